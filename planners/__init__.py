@@ -1,0 +1,1 @@
+"""The pure core: true with no scheduler, disk or screen."""

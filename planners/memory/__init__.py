@@ -1,0 +1,1 @@
+"""What is remembered: experiences, hallucinated problems, the encoder and recall."""

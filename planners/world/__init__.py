@@ -1,0 +1,1 @@
+"""Where a robot moves: problems, the vehicle, collision, and the classes problems are drawn from."""

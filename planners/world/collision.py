@@ -1,0 +1,229 @@
+"""Exact collision of the car's footprint with convex obstacles: a cell look-up, then separating axes.
+
+Each piece is listed in every cell of a grid in which a footprint's centre could lie when it touches the
+piece, so one check reads one cell, however many obstacles there are.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.dynamics import step_margin
+from planners.world.jit import inlined, jit
+from planners.world.problem import Floats, Integers, Problem
+from planners.world.vehicle import Vehicle
+
+CELL_M = 1.0  # measured: smaller cells cost more to fill than they save in checks
+REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept car, a roadmap node's body
+
+
+class Scene(NamedTuple):
+    """A problem made ready for collision checks."""
+
+    bounds: Floats  # [4] x_min, y_min, x_max, y_max in metres
+    vertices: Floats  # [V, 2] metres
+    normals: Floats  # [V, 2] outward unit normal of the edge that begins at each vertex
+    offsets: Floats  # [V] normal . vertex, metres
+    piece_starts: Integers  # [P + 1]
+    cell_starts: Integers  # [rows * columns + 1]
+    cell_pieces: Integers  # [K] pieces within reach of a cell, cell by cell
+    columns: int
+
+
+@inlined
+def box_meets_piece(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    piece: int,
+    vertices: Floats,
+    normals: Floats,
+    offsets: Floats,
+    piece_starts: Integers,
+) -> bool:
+    """Whether a box (centre, direction, half extents) and a convex piece share a point (separating axes)."""
+    first = piece_starts[piece]
+    last = piece_starts[piece + 1]
+    for i in range(first, last):
+        nx = normals[i, 0]
+        ny = normals[i, 1]
+        extent = half_length * abs(nx * cos + ny * sin) + half_width * abs(ny * cos - nx * sin)
+        if nx * x + ny * y - offsets[i] > extent:
+            return False
+    low_u = math.inf
+    high_u = -math.inf
+    low_w = math.inf
+    high_w = -math.inf
+    for i in range(first, last):
+        dx = vertices[i, 0] - x
+        dy = vertices[i, 1] - y
+        u = dx * cos + dy * sin
+        w = dy * cos - dx * sin
+        low_u = min(low_u, u)
+        high_u = max(high_u, u)
+        low_w = min(low_w, w)
+        high_w = max(high_w, w)
+    return not (
+        low_u > half_length or high_u < -half_length or low_w > half_width or high_w < -half_width
+    )
+
+
+@jit
+def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
+    """Edge normals and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
+    count = vertices.shape[0]
+    pieces = piece_starts.shape[0] - 1
+    normals = np.empty((count, 2))
+    offsets = np.empty(count)
+    for p in range(pieces):
+        first = piece_starts[p]
+        last = piece_starts[p + 1]
+        for i in range(first, last):
+            j = i + 1 if i + 1 < last else first
+            ex = vertices[j, 0] - vertices[i, 0]
+            ey = vertices[j, 1] - vertices[i, 1]
+            length = math.hypot(ex, ey)
+            normals[i, 0] = ey / length
+            normals[i, 1] = -ex / length
+            offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
+    columns = int(math.ceil((bounds[2] - bounds[0]) / CELL_M)) + 1
+    rows = int(math.ceil((bounds[3] - bounds[1]) / CELL_M)) + 1
+    half = 0.5 * CELL_M + REACH_M
+    listed_cells = np.empty(64 * pieces + 64, np.int32)
+    listed_pieces = np.empty(64 * pieces + 64, np.int32)
+    cell_starts = np.zeros(rows * columns + 1, np.int32)
+    listed = 0
+    for p in range(pieces):
+        first = piece_starts[p]
+        last = piece_starts[p + 1]
+        x_min = math.inf
+        y_min = math.inf
+        x_max = -math.inf
+        y_max = -math.inf
+        for i in range(first, last):
+            x_min = min(x_min, vertices[i, 0])
+            x_max = max(x_max, vertices[i, 0])
+            y_min = min(y_min, vertices[i, 1])
+            y_max = max(y_max, vertices[i, 1])
+        column_0 = max(0, int(math.floor((x_min - REACH_M - bounds[0]) / CELL_M)))
+        column_1 = min(columns - 1, int(math.floor((x_max + REACH_M - bounds[0]) / CELL_M)))
+        row_0 = max(0, int(math.floor((y_min - REACH_M - bounds[1]) / CELL_M)))
+        row_1 = min(rows - 1, int(math.floor((y_max + REACH_M - bounds[1]) / CELL_M)))
+        for row in range(row_0, row_1 + 1):
+            centre_y = bounds[1] + (row + 0.5) * CELL_M
+            for column in range(column_0, column_1 + 1):
+                centre_x = bounds[0] + (column + 0.5) * CELL_M
+                near = True
+                for i in range(first, last):
+                    nx = normals[i, 0]
+                    ny = normals[i, 1]
+                    gap = nx * centre_x + ny * centre_y - offsets[i]
+                    if gap > half * (abs(nx) + abs(ny)):
+                        near = False
+                        break
+                if near:
+                    if listed == listed_cells.shape[0]:
+                        listed_cells = np.concatenate((listed_cells, np.empty_like(listed_cells)))
+                        listed_pieces = np.concatenate((listed_pieces, np.empty_like(listed_pieces)))
+                    cell = row * columns + column
+                    listed_cells[listed] = cell
+                    listed_pieces[listed] = p
+                    cell_starts[cell + 1] += 1
+                    listed += 1
+    for cell in range(rows * columns):
+        cell_starts[cell + 1] += cell_starts[cell]
+    cell_pieces = np.empty(listed, np.int32)
+    for k in range(listed - 1, -1, -1):  # backwards, with starts moved up: each cell keeps its order
+        cell = listed_cells[k]
+        cell_starts[cell + 1] -= 1
+        cell_pieces[cell_starts[cell + 1]] = listed_pieces[k]
+    for cell in range(rows * columns):
+        cell_starts[cell] = cell_starts[cell + 1]
+    cell_starts[rows * columns] = listed
+    return Scene(
+        bounds, vertices, normals, offsets, piece_starts, cell_starts, cell_pieces, columns
+    )
+
+
+def scene_of(problem: Problem) -> Scene:
+    """The problem made ready for collision checks."""
+    obstacles = problem.obstacles
+    return build_scene(obstacles.vertices, obstacles.piece_starts, np.array(problem.bounds))
+
+
+@inlined
+def box_is_free(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    scene: Scene,
+) -> bool:
+    """Whether a box lies inside the bounds and meets no obstacle; its half-diagonal is at most REACH_M."""
+    extent_x = half_length * abs(cos) + half_width * abs(sin)
+    extent_y = half_length * abs(sin) + half_width * abs(cos)
+    bounds = scene.bounds
+    if (
+        x - extent_x < bounds[0]
+        or x + extent_x > bounds[2]
+        or y - extent_y < bounds[1]
+        or y + extent_y > bounds[3]
+    ):
+        return False
+    column = int((x - bounds[0]) * (1.0 / CELL_M))
+    row = int((y - bounds[1]) * (1.0 / CELL_M))
+    cell = row * scene.columns + column
+    for k in range(scene.cell_starts[cell], scene.cell_starts[cell + 1]):
+        if box_meets_piece(
+            x,
+            y,
+            cos,
+            sin,
+            half_length,
+            half_width,
+            scene.cell_pieces[k],
+            scene.vertices,
+            scene.normals,
+            scene.offsets,
+            scene.piece_starts,
+        ):
+            return False
+    return True
+
+
+@inlined
+def state_is_free(
+    x: float, y: float, heading: float, speed: float, steering: float, car: Vehicle, scene: Scene
+) -> bool:
+    """Whether the car's footprint, inflated for the steps into and out of this state, is free."""
+    margin = step_margin(speed, steering, car)
+    cos = math.cos(heading)
+    sin = math.sin(heading)
+    ahead = 0.5 * (car.front - car.rear)
+    return box_is_free(
+        x + ahead * cos,
+        y + ahead * sin,
+        cos,
+        sin,
+        0.5 * (car.front + car.rear) + margin,
+        0.5 * car.width + margin,
+        scene,
+    )
+
+
+@jit
+def count_free_prefix(states: Floats, car: Vehicle, scene: Scene) -> int:
+    """How many of ``states [T, 5]`` are free before the first that is not; T when all are."""
+    for i in range(states.shape[0]):
+        s = states[i]
+        if not state_is_free(s[0], s[1], s[2], s[3], s[4], car, scene):
+            return i
+    return states.shape[0]

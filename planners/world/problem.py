@@ -1,0 +1,106 @@
+"""What is asked (a Problem) and what is answered (a Plan)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.vehicle import CAR, Vehicle
+
+Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+Integers = np.ndarray[tuple[int, ...], np.dtype[np.int32]]
+
+CANONICAL_START = (0.0, 0.0, math.pi / 4)  # metres, metres, radians: facing the goal
+CANONICAL_GOAL = (50.0, 50.0)  # metres
+CANONICAL_DISTANCE = math.hypot(*CANONICAL_GOAL)
+GOAL_RADIUS = 2.0  # metres
+BOUNDS = (-7.0, -7.0, 57.0, 57.0)  # x_min, y_min, x_max, y_max in metres
+
+
+class Obstacles(NamedTuple):
+    """Obstacles as groups of convex pieces; coordinates are exact in float32, so shards keep them exactly."""
+
+    vertices: Floats  # [V, 2] metres, counter-clockwise within each piece
+    piece_starts: Integers  # [P + 1] piece p owns vertices[piece_starts[p] : piece_starts[p + 1]]
+    obstacle_starts: Integers  # [O + 1] obstacle o owns pieces obstacle_starts[o] : obstacle_starts[o + 1]
+
+    def pieces(self) -> list[Floats]:
+        """The convex pieces, each ``[n, 2]`` metres."""
+        return np.split(self.vertices, self.piece_starts[1:-1]) if len(self.piece_starts) > 1 else []
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Start pose, goal disc, bounds and obstacles (method.md: ``S``)."""
+
+    id: str
+    class_name: str
+    start: tuple[float, float, float]  # x, y in metres, heading in radians
+    goal: tuple[float, float]  # metres
+    goal_radius: float  # metres
+    bounds: tuple[float, float, float, float]  # x_min, y_min, x_max, y_max in metres
+    obstacles: Obstacles
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """States and the controls between them at a fixed time step (method.md: ``P``)."""
+
+    states: Floats  # [T, 5] x m, y m, heading rad, speed m/s, steering rad
+    controls: Floats  # [T - 1, 2] acceleration m/s^2, steering rate rad/s
+    dt: float = CAR.dt  # seconds
+
+    @property
+    def length_m(self) -> float:
+        """Length of the rear axle's way, in metres."""
+        return float(np.hypot(*np.diff(self.states[:, :2], axis=0).T).sum())
+
+    @property
+    def duration_s(self) -> float:
+        """Driving time in seconds."""
+        return self.dt * len(self.controls)
+
+
+def obstacles_of(groups: list[list[Floats]]) -> Obstacles:
+    """Pack obstacles, each a list of convex pieces ``[n, 2]``, turning pieces counter-clockwise."""
+    pieces = [counter_clockwise(piece) for group in groups for piece in group]
+    vertices = np.concatenate(pieces) if pieces else np.empty((0, 2))
+    return Obstacles(
+        np.ascontiguousarray(vertices.astype(np.float32).astype(np.float64)),
+        np.cumsum([0] + [len(piece) for piece in pieces], dtype=np.int32),
+        np.cumsum([0] + [len(group) for group in groups], dtype=np.int32),
+    )
+
+
+def counter_clockwise(polygon: Floats) -> Floats:
+    """The same polygon ``[n, 2]`` with its vertices in counter-clockwise order."""
+    x, y = polygon[:, 0], polygon[:, 1]
+    area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    return polygon if area >= 0.0 else polygon[::-1]
+
+
+def start_state(problem: Problem) -> Floats:
+    """The state ``[5]`` at rest, wheels straight, at the problem's start."""
+    return np.array([*problem.start, 0.0, 0.0])
+
+
+__all__ = [
+    "BOUNDS",
+    "CANONICAL_DISTANCE",
+    "CANONICAL_GOAL",
+    "CANONICAL_START",
+    "CAR",
+    "GOAL_RADIUS",
+    "Floats",
+    "Integers",
+    "Obstacles",
+    "Plan",
+    "Problem",
+    "Vehicle",
+    "counter_clockwise",
+    "obstacles_of",
+    "start_state",
+]
