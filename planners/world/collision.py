@@ -69,9 +69,7 @@ def box_meets_piece(
         high_u = max(high_u, u)
         low_w = min(low_w, w)
         high_w = max(high_w, w)
-    return not (
-        low_u > half_length or high_u < -half_length or low_w > half_width or high_w < -half_width
-    )
+    return not (low_u > half_length or high_u < -half_length or low_w > half_width or high_w < -half_width)
 
 
 @jit
@@ -92,8 +90,8 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
             normals[i, 0] = ey / length
             normals[i, 1] = -ex / length
             offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
-    columns = int(math.ceil((bounds[2] - bounds[0]) / CELL_M)) + 1
-    rows = int(math.ceil((bounds[3] - bounds[1]) / CELL_M)) + 1
+    columns = math.ceil((bounds[2] - bounds[0]) / CELL_M) + 1
+    rows = math.ceil((bounds[3] - bounds[1]) / CELL_M) + 1
     half = 0.5 * CELL_M + REACH_M
     listed_cells = np.empty(64 * pieces + 64, np.int32)
     listed_pieces = np.empty(64 * pieces + 64, np.int32)
@@ -111,10 +109,10 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
             x_max = max(x_max, vertices[i, 0])
             y_min = min(y_min, vertices[i, 1])
             y_max = max(y_max, vertices[i, 1])
-        column_0 = max(0, int(math.floor((x_min - REACH_M - bounds[0]) / CELL_M)))
-        column_1 = min(columns - 1, int(math.floor((x_max + REACH_M - bounds[0]) / CELL_M)))
-        row_0 = max(0, int(math.floor((y_min - REACH_M - bounds[1]) / CELL_M)))
-        row_1 = min(rows - 1, int(math.floor((y_max + REACH_M - bounds[1]) / CELL_M)))
+        column_0 = max(0, math.floor((x_min - REACH_M - bounds[0]) / CELL_M))
+        column_1 = min(columns - 1, math.floor((x_max + REACH_M - bounds[0]) / CELL_M))
+        row_0 = max(0, math.floor((y_min - REACH_M - bounds[1]) / CELL_M))
+        row_1 = min(rows - 1, math.floor((y_max + REACH_M - bounds[1]) / CELL_M))
         for row in range(row_0, row_1 + 1):
             centre_y = bounds[1] + (row + 0.5) * CELL_M
             for column in range(column_0, column_1 + 1):
@@ -146,9 +144,7 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
     for cell in range(rows * columns):
         cell_starts[cell] = cell_starts[cell + 1]
     cell_starts[rows * columns] = listed
-    return Scene(
-        bounds, vertices, normals, offsets, piece_starts, cell_starts, cell_pieces, columns
-    )
+    return Scene(bounds, vertices, normals, offsets, piece_starts, cell_starts, cell_pieces, columns)
 
 
 def scene_of(problem: Problem) -> Scene:

@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from planners.world.jit import inlined, jit
+from planners.world.problem import Floats
 from planners.world.vehicle import Vehicle
-
-
 
 
 @inlined

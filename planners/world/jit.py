@@ -22,7 +22,7 @@ def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a small kernel into each of its callers; passing many arrays costs more than its work."""
-    compiled: Callable[_P, _R] = numba.njit(
-        cache=True, nogil=True, error_model="numpy", forceinline=True
-    )(function)
+    compiled: Callable[_P, _R] = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(
+        function
+    )
     return compiled

@@ -1,0 +1,47 @@
+# Everything a newcomer types. Each target installs what it needs into .venv first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+TORCH := torch==2.13.0
+PIP := $(BIN)/pip --disable-pip-version-check --quiet
+export PYTHONWARNINGS ?= default
+
+.PHONY: run smoke test test-slow check speed format clean
+
+run: $(READY)  ## the main job: every stage on the three classes, under 10 minutes on 2 cores
+	$(BIN)/motion-memory run --preset laptop
+
+smoke: $(READY)  ## the same, tiny: under a minute
+	$(BIN)/motion-memory run --preset smoke
+
+test: $(READY)  ## the test suite, in parallel
+	$(BIN)/pytest -n 2 --dist worksteal -q
+
+test-slow: $(READY)  ## the tests that take minutes
+	$(BIN)/pytest -m slow -q --timeout 3600
+
+check: $(READY)  ## lint, types, import contracts
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+speed: $(READY)  ## per class and planner: times, solved share, collision checks a second; roadmap size sweep
+	$(BIN)/python -m tests.speed.planners
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) build *.egg-info
+
+# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
+	$(PYTHON) -m venv $(VENV)
+	@echo "Installing into $(VENV), some two minutes ..."
+	$(PIP) install -c constraints.txt $(TORCH)
+	$(PIP) install -c constraints.txt --editable '.[dev]'
+	touch $(READY)

@@ -1,0 +1,83 @@
+"""What every planner does around its kernel: blocked ends, slices between looks at the clock, the outcome."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+
+from planners.search.outcome import Limits, Outcome, Status
+from planners.search.tree import (
+    CHECKS,
+    EXPANSIONS,
+    GOAL_VERTEX,
+    SIZE,
+    Tree,
+    allocate_tree,
+    plan_to_goal,
+    plant,
+)
+from planners.world.collision import Scene, box_is_free, state_is_free
+from planners.world.jit import jit
+from planners.world.problem import Floats, Problem, start_state
+from planners.world.vehicle import Vehicle
+
+SLICE = 256  # expansions between two looks at the clock: some milliseconds
+
+
+@jit
+def _is_blocked(state: Floats, goal: Floats, car: Vehicle, scene: Scene) -> int:
+    if not state_is_free(state[0], state[1], state[2], state[3], state[4], car, scene):
+        return 1
+    return 0 if box_is_free(goal[0], goal[1], 1.0, 0.0, 0.0, 0.0, scene) else 2
+
+
+def attempt(
+    problem: Problem,
+    scene: Scene,
+    limits: Limits,
+    car: Vehicle,
+    prepare: Callable[[Tree, Floats], None],
+    grow: Callable[[Tree, Floats, int], None],
+) -> Outcome:
+    """Plant a tree, ``prepare(tree, goal)`` once (roadmaps), then ``grow(tree, goal, until)`` until solved.
+
+    ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
+    """
+    began = perf_counter()
+    tree = allocate_tree(limits.nodes)
+    root = start_state(problem)
+    goal = np.array([*problem.goal, problem.goal_radius])
+    plant(tree, root, scene.bounds)
+    counts = tree.counts
+    blocked = _is_blocked(root, goal, car, scene)
+    roadmap_seconds = 0.0
+    if blocked:
+        status = Status.START_BLOCKED if blocked == 1 else Status.GOAL_BLOCKED
+    elif math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
+        counts[GOAL_VERTEX] = 0
+        status = Status.SOLVED
+    else:
+        prepare(tree, goal)
+        roadmap_seconds = perf_counter() - began
+        status = Status.BUDGET_SPENT
+        while counts[EXPANSIONS] < limits.expansions and counts[SIZE] < limits.nodes:
+            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, limits.expansions))
+            if counts[GOAL_VERTEX] >= 0:
+                status = Status.SOLVED
+                break
+            if perf_counter() - began > limits.seconds:
+                status = Status.TIME_SPENT
+                break
+    plan = plan_to_goal(tree, car.dt) if status is Status.SOLVED else None
+    return Outcome(
+        status=status,
+        plan=plan,
+        collision_checks=int(counts[CHECKS]),
+        expansions=int(counts[EXPANSIONS]),
+        nodes=int(counts[SIZE]),
+        roadmap_seconds=roadmap_seconds,
+        search_seconds=perf_counter() - began - roadmap_seconds,
+    )

@@ -1,0 +1,210 @@
+"""Follow (Plaku, Plaku and Simari, Robotica 2018): the tree follows a lead path over the roadmap closely."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.attempt import attempt
+from planners.search.gust import (
+    SAMPLE,
+    Groups,
+    GustSettings,
+    allocate_groups,
+    choose_member,
+    clear_groups,
+    grow_gust,
+    heaviest,
+    join_groups,
+    keep,
+)
+from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
+from planners.search.roadmap import (
+    CHECKS as ROADMAP_CHECKS,
+)
+from planners.search.roadmap import (
+    Roadmap,
+    RoadmapSettings,
+    allocate_roadmap,
+    build_roadmap,
+    node_of,
+    resample_way,
+)
+from planners.search.sampling import in_disc
+from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
+from planners.world.collision import Scene, scene_of
+from planners.world.jit import jit
+from planners.world.problem import Floats, Integers, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+LONGEST_LEAD = 256  # waypoints
+# places in Lead.marks
+LENGTH, SINCE_FOLLOW, SINCE_GROUP = range(3)
+
+
+class FollowSettings(NamedTuple):
+    """Defaults of algorithms.md, Follow; edges of the roadmap cost length / clearance."""
+
+    gust: GustSettings = GustSettings(roadmap=RoadmapSettings(clearance_exponent=1.0))
+    spacing_m: float = 3.0  # R: between waypoints, and the radius of the tube around the lead
+    passing_m: float = 2.0  # a waypoint is passed within this distance
+    near_radius_m: float = 2.0  # targets: around the next waypoint, one radius or the other
+    far_radius_m: float = 3.0
+    progress_base: float = 4.0  # a group's weight is this to the power of its waypoint
+    selection_penalty: float = 0.95
+    patience: int = 150  # iterations without a new follow group before a new lead may be drawn
+    group_patience: int = 100  # iterations without a new GUST group before exploring ...
+    explorations: int = 20  # ... for this many
+
+
+class Lead(NamedTuple):
+    """The path that is followed and the groups of vertices by next waypoint."""
+
+    points: Floats  # [LONGEST_LEAD, 2] metres
+    weights: Floats  # [LONGEST_LEAD] logarithms
+    counts: Integers  # [LONGEST_LEAD] vertices ever put into each group
+    members: Integers  # [LONGEST_LEAD, SAMPLE] a uniform sample of them
+    marks: Integers  # [3] LENGTH of the path, iterations SINCE_FOLLOW and SINCE_GROUP were new
+
+
+@functools.lru_cache(maxsize=1)
+def allocate_lead() -> Lead:
+    """Buffers for a lead path."""
+    return Lead(
+        np.empty((LONGEST_LEAD, 2)),
+        np.empty(LONGEST_LEAD),
+        np.empty(LONGEST_LEAD, np.int32),
+        np.empty((LONGEST_LEAD, SAMPLE), np.int32),
+        np.zeros(3, np.int32),
+    )
+
+
+@jit
+def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: np.random.Generator) -> None:
+    waypoint = tree.waypoints[vertex]
+    if lead.counts[waypoint] == 0:
+        lead.weights[waypoint] = waypoint * math.log(progress_base)
+        lead.marks[SINCE_FOLLOW] = 0
+    keep(lead.members[waypoint], lead.counts[waypoint], vertex, rng)
+    lead.counts[waypoint] += 1
+
+
+@jit
+def _new_lead(
+    tree: Tree,
+    node: int,
+    roadmap: Roadmap,
+    groups: Groups,
+    lead: Lead,
+    settings: FollowSettings,
+    rng: np.random.Generator,
+) -> None:
+    """Follow the way of ``node``'s group from now on; its vertices are where to begin."""
+    lead.marks[LENGTH] = resample_way(roadmap, node, settings.spacing_m, lead.points)
+    lead.counts[:] = 0
+    for k in range(min(groups.counts[node], SAMPLE)):
+        vertex = groups.members[node, k]
+        tree.waypoints[vertex] = 0
+        _join_lead(tree, vertex, lead, settings.progress_base, rng)
+    lead.marks[SINCE_FOLLOW] = 0
+
+
+@jit
+def _grow(
+    tree: Tree,
+    goal: Floats,
+    until: int,
+    roadmap: Roadmap,
+    groups: Groups,
+    lead: Lead,
+    settings: FollowSettings,
+    car: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    counts = tree.counts
+    marks = lead.marks
+    gust = settings.gust
+    while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
+        known = groups.size[0]
+        if marks[SINCE_GROUP] >= settings.group_patience:
+            last = min(counts[EXPANSIONS] + settings.explorations, until)
+            grow_gust(tree, goal, last, True, roadmap, groups, gust, car, scene, rng)
+            if counts[GOAL_VERTEX] >= 0:
+                return
+            marks[SINCE_GROUP] = 0
+            continue
+        stuck = marks[SINCE_FOLLOW]
+        if stuck > settings.patience and rng.random() < 0.5 * 2.0 ** (stuck / settings.patience - 1.0):
+            node = heaviest(groups)
+            groups.weights[node] += math.log(gust.selection_penalty)
+            _new_lead(tree, node, roadmap, groups, lead, settings, rng)
+        waypoint = 0
+        best = -math.inf
+        for i in range(marks[LENGTH]):
+            if lead.counts[i] > 0 and lead.weights[i] > best:
+                best = lead.weights[i]
+                waypoint = i
+        lead.weights[waypoint] += math.log(settings.selection_penalty)
+        radius = settings.near_radius_m if rng.random() < 0.5 else settings.far_radius_m
+        x, y = in_disc(lead.points[waypoint, 0], lead.points[waypoint, 1], radius, rng)
+        vertex = choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, car, rng)
+        first = counts[SIZE]
+        marks[SINCE_FOLLOW] += 1
+        marks[SINCE_GROUP] += 1
+        added = extend(
+            tree,
+            vertex,
+            x,
+            y,
+            goal,
+            lead.points[: marks[LENGTH]],
+            settings.spacing_m,
+            settings.passing_m,
+            gust.extension,
+            car,
+            scene,
+            rng,
+        )
+        if counts[GOAL_VERTEX] >= 0:
+            return
+        for new in range(first, first + added):
+            _join_lead(tree, new, lead, settings.progress_base, rng)
+        join_groups(tree, first, added, roadmap, groups, gust.distance_exponent, rng)
+        if groups.size[0] > known:
+            marks[SINCE_GROUP] = 0
+
+
+def follow(
+    problem: Problem,
+    settings: FollowSettings,
+    rng: np.random.Generator,
+    guide: Guide | None = None,
+    scene: Scene | None = None,
+    limits: Limits | None = None,
+    car: Vehicle = CAR,
+) -> Outcome:
+    """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
+    ready = scene_of(problem) if scene is None else scene
+    guiding = NO_GUIDE if guide is None else guide
+    on_roadmap = settings.gust.roadmap
+    roadmap = allocate_roadmap(on_roadmap.most_nodes, on_roadmap.neighbours)
+    groups = allocate_groups(on_roadmap.most_nodes)
+    lead = allocate_lead()
+
+    def prepare(tree: Tree, goal: Floats) -> None:
+        root = tree.states[0]
+        build_roadmap(roadmap, root, goal, guiding, on_roadmap, car, ready, rng)
+        tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
+        clear_groups(groups)
+        join_groups(tree, 0, 1, roadmap, groups, settings.gust.distance_exponent, rng)
+        lead.marks[:] = 0
+        _new_lead(tree, node_of(roadmap, root[0], root[1]), roadmap, groups, lead, settings, rng)
+
+    def grow(tree: Tree, goal: Floats, until: int) -> None:
+        _grow(tree, goal, until, roadmap, groups, lead, settings, car, ready, rng)
+
+    return attempt(problem, ready, limits or Limits(), car, prepare, grow)

@@ -1,0 +1,216 @@
+"""GUST (Plaku, T-RO 2015): a roadmap groups the tree's vertices and says which group is worth extending."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.attempt import attempt
+from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
+from planners.search.roadmap import (
+    CHECKS as ROADMAP_CHECKS,
+)
+from planners.search.roadmap import (
+    Roadmap,
+    RoadmapSettings,
+    allocate_roadmap,
+    build_roadmap,
+    node_of,
+    resample_way,
+)
+from planners.search.sampling import in_bounds, in_disc
+from planners.search.tree import (
+    CHECKS,
+    EXPANSIONS,
+    EXTENSION,
+    GOAL_VERTEX,
+    NO_PATH,
+    SIZE,
+    Extension,
+    Tree,
+    extend,
+)
+from planners.world.collision import Scene, scene_of
+from planners.world.jit import inlined, jit
+from planners.world.problem import Floats, Integers, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
+
+
+class GustSettings(NamedTuple):
+    """Defaults of algorithms.md, GUST."""
+
+    roadmap: RoadmapSettings = RoadmapSettings()
+    distance_exponent: float = 8.0  # delta: how much nearer groups are preferred
+    selection_penalty: float = 0.95  # alpha
+    guide_probability: float = 0.5  # else the target is uniform
+    guide_spacing_m: float = 3.0
+    guide_steps: int = 4  # U{1 .. this} points ahead
+    guide_radius_m: float = 2.0
+    extension: Extension = EXTENSION
+
+
+class Groups(NamedTuple):
+    """Groups of tree vertices by nearest roadmap node; weights are logarithms, so none underflows."""
+
+    weights: Floats  # [C] log weight by node
+    counts: Integers  # [C] vertices ever put into each group
+    members: Integers  # [C, SAMPLE] a uniform sample of them
+    active: Integers  # [C] nodes that have a group, in the order in which they got it
+    size: Integers  # [1] how many those are
+    way: Floats  # [8, 2] points ahead of a group, metres
+
+
+@functools.lru_cache(maxsize=2)
+def allocate_groups(capacity: int) -> Groups:
+    """Buffers for groups of ``capacity`` roadmap nodes."""
+    return Groups(
+        np.empty(capacity),
+        np.empty(capacity, np.int32),
+        np.empty((capacity, SAMPLE), np.int32),
+        np.empty(capacity, np.int32),
+        np.zeros(1, np.int32),
+        np.empty((8, 2)),
+    )
+
+
+@jit
+def clear_groups(groups: Groups) -> None:
+    """Forget all groups."""
+    groups.counts[:] = 0
+    groups.size[0] = 0
+
+
+@inlined
+def keep(members: Integers, count: int, vertex: int, rng: np.random.Generator) -> None:
+    """Keep a uniform sample of all vertices ever put, ``count`` of them before this one (algorithm R)."""
+    place = count
+    if count >= members.shape[0]:
+        place = int(rng.random() * (count + 1))
+    if place < members.shape[0]:
+        members[place] = vertex
+
+
+@jit
+def join_groups(
+    tree: Tree,
+    first: int,
+    count: int,
+    roadmap: Roadmap,
+    groups: Groups,
+    distance_exponent: float,
+    rng: np.random.Generator,
+) -> None:
+    """Put vertices ``first ..`` into the groups of their nearest roadmap nodes."""
+    for vertex in range(first, first + count):
+        node = node_of(roadmap, tree.states[vertex, 0], tree.states[vertex, 1])
+        if groups.counts[node] == 0:
+            groups.active[groups.size[0]] = node
+            groups.size[0] += 1
+            groups.weights[node] = -distance_exponent * math.log(max(roadmap.distances[node], 1e-3))
+        keep(groups.members[node], groups.counts[node], vertex, rng)
+        groups.counts[node] += 1
+
+
+@inlined
+def heaviest(groups: Groups) -> int:
+    """The node whose group weighs most."""
+    best = groups.active[0]
+    for i in range(1, groups.size[0]):
+        if groups.weights[groups.active[i]] > groups.weights[best]:
+            best = groups.active[i]
+    return int(best)
+
+
+@jit
+def choose_member(
+    tree: Tree,
+    members: Integers,
+    count: int,
+    x: float,
+    y: float,
+    car: Vehicle,
+    rng: np.random.Generator,
+) -> int:
+    """A vertex, the likelier the sooner it was reached and the sooner it could reach (x, y).
+
+    Probability in proportion to 1 / (time from the root + distance / max(0.01 v_max, v)).
+    """
+    looked_at = min(count, members.shape[0])
+    total = 0.0
+    chosen = members[0]
+    for k in range(looked_at):
+        vertex = members[k]
+        if tree.spent[vertex]:
+            continue
+        distance = math.hypot(tree.states[vertex, 0] - x, tree.states[vertex, 1] - y)
+        speed = max(0.01 * car.max_speed, tree.states[vertex, 3])
+        weight = 1.0 / (tree.depths[vertex] * car.dt + distance / speed + 1e-9)
+        total += weight
+        if rng.random() * total < weight:  # each stays with its share, without a second pass
+            chosen = vertex
+    return int(chosen)
+
+
+@jit
+def grow_gust(
+    tree: Tree,
+    goal: Floats,
+    until: int,
+    uniform: bool,
+    roadmap: Roadmap,
+    groups: Groups,
+    settings: GustSettings,
+    car: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    """Extend the heaviest group until solved or ``until`` expansions; ``uniform`` ignores its way ahead."""
+    counts = tree.counts
+    while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
+        node = heaviest(groups)
+        groups.weights[node] += math.log(settings.selection_penalty)
+        if not uniform and rng.random() < settings.guide_probability:
+            ahead = 1 + int(rng.random() * settings.guide_steps)
+            filled = resample_way(roadmap, node, settings.guide_spacing_m, groups.way[: ahead + 2])
+            point = groups.way[min(ahead, filled - 1)]
+            x, y = in_disc(point[0], point[1], settings.guide_radius_m, rng)
+        else:
+            x, y = in_bounds(scene.bounds, rng)
+        vertex = choose_member(tree, groups.members[node], groups.counts[node], x, y, car, rng)
+        first = counts[SIZE]
+        added = extend(tree, vertex, x, y, goal, NO_PATH, 0.0, 0.0, settings.extension, car, scene, rng)
+        if counts[GOAL_VERTEX] >= 0:
+            return
+        join_groups(tree, first, added, roadmap, groups, settings.distance_exponent, rng)
+
+
+def gust(
+    problem: Problem,
+    settings: GustSettings,
+    rng: np.random.Generator,
+    guide: Guide | None = None,
+    scene: Scene | None = None,
+    limits: Limits | None = None,
+    car: Vehicle = CAR,
+) -> Outcome:
+    """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
+    ready = scene_of(problem) if scene is None else scene
+    guiding = NO_GUIDE if guide is None else guide
+    roadmap = allocate_roadmap(settings.roadmap.most_nodes, settings.roadmap.neighbours)
+    groups = allocate_groups(settings.roadmap.most_nodes)
+
+    def prepare(tree: Tree, goal: Floats) -> None:
+        build_roadmap(roadmap, tree.states[0], goal, guiding, settings.roadmap, car, ready, rng)
+        tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
+        clear_groups(groups)
+        join_groups(tree, 0, 1, roadmap, groups, settings.distance_exponent, rng)
+
+    def grow(tree: Tree, goal: Floats, until: int) -> None:
+        grow_gust(tree, goal, until, False, roadmap, groups, settings, car, ready, rng)
+
+    return attempt(problem, ready, limits or Limits(), car, prepare, grow)

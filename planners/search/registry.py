@@ -1,0 +1,35 @@
+"""The planners by name. A new one is a file and a line here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from planners.search.follow import FollowSettings, follow
+from planners.search.gust import GustSettings, gust
+from planners.search.outcome import Guide, Limits, Outcome
+from planners.search.rrt import RrtSettings, rrt
+from planners.world.collision import Scene
+from planners.world.problem import Problem
+
+Planner = Callable[..., Outcome]
+
+PLANNERS: dict[str, Planner] = {
+    "rrt": partial(rrt, settings=RrtSettings()),
+    "gust": partial(gust, settings=GustSettings()),
+    "follow": partial(follow, settings=FollowSettings()),
+}
+
+
+def plan(
+    name: str,
+    problem: Problem,
+    rng: np.random.Generator,
+    guide: Guide | None = None,
+    scene: Scene | None = None,
+    limits: Limits | None = None,
+) -> Outcome:
+    """Solve ``problem`` with the planner called ``name``, with its default settings."""
+    return PLANNERS[name](problem, rng=rng, guide=guide, scene=scene, limits=limits)

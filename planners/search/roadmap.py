@@ -1,0 +1,348 @@
+"""The roadmap of GUST and Follow: free places, the strips between them, and the shortest ways to the goal.
+
+Strips are checked only when Dijkstra's search would use them, which gives the same ways for far fewer
+checks. Batches are added until the start is connected.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.neighbours import (
+    Buckets,
+    allocate_buckets,
+    clear_buckets,
+    nearest,
+    nearest_k,
+    put,
+)
+from planners.search.outcome import Guide
+from planners.search.sampling import guided
+from planners.world.collision import REACH_M, Scene, box_is_free
+from planners.world.jit import inlined, jit
+from planners.world.problem import Floats, Integers
+from planners.world.vehicle import Vehicle
+
+GOAL, START = 0, 1  # the first two nodes
+# places in Roadmap.counts
+NODES, CHECKS, EDGES = range(3)
+UNKNOWN, FREE, BLOCKED = range(3)
+
+
+class RoadmapSettings(NamedTuple):
+    """How a roadmap is built (algorithms.md, Roadmap)."""
+
+    batch: int = 100  # nodes drawn before the first, and between two, searches for a way from the start
+    neighbours: int = 10
+    most_nodes: int = 3000
+    body_length_scale: float = 1.5  # a node's body must be free: a little more room than the car needs
+    body_width_scale: float = 1.25
+    guide_radius_m: float = 4.0
+    clearance_exponent: float = 0.0  # edge cost: length / clearance^f; GUST 0, Follow 1
+    clearance_limit_m: float = 5.0  # places with more room than this are all alike
+
+
+class Roadmap(NamedTuple):
+    """Nodes, edges and the way from each node to the goal; buffers are kept from problem to problem."""
+
+    nodes: Floats  # [C, 2] metres
+    clearances: Floats  # [C] metres to the nearest obstacle
+    distances: Floats  # [C] d(q): cost of the way to the goal, infinite where there is none
+    following: Integers  # [C] next node of that way
+    heads: Integers  # [C] first edge of a node, -1: none
+    edge_next: Integers  # [E] edges come in pairs 2i, 2i + 1, one a direction
+    edge_to: Integers  # [E]
+    edge_state: Integers  # [E / 2] UNKNOWN, FREE, BLOCKED
+    edge_length: Floats  # [E / 2] metres
+    heap: Integers  # [C] binary heap of Dijkstra's search
+    places: Integers  # [C] a node's place in the heap, -1: not in it
+    counts: Integers  # [3] NODES, CHECKS, EDGES
+    sampled: Buckets  # all nodes
+    connected: Buckets  # those that reach the goal
+    near_items: Integers  # [k]
+    near_distances: Floats  # [k]
+
+
+@functools.lru_cache(maxsize=2)
+def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
+    """Buffers for ``capacity`` nodes, one set a process and size."""
+    nodes = np.empty((capacity, 2))
+    edges = 2 * capacity * neighbours
+    return Roadmap(
+        nodes,
+        np.empty(capacity),
+        np.empty(capacity),
+        np.empty(capacity, np.int32),
+        np.empty(capacity, np.int32),
+        np.empty(edges, np.int32),
+        np.empty(edges, np.int32),
+        np.empty(edges // 2, np.int32),
+        np.empty(edges // 2),
+        np.empty(capacity, np.int32),
+        np.empty(capacity, np.int32),
+        np.zeros(3, np.int32),
+        allocate_buckets(nodes),
+        allocate_buckets(nodes),
+        np.empty(neighbours, np.int32),
+        np.empty(neighbours),
+    )
+
+
+@jit
+def clearance(x: float, y: float, limit: float, scene: Scene) -> float:
+    """Distance in metres from a point to the nearest obstacle or bound, at most ``limit``."""
+    bounds = scene.bounds
+    best = min(limit, x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y)
+    vertices = scene.vertices
+    starts = scene.piece_starts
+    for p in range(starts.shape[0] - 1):
+        outside = -math.inf  # the largest edge distance is a lower bound of the distance to the piece
+        edge = starts[p]
+        for i in range(starts[p], starts[p + 1]):
+            gap = scene.normals[i, 0] * x + scene.normals[i, 1] * y - scene.offsets[i]
+            if gap > outside:
+                outside = gap
+                edge = i
+                if outside >= best:
+                    break
+        if outside >= best:
+            continue
+        if outside <= 0.0:
+            return 0.0
+        # beyond an end of that edge a corner is nearer still: measure to the edge itself
+        other = edge + 1 if edge + 1 < starts[p + 1] else starts[p]
+        ex = vertices[other, 0] - vertices[edge, 0]
+        ey = vertices[other, 1] - vertices[edge, 1]
+        dx = x - vertices[edge, 0]
+        dy = y - vertices[edge, 1]
+        share = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+        best = min(best, math.hypot(dx - share * ex, dy - share * ey))
+    return float(max(best, 0.0))
+
+
+@jit
+def strip_is_free(
+    ax: float, ay: float, bx: float, by: float, half_width: float, roadmap: Roadmap, scene: Scene
+) -> bool:
+    """Whether a strip from a to b is free, as boxes short enough for the scene's cells."""
+    length = math.hypot(bx - ax, by - ay)
+    if length == 0.0:
+        return True
+    cos = (bx - ax) / length
+    sin = (by - ay) / length
+    longest = 1.9 * math.sqrt(REACH_M * REACH_M - half_width * half_width)
+    pieces = math.ceil(length / longest)
+    half = 0.5 * length / pieces
+    for i in range(pieces):
+        along = (2 * i + 1) * half
+        roadmap.counts[CHECKS] += 1
+        if not box_is_free(ax + along * cos, ay + along * sin, cos, sin, half, half_width, scene):
+            return False
+    return True
+
+
+@jit
+def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, scene: Scene) -> None:
+    """Add a place and the edges to its nearest neighbours."""
+    counts = roadmap.counts
+    new = counts[NODES]
+    counts[NODES] += 1
+    roadmap.nodes[new, 0] = x
+    roadmap.nodes[new, 1] = y
+    roadmap.heads[new] = -1
+    if settings.clearance_exponent > 0.0:
+        roadmap.clearances[new] = clearance(x, y, settings.clearance_limit_m, scene)
+    found = nearest_k(roadmap.sampled, x, y, roadmap.near_items, roadmap.near_distances)
+    for k in range(found):
+        other = roadmap.near_items[k]
+        edge = counts[EDGES]
+        roadmap.edge_state[edge] = UNKNOWN
+        roadmap.edge_length[edge] = roadmap.near_distances[k]
+        roadmap.edge_to[2 * edge] = other
+        roadmap.edge_next[2 * edge] = roadmap.heads[new]
+        roadmap.heads[new] = 2 * edge
+        roadmap.edge_to[2 * edge + 1] = new
+        roadmap.edge_next[2 * edge + 1] = roadmap.heads[other]
+        roadmap.heads[other] = 2 * edge + 1
+        counts[EDGES] += 1
+    put(roadmap.sampled, new)
+
+
+@inlined
+def sift_up(roadmap: Roadmap, place: int) -> None:
+    """Move a heap entry towards the root until its parent is no farther."""
+    heap = roadmap.heap
+    node = heap[place]
+    while place > 0:
+        parent = (place - 1) // 2
+        if roadmap.distances[heap[parent]] <= roadmap.distances[node]:
+            break
+        heap[place] = heap[parent]
+        roadmap.places[heap[place]] = place
+        place = parent
+    heap[place] = node
+    roadmap.places[node] = place
+
+
+@inlined
+def pop(roadmap: Roadmap, size: int) -> int:
+    """Take the nearest node off a heap of ``size`` entries."""
+    heap = roadmap.heap
+    top = heap[0]
+    roadmap.places[top] = -1
+    node = heap[size - 1]
+    place = 0
+    while True:
+        child = 2 * place + 1
+        if child >= size - 1:
+            break
+        if child + 1 < size - 1 and (roadmap.distances[heap[child + 1]] < roadmap.distances[heap[child]]):
+            child += 1
+        if roadmap.distances[heap[child]] >= roadmap.distances[node]:
+            break
+        heap[place] = heap[child]
+        roadmap.places[heap[place]] = place
+        place = child
+    heap[place] = node
+    roadmap.places[node] = place
+    return int(top)
+
+
+@jit
+def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, scene: Scene) -> None:
+    """Dijkstra's search from the goal: d(q) and the next node for every node that reaches it."""
+    count = roadmap.counts[NODES]
+    for node in range(count):
+        roadmap.distances[node] = math.inf
+        roadmap.following[node] = -1
+        roadmap.places[node] = -1
+    nodes = roadmap.nodes
+    clear_buckets(roadmap.connected, scene.bounds)
+    roadmap.distances[GOAL] = 0.0
+    roadmap.heap[0] = GOAL
+    roadmap.places[GOAL] = 0
+    size = 1
+    while size > 0:
+        node = pop(roadmap, size)
+        size -= 1
+        put(roadmap.connected, node)
+        edge = roadmap.heads[node]
+        while edge >= 0:
+            other = roadmap.edge_to[edge]
+            cost = roadmap.edge_length[edge // 2]
+            if settings.clearance_exponent > 0.0:
+                room = max(min(roadmap.clearances[node], roadmap.clearances[other]), 1e-3)
+                cost /= room**settings.clearance_exponent
+            cost += roadmap.distances[node]
+            if cost < roadmap.distances[other] and roadmap.edge_state[edge // 2] != BLOCKED:
+                if roadmap.edge_state[edge // 2] == UNKNOWN:
+                    free = strip_is_free(
+                        nodes[node, 0],
+                        nodes[node, 1],
+                        nodes[other, 0],
+                        nodes[other, 1],
+                        0.5 * car.width,
+                        roadmap,
+                        scene,
+                    )
+                    roadmap.edge_state[edge // 2] = FREE if free else BLOCKED
+                if roadmap.edge_state[edge // 2] == FREE:
+                    roadmap.distances[other] = cost
+                    roadmap.following[other] = node
+                    if roadmap.places[other] < 0:
+                        roadmap.heap[size] = other
+                        roadmap.places[other] = size
+                        size += 1
+                    sift_up(roadmap, roadmap.places[other])
+            edge = roadmap.edge_next[edge]
+
+
+@jit
+def grow_roadmap(
+    roadmap: Roadmap,
+    batch: int,
+    goal: Floats,
+    guide: Guide,
+    settings: RoadmapSettings,
+    car: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    """Add ``batch`` draws, then search from the goal again; the guide places the nodes, if there is one."""
+    half_length = 0.5 * settings.body_length_scale * (car.front + car.rear)
+    half_width = 0.5 * settings.body_width_scale * car.width
+    near = settings.guide_radius_m
+    for _ in range(batch):
+        if roadmap.counts[NODES] == roadmap.nodes.shape[0]:
+            break
+        x, y = guided(guide, goal, scene.bounds, near, near, rng)
+        heading = 2.0 * math.pi * rng.random()
+        roadmap.counts[CHECKS] += 1
+        cos = math.cos(heading)
+        sin = math.sin(heading)
+        if box_is_free(x, y, cos, sin, half_length, half_width, scene):
+            add_node(roadmap, x, y, settings, scene)
+    search_from_goal(roadmap, settings, car, scene)
+
+
+@jit
+def build_roadmap(
+    roadmap: Roadmap,
+    start: Floats,
+    goal: Floats,
+    guide: Guide,
+    settings: RoadmapSettings,
+    car: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> bool:
+    """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
+    anywhere = Guide(guide.points[:0], guide.starts[:1], guide.probabilities[:0], 0.0)
+    roadmap.counts[:] = 0
+    clear_buckets(roadmap.sampled, scene.bounds)
+    add_node(roadmap, goal[0], goal[1], settings, scene)
+    add_node(roadmap, start[0], start[1], settings, scene)
+    if guide.probabilities.shape[0] > 0:
+        grow_roadmap(roadmap, settings.batch, goal, guide, settings, car, scene, rng)
+    else:
+        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, car, scene, rng)
+    draws = settings.batch
+    while roadmap.distances[START] == math.inf and draws < settings.most_nodes:
+        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, car, scene, rng)
+        draws += settings.batch
+    return bool(roadmap.distances[START] < math.inf)
+
+
+@jit
+def node_of(roadmap: Roadmap, x: float, y: float) -> int:
+    """The nearest node that reaches the goal: the group of a vertex at (x, y)."""
+    return nearest(roadmap.connected, x, y)
+
+
+@jit
+def resample_way(roadmap: Roadmap, node: int, spacing_m: float, points: Floats) -> int:
+    """Fill ``points [m, 2]`` with the way from ``node`` to the goal, one each ``spacing_m``; how many."""
+    nodes = roadmap.nodes
+    points[0, 0] = nodes[node, 0]
+    points[0, 1] = nodes[node, 1]
+    filled = 1
+    left = spacing_m  # to go until the next point
+    while roadmap.following[node] >= 0 and filled < points.shape[0] - 1:
+        after = roadmap.following[node]
+        length = math.hypot(nodes[after, 0] - nodes[node, 0], nodes[after, 1] - nodes[node, 1])
+        along = left
+        while along <= length and filled < points.shape[0] - 1:
+            share = along / length
+            points[filled, 0] = nodes[node, 0] + share * (nodes[after, 0] - nodes[node, 0])
+            points[filled, 1] = nodes[node, 1] + share * (nodes[after, 1] - nodes[node, 1])
+            filled += 1
+            along += spacing_m
+        left = along - length
+        node = after
+    points[filled, 0] = nodes[GOAL, 0]
+    points[filled, 1] = nodes[GOAL, 1]
+    return filled + 1

@@ -1,0 +1,67 @@
+"""Kinodynamic RRT (LaValle and Kuffner 2001): the vertex nearest to a random target is extended to it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.attempt import attempt
+from planners.search.neighbours import nearest
+from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
+from planners.search.sampling import guided
+from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, NO_PATH, SIZE, Extension, Tree, extend
+from planners.world.collision import Scene, scene_of
+from planners.world.jit import jit
+from planners.world.problem import Floats, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+
+class RrtSettings(NamedTuple):
+    """Defaults of algorithms.md; without a guide the goal is drawn with ``NO_GUIDE.goal_probability``."""
+
+    guide_near_m: float = 2.0
+    guide_far_m: float = 4.0
+    extension: Extension = EXTENSION
+
+
+@jit
+def _grow(
+    tree: Tree,
+    goal: Floats,
+    until: int,
+    guide: Guide,
+    settings: RrtSettings,
+    car: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    counts = tree.counts
+    while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
+        x, y = guided(guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng)
+        vertex = nearest(tree.buckets, x, y)
+        extend(tree, vertex, x, y, goal, NO_PATH, 0.0, 0.0, settings.extension, car, scene, rng)
+        if counts[GOAL_VERTEX] >= 0:
+            return
+
+
+def rrt(
+    problem: Problem,
+    settings: RrtSettings,
+    rng: np.random.Generator,
+    guide: Guide | None = None,
+    scene: Scene | None = None,
+    limits: Limits | None = None,
+    car: Vehicle = CAR,
+) -> Outcome:
+    """Plan from the problem's start to its goal disc; a guide draws the targets near its plans."""
+    ready = scene_of(problem) if scene is None else scene
+    guiding = NO_GUIDE if guide is None else guide
+    return attempt(
+        problem,
+        ready,
+        limits or Limits(),
+        car,
+        lambda tree, goal: None,
+        lambda tree, goal, until: _grow(tree, goal, until, guiding, settings, car, ready, rng),
+    )
