@@ -1,4 +1,4 @@
-"""Nearest neighbour in the plane by 2 m buckets, looking at a bounded number of points in each.
+"""Nearest neighbour in the plane by buckets, looking at a bounded number of points in each.
 
 A linear scan is the bottleneck of a tree planner, and crowded buckets make its tails: only the newest
 points of a bucket are looked at, but none is ever refused.
@@ -15,7 +15,6 @@ from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers
 
 BUCKETS_A_SIDE = 64
-BUCKET_M = 2.0  # grows with bounds wider than 128 m
 NEWEST = 16  # points looked at in a bucket
 
 
@@ -35,13 +34,13 @@ def allocate_buckets(points: Floats) -> Buckets:
 
 
 @jit
-def clear_buckets(buckets: Buckets, bounds: Floats) -> None:
-    """Empty the buckets and lay them over ``bounds``."""
+def clear_buckets(buckets: Buckets, bounds: Floats, size_m: float) -> None:
+    """Empty the buckets and lay them over ``bounds``, ``size_m`` wide or as wide as the bounds need."""
     buckets.counts[:] = 0
     buckets.frame[0] = bounds[0]
     buckets.frame[1] = bounds[1]
     widest = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    buckets.frame[2] = max(BUCKET_M, widest / BUCKETS_A_SIDE)
+    buckets.frame[2] = max(size_m, widest / BUCKETS_A_SIDE)
 
 
 @inlined

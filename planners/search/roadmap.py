@@ -27,6 +27,7 @@ from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers
 from planners.world.vehicle import Vehicle
 
+BUCKET_M = 4.0  # nodes lie some 6 m apart
 GOAL, START = 0, 1  # the first two nodes
 # places in Roadmap.counts
 NODES, CHECKS, EDGES = range(3)
@@ -221,7 +222,7 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, 
         roadmap.following[node] = -1
         roadmap.places[node] = -1
     nodes = roadmap.nodes
-    clear_buckets(roadmap.connected, scene.bounds)
+    clear_buckets(roadmap.connected, scene.bounds, BUCKET_M)
     roadmap.distances[GOAL] = 0.0
     roadmap.heap[0] = GOAL
     roadmap.places[GOAL] = 0
@@ -303,7 +304,7 @@ def build_roadmap(
     """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
     anywhere = Guide(guide.points[:0], guide.starts[:1], guide.probabilities[:0], 0.0)
     roadmap.counts[:] = 0
-    clear_buckets(roadmap.sampled, scene.bounds)
+    clear_buckets(roadmap.sampled, scene.bounds, BUCKET_M)
     add_node(roadmap, goal[0], goal[1], settings, scene)
     add_node(roadmap, start[0], start[1], settings, scene)
     if guide.probabilities.shape[0] > 0:

@@ -48,6 +48,7 @@ class Extension(NamedTuple):
 
 EXTENSION = Extension()
 NO_PATH = np.empty((0, 2))
+BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
 @functools.lru_cache(maxsize=1)
@@ -78,7 +79,7 @@ def plant(tree: Tree, root: Floats, bounds: Floats) -> None:
     tree.counts[:] = 0
     tree.counts[SIZE] = 1
     tree.counts[GOAL_VERTEX] = -1
-    clear_buckets(tree.buckets, bounds)
+    clear_buckets(tree.buckets, bounds, BUCKET_M)
     put(tree.buckets, 0)
 
 

@@ -20,7 +20,7 @@ def strew(seed, count):
     rng = np.random.default_rng(seed)
     points = rng.uniform(-7, 57, (count, 2))
     buckets = allocate_buckets(points)
-    clear_buckets(buckets, np.array(BOUNDS))
+    clear_buckets(buckets, np.array(BOUNDS), 2.0)
     for i in range(count):
         put(buckets, i)
     return points, buckets, rng.uniform(-10, 60, 2)
@@ -56,7 +56,7 @@ def test_a_removed_point_is_never_found_again(seed, count):
 def test_a_crowded_bucket_keeps_its_newest_points():
     points = np.tile([[10.0, 10.0]], (100, 1)) + np.linspace(0, 0.5, 100)[:, None]
     buckets = allocate_buckets(points)
-    clear_buckets(buckets, np.array(BOUNDS))
+    clear_buckets(buckets, np.array(BOUNDS), 2.0)
     for i in range(100):
         put(buckets, i)
     assert nearest(buckets, 10.0, 10.0) == 100 - NEWEST
