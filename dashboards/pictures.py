@@ -1,0 +1,163 @@
+"""Problems and plans as pictures: obstacles, the car along its way, where a recalled plan collides."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
+
+from dashboards.style import GREEN, INK, NOTE_SIZE, ORANGE, SKY, VERMILLION, message_figure, new_figure
+from planners.world.collision import count_free_prefix, scene_of
+from planners.world.problem import Floats, Plan, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+FOOTPRINT_SPACING_M: Final = 4.0  # two cars' lengths: the way stays readable at a gallery's size
+_OBSTACLE: Final = "#6B7280"
+
+
+class Example(NamedTuple):
+    """One picture of the gallery."""
+
+    problem: Problem
+    recalled: Sequence[Plan]  # in the order of recall, turned to the problem's start as they were checked
+    found: Plan | None  # the answer; None where the attempt failed
+    caption: str
+
+
+def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
+    """Bounds, obstacles, the car at its start and the goal disc, in metres."""
+    x_min, y_min, x_max, y_max = problem.bounds
+    frame = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min, fill=False, edgecolor=INK, linewidth=1.2)
+    axes.add_patch(frame)
+    obstacles = PolyCollection(
+        problem.obstacles.pieces(),
+        facecolor=_OBSTACLE,
+        edgecolor=_OBSTACLE,  # closes the seams between the convex pieces of one obstacle
+        linewidth=0.3,
+    )
+    axes.add_collection(obstacles)
+    obstacles.set_clip_path(frame)
+    axes.add_patch(
+        Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8, zorder=2)
+    )
+    start = np.array([[*problem.start, 0.0, 0.0]])
+    axes.add_patch(Polygon(footprints(start, vehicle)[0], facecolor=INK, edgecolor=INK, zorder=6))
+    x, y, heading = problem.start
+    tip = (x + 4.5 * math.cos(heading), y + 4.5 * math.sin(heading))
+    axes.annotate("", tip, (x, y), arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}, zorder=6)
+    margin = 0.015 * (x_max - x_min)
+    axes.set_xlim(x_min - margin, x_max + margin)
+    axes.set_ylim(y_min - margin, y_max + margin)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def draw_plan(
+    axes: Axes,
+    plan: Plan,
+    colour: str = GREEN,
+    linewidth: float = 1.8,
+    first_collision: int | None = None,
+    vehicle: Vehicle = CAR,
+) -> None:
+    """The way of the rear axle with the car's footprint every few metres.
+
+    With the number of the first state in collision, the way is dashed and ends in a cross at that state.
+    """
+    states = plan.states if first_collision is None else plan.states[: first_collision + 1]
+    style = "-" if first_collision is None else (0, (4, 1.5))
+    axes.plot(states[:, 0], states[:, 1], color=colour, linewidth=linewidth, linestyle=style, zorder=4)
+    if first_collision is None:
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(states[:, :2], axis=0).T))])
+        count = 1 + int(way[-1] / FOOTPRINT_SPACING_M)
+        shown = states[
+            np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], count + 1)), len(states) - 1)
+        ]
+        axes.add_collection(
+            PolyCollection(
+                list(footprints(shown, vehicle)), facecolor="none", edgecolor=colour, linewidth=0.8, zorder=3
+            )
+        )
+        return
+    rest = plan.states[first_collision:]
+    axes.plot(rest[:, 0], rest[:, 1], color=colour, linewidth=0.8, linestyle=":", alpha=0.8, zorder=3)
+    axes.plot(*states[-1, :2], marker="X", color=colour, markersize=8, markeredgecolor="white", zorder=7)
+
+
+def gallery(examples: Sequence[Example]) -> Figure:
+    """Problems with the plans recalled for them, free or in collision, and the plan that was found."""
+    title = "Recalled and found plans"
+    if not examples:
+        return message_figure(title, "No problems to show: run the benchmark first.")
+    columns = min(3, len(examples))
+    rows = math.ceil(len(examples) / columns)
+    figure = new_figure(max(6.4, 3.8 * columns), 4.1 * rows + 1.0, title)
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in grid[len(examples) :]:
+        axes.set_axis_off()
+    for axes, example in zip(grid, examples, strict=False):
+        _draw_example(axes, example)
+    figure.legend(
+        handles=_legend(),
+        loc="outside lower left",
+        ncols=5 if columns > 2 else 3,
+        frameon=False,
+        fontsize=NOTE_SIZE + 0.5,
+    )
+    return figure
+
+
+def picture(problem: Problem, plan: Plan | None, caption: str, recalled: Sequence[Plan] = ()) -> Figure:
+    """One problem with its plan and, where given, the plans recalled for it."""
+    figure = new_figure(6.4, 7.2, problem.id or "Problem")
+    _draw_example(figure.add_subplot(), Example(problem, recalled, plan, caption))
+    handles = _legend()[: 5 if recalled else 3]
+    figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
+    return figure
+
+
+def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
+    """Corners ``[T, 4, 2]`` in metres of the car's body at ``states [T, 5]``, counter-clockwise."""
+    half = 0.5 * vehicle.width
+    body = np.array(
+        [[-vehicle.rear, -half], [vehicle.front, -half], [vehicle.front, half], [-vehicle.rear, half]]
+    )
+    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
+    turns = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)  # row vectors
+    return np.asarray(body @ turns + states[:, None, :2])
+
+
+def _draw_example(axes: Axes, example: Example) -> None:
+    draw_problem(axes, example.problem)
+    scene = scene_of(example.problem)
+    if example.found is not None:
+        draw_plan(axes, example.found)
+    for plan in example.recalled:
+        free = count_free_prefix(plan.states, CAR, scene)
+        if free < len(plan.states):
+            draw_plan(axes, plan, VERMILLION, linewidth=1.3, first_collision=free)
+        else:
+            # Wide and below: a rim around the plan found where the recalled one is the answer.
+            axes.plot(*plan.states[:, :2].T, color=SKY, linewidth=4.5, zorder=2.5)
+    failed = example.found is None
+    title = f"{example.caption}, no plan found" if failed else example.caption
+    axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
+
+
+def _legend() -> list[Line2D | Patch]:
+    return [
+        Line2D([], [], color=INK, marker=">", linestyle="none", label="start"),
+        Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
+               label="goal"),
+        Line2D([], [], color=GREEN, linewidth=1.8, label="plan found, with the car every 4 m"),
+        Line2D([], [], color=SKY, linewidth=4.5, label="recalled, free"),
+        Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
+               markersize=8, label="recalled, collides at the cross"),
+    ]  # fmt: skip

@@ -1,0 +1,78 @@
+"""How every figure looks, and how it is saved: colours, axes, notes, files."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import Final
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from storage.files import whole_file
+
+# Okabe and Ito's colours, told apart with any colour vision.
+SKY: Final = "#56B4E9"
+BLUE: Final = "#0072B2"
+ORANGE: Final = "#E69F00"
+VERMILLION: Final = "#D55E00"
+GREEN: Final = "#009E73"
+GREY: Final = "#8C8C8C"
+INK: Final = "#333333"
+PALE: Final = "#E4E4E4"
+
+NOTE_SIZE: Final = 8.0
+_DPI: Final = 160
+_NOTE_LETTERS_AN_INCH: Final = 16.5  # at NOTE_SIZE, with room to spare
+
+# Identifiers in an SVG are drawn from this instead of the clock: the same rows give the same file.
+matplotlib.rcParams["svg.hashsalt"] = "motion-memory"
+
+
+def new_figure(width: float, height: float, title: str, note: str = "") -> Figure:
+    """An empty figure, size in inches, with a title above and a wrapped note below.
+
+    It belongs to no window system and no global list of figures, so any thread may draw it.
+    """
+    figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    figure.get_layout_engine().set(w_pad=0.08, h_pad=0.08, wspace=0.03, hspace=0.05)  # type: ignore[union-attr, call-arg]
+    figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold", color=INK)
+    if note:
+        letters = int(_NOTE_LETTERS_AN_INCH * (width - 0.2))
+        note = "\n".join(textwrap.fill(paragraph, letters) for paragraph in note.splitlines())
+        figure.supxlabel(note, x=0.012, ha="left", fontsize=NOTE_SIZE, color="#555555", linespacing=1.4)
+    return figure
+
+
+def message_figure(title: str, message: str) -> Figure:
+    """A figure that says in words why there is nothing to draw."""
+    figure = new_figure(8.0, 2.4, title)
+    axes = figure.add_subplot()
+    axes.set_axis_off()
+    axes.text(0.5, 0.5, message, ha="center", va="center", fontsize=11, color=INK, transform=axes.transAxes)
+    return figure
+
+
+def tidy(axes: Axes) -> None:
+    """Quiet axes: a grid of pale horizontal lines behind the data, no box."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+    axes.tick_params(labelsize=9, colors=INK, length=3)
+    axes.grid(axis="y", color=PALE, linewidth=0.8)
+    axes.set_axisbelow(True)
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write ``name.png`` (160 dots an inch) and ``name.svg`` into ``folder``; returns both paths.
+
+    A file appears whole or not at all, and the same figure gives the same bytes. StorageError: no room, no
+    permission.
+    """
+    paths = []
+    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
+        path = folder / f"{name}.{kind}"
+        with whole_file(path) as temporary:
+            figure.savefig(temporary, format=kind, dpi=_DPI, metadata=metadata)
+        paths.append(path)
+    return paths

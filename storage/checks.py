@@ -1,0 +1,55 @@
+"""Whether a problem makes sense to a planner, said in one line where it does not."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from planners.world.collision import box_is_free, count_free_prefix, scene_of
+from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
+from planners.world.vehicle import CAR, Vehicle
+from storage.polygons import LARGEST_COORDINATE_M
+
+WIDEST_BOUNDS_M: Final = 1_000.0  # the cell look-up of collision checks grows with the bounds' area
+
+
+def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
+    """What is wrong with a problem whose obstacles are well formed and what to do, or None.
+
+    In this order: numbers finite and near, bounds, goal radius, distance, start footprint, goal centre.
+    """
+    numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds)
+    if not all(math.isfinite(number) for number in numbers):
+        return "start, goal, goal_radius and bounds must be finite numbers; correct them"
+    if max(abs(number) for number in numbers) > LARGEST_COORDINATE_M:
+        return (
+            f"lies farther than {LARGEST_COORDINATE_M:.0f} m from the origin; move the origin near the start"
+        )
+    x_min, y_min, x_max, y_max = problem.bounds
+    if not (x_min < x_max and y_min < y_max):
+        return (
+            f"bounds {list(problem.bounds)} are inverted; wanted was [x_min, y_min, x_max, y_max] in metres"
+        )
+    if max(x_max - x_min, y_max - y_min) > WIDEST_BOUNDS_M:
+        return f"bounds {list(problem.bounds)} are wider than {WIDEST_BOUNDS_M:.0f} m; are they in metres?"
+    if problem.goal_radius <= 0.0:
+        return f"goal_radius is {problem.goal_radius}; wanted was a length above 0 m"
+    distance = math.dist(problem.start[:2], problem.goal)
+    if abs(distance - CANONICAL_DISTANCE) > problem.goal_radius:
+        return (
+            f"start and goal are {distance:.2f} m apart, wanted was {CANONICAL_DISTANCE:.2f} m within the "
+            f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
+        )
+    scene = scene_of(problem)
+    if count_free_prefix(start_state(problem)[np.newaxis], vehicle, scene) == 0:
+        return f"start footprint at {_place(problem.start)} is not free or leaves the bounds; move the start"
+    x, y = problem.goal
+    if not box_is_free(x, y, 1.0, 0.0, 0.0, 0.0, scene):
+        return f"goal centre {_place(problem.goal)} lies in an obstacle or out of bounds; move the goal"
+    return None
+
+
+def _place(coordinates: tuple[float, ...]) -> str:
+    return f"({', '.join(f'{coordinate:g}' for coordinate in coordinates)})"

@@ -1,0 +1,94 @@
+"""Lists of numbers and bits as columns, and back, without a Python object a number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from planners.world.problem import Obstacles, Problem
+
+Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
+Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+
+def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
+    """Problems as the columns that every table with whole problems begins with."""
+    return {
+        "id": [problem.id for problem in problems],
+        "class": [problem.class_name for problem in problems],
+        "start": list_column([problem.start for problem in problems], np.float64),
+        "goal": list_column([problem.goal for problem in problems], np.float64),
+        "goal_radius": [problem.goal_radius for problem in problems],
+        "bounds": list_column([problem.bounds for problem in problems], np.float64),
+        "vertices": list_column([problem.obstacles.vertices for problem in problems], np.float32),
+        "piece_starts": list_column([problem.obstacles.piece_starts for problem in problems], np.int32),
+        "obstacle_starts": list_column([problem.obstacles.obstacle_starts for problem in problems], np.int32),
+    }
+
+
+def problems_of(table: pa.Table) -> list[Problem]:
+    """The problems of a table that has the columns of ``problem_columns``."""
+    rows = zip(
+        table["id"].to_pylist(),
+        table["class"].to_pylist(),
+        table["start"].to_pylist(),
+        table["goal"].to_pylist(),
+        table["goal_radius"].to_pylist(),
+        table["bounds"].to_pylist(),
+        lists_of(table["vertices"]),
+        lists_of(table["piece_starts"]),
+        lists_of(table["obstacle_starts"]),
+        strict=True,
+    )
+    return [
+        Problem(
+            identity,
+            class_name,
+            tuple(start),
+            tuple(goal),
+            radius,
+            tuple(bounds),
+            Obstacles(vertices.astype(np.float64).reshape(-1, 2), pieces.copy(), obstacles.copy()),
+        )
+        for identity, class_name, start, goal, radius, bounds, vertices, pieces, obstacles in rows
+    ]
+
+
+def list_column(lists: Iterable[Any], dtype: type[np.generic]) -> pa.Array:
+    """One list a row, from arrays of any shape, flattened."""
+    arrays = [np.asarray(values, dtype=dtype).reshape(-1) for values in lists]
+    starts = np.cumsum([0] + [len(array) for array in arrays], dtype=np.int32)
+    values = np.concatenate(arrays) if arrays else np.empty(0, dtype)
+    return pa.ListArray.from_arrays(pa.array(starts), pa.array(values))
+
+
+def lists_of(column: pa.ChunkedArray) -> list[Array]:
+    """The lists of a column, each a read-only array that shares the column's memory."""
+    return [
+        values[first:last]
+        for chunk in column.chunks
+        for values, starts in [(chunk.values.to_numpy(), chunk.offsets.to_numpy())]
+        for first, last in pairwise(starts.tolist())
+    ]
+
+
+def bits_column(packed: Bits) -> pa.Array:
+    """Packed bits ``uint8 [n, b]`` as one value of ``b`` bytes a row."""
+    rows, width = packed.shape
+    data = pa.py_buffer(np.ascontiguousarray(packed, dtype=np.uint8))
+    return pa.Array.from_buffers(pa.binary(width), rows, [None, data])
+
+
+def bits_of(column: pa.ChunkedArray) -> Bits:
+    """The packed bits ``uint8 [n, b]`` of a column, in one copy."""
+    width = column.type.byte_width
+    parts = [
+        np.frombuffer(chunk.buffers()[1], np.uint8, len(chunk) * width, chunk.offset * width)
+        for chunk in column.chunks
+        if len(chunk)
+    ]
+    return np.concatenate(parts or [np.empty(0, np.uint8)]).reshape(-1, width)

@@ -1,0 +1,90 @@
+"""Solved problems with their plans."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from planners.memory.experience import Experience
+from planners.world.problem import Plan
+from planners.world.vehicle import CAR, Vehicle
+from storage.columns import list_column, lists_of, problem_columns, problems_of
+from storage.errors import StorageError
+from storage.schemas import EXPERIENCES
+from storage.shards import metadata_of, read_table, write_table
+
+_STATE = 5
+_CONTROL = 2
+
+
+def write_experiences(
+    path: Path,
+    experiences: Sequence[Experience],
+    *,
+    planner: str,
+    seeds: Sequence[int],
+    planning_seconds: Sequence[float],
+    key: str = "",
+    vehicle: Vehicle = CAR,
+) -> None:
+    """Write experiences with the planner that found them, its seeds and its times, one of each a row."""
+    plans = [experience.plan for experience in experiences]
+    columns = {
+        **problem_columns([experience.problem for experience in experiences]),
+        "states": list_column([plan.states for plan in plans], np.float64),
+        "controls": list_column([plan.controls for plan in plans], np.float64),
+        "dt": [plan.dt for plan in plans],
+        "planner": [planner] * len(plans),
+        "seed": list(seeds),
+        "planning_seconds": list(planning_seconds),
+    }
+    table = pa.table(columns, schema=_with_vehicle(vehicle))
+    write_table(path, table, key)
+
+
+def read_experiences(path: Path, vehicle: Vehicle = CAR) -> list[Experience]:
+    """The experiences of a file, in order.
+
+    StorageError: the file is missing, damaged, of another kind, or recorded for another robot.
+    """
+    table = read_table(path, EXPERIENCES)
+    recorded = metadata_of(path).get(b"vehicle", b"").decode()
+    if recorded != _vehicle_text(vehicle):
+        raise StorageError(
+            f"{path} was recorded for vehicle {recorded}, wanted was {_vehicle_text(vehicle)}; "
+            "collect experiences with this vehicle."
+        )
+    return [
+        Experience(
+            problem, Plan(states.reshape(-1, _STATE).copy(), controls.reshape(-1, _CONTROL).copy(), dt)
+        )
+        for problem, states, controls, dt in zip(
+            problems_of(table),
+            lists_of(table["states"]),
+            lists_of(table["controls"]),
+            table["dt"].to_pylist(),
+            strict=True,
+        )
+    ]
+
+
+def merge_experiences(shards: Sequence[Path], path: Path, count: int, key: str = "") -> int:
+    """Write the first ``count`` rows of the shards, in their order, as one file; how many there were."""
+    tables = [read_table(shard, EXPERIENCES) for shard in shards]
+    if not tables:
+        raise StorageError(f"{path} has no shards to be made from; run collect.")
+    merged = pa.concat_tables(tables).slice(0, count)
+    write_table(path, merged, key)
+    return int(merged.num_rows)
+
+
+def _with_vehicle(vehicle: Vehicle) -> pa.Schema:
+    return EXPERIENCES.with_metadata({**EXPERIENCES.metadata, b"vehicle": _vehicle_text(vehicle).encode()})
+
+
+def _vehicle_text(vehicle: Vehicle) -> str:
+    return json.dumps(vehicle._asdict())

@@ -1,0 +1,180 @@
+"""Where everything lies in a data folder, and whose folder it is."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from storage.errors import StorageError
+from storage.files import PARTIAL, read_json, remove_leftovers, write_json
+
+LAYOUT: Final = 1  # one more whenever an older program could no longer read the folder
+MARK: Final = "motion-memory.json"
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+
+Table = Literal["experiences", "hallucinated", "results", "recalls"]
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The places of one run; nothing is created by asking for a place, writers create folders."""
+
+    path: Path
+
+    @property
+    def settings(self) -> Path:
+        """What the run was asked for."""
+        return self.path / "settings.json"
+
+    @property
+    def results(self) -> Path:
+        """All attempt rows: ``<class>/NNNN.parquet`` below."""
+        return self.path / "results"
+
+    @property
+    def recalls(self) -> Path:
+        """What the memories recalled: ``<class>/NNNN.parquet`` below."""
+        return self.path / "recalls"
+
+    @property
+    def figures(self) -> Path:
+        """Pictures."""
+        return self.path / "figures"
+
+    def summary(self, suffix: str) -> Path:
+        """The summary in one of its forms, such as ``summary("json")``."""
+        return self.path / f"summary.{suffix}"
+
+    def worlds(self, class_name: str, part: str) -> Path:
+        """The problems of one part of a folder of worlds."""
+        return self.path / "worlds" / checked_name(class_name) / f"{checked_name(part)}.parquet"
+
+    def experiences(self, class_name: str) -> Path:
+        """The experiences of a class once all are collected."""
+        return self.path / "experiences" / f"{checked_name(class_name)}.parquet"
+
+    def model(self, class_name: str) -> Path:
+        """The folder of a class's trained encoder."""
+        return self.path / "models" / checked_name(class_name)
+
+    def memory(self, class_name: str) -> Path:
+        """The folder of a class's memory."""
+        return self.path / "memories" / checked_name(class_name)
+
+    def shard(self, table: Table, class_name: str, index: int) -> Path:
+        """Chunk ``index`` of a table: ``<table>/<class>/NNNN.parquet``."""
+        return self.path / table / checked_name(class_name) / f"{index:04d}.parquet"
+
+    def shards(self, table: Table, class_name: str) -> list[Path]:
+        """The chunks of a table that are there, in order."""
+        return sorted((self.path / table / checked_name(class_name)).glob("[0-9]*.parquet"))
+
+
+@dataclass(frozen=True)
+class DataFolder:
+    """A folder that holds runs, the tracking database and the orchestrator's own files."""
+
+    path: Path  # absolute
+
+    @property
+    def mlflow_database(self) -> Path:
+        """MLflow's SQLite file."""
+        return self.path / "mlflow.db"
+
+    @property
+    def mlflow_artifacts(self) -> Path:
+        """MLflow's artifacts."""
+        return self.path / "mlartifacts"
+
+    @property
+    def prefect(self) -> Path:
+        """Prefect's own folder."""
+        return self.path / "prefect"
+
+    def run(self, name: str) -> RunFolder:
+        """The folder of a run; a StorageError for a name that is no plain word."""
+        return RunFolder(self.path / "runs" / checked_name(name))
+
+    def runs(self) -> list[RunFolder]:
+        """All runs that are there, by name."""
+        return [RunFolder(path) for path in sorted((self.path / "runs").glob("*")) if path.is_dir()]
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the folder for this process; leftovers of killed writers are removed on the way in.
+
+        StorageError: another command holds it; the message says which process.
+        """
+        try:
+            handle = os.open(self.path / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise _not_writable(self.path, error) from None
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
+                raise StorageError(
+                    f"{self.path} is in use by another command (process {holder}); "
+                    "wait for it to end or give another data folder."
+                ) from None
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+            remove_leftovers(self.path / "runs")
+            yield
+        finally:
+            os.close(handle)  # which also gives the lock back, as does a killed process
+
+
+def open_data_folder(path: Path | str) -> DataFolder:
+    """Open a data folder, or make one of a missing or empty folder.
+
+    StorageError: no folder, not writable, of another version, or full of somebody else's files.
+    """
+    folder = Path(path).expanduser().absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        names = [entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)]
+    except OSError as error:
+        raise _not_writable(folder, error) from None
+    mark = folder / MARK
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise _not_writable(folder, PermissionError(13, "Permission denied"))
+    if MARK in names:
+        found = read_json(mark)
+        version = found.get("layout") if isinstance(found, dict) else None
+        if version != LAYOUT:
+            raise StorageError(
+                f"{folder} has data layout {version!r}, this program reads layout {LAYOUT}; "
+                "use the version that wrote it or give another data folder."
+            )
+    elif names:
+        raise StorageError(
+            f"{folder} is not empty and has no {MARK}, so it is not a data folder; "
+            "give an empty or a new folder."
+        )
+    else:
+        write_json(mark, {"layout": LAYOUT})
+    return DataFolder(folder)
+
+
+def checked_name(name: str) -> str:
+    """The name of a class or run if it can be a file's name everywhere, else a StorageError."""
+    if not NAME.fullmatch(name):
+        raise StorageError(
+            f"{name[:100]!r} cannot name a class or run; use up to 100 letters, digits, '-' and '_', "
+            "beginning with a letter or digit."
+        )
+    return name
+
+
+def _not_writable(folder: Path, error: OSError) -> StorageError:
+    return StorageError(
+        f"{folder} cannot be used as a data folder: {error.strerror}; give a folder that you may write to."
+    )

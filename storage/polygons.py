@@ -1,0 +1,93 @@
+"""Simple polygons of any kind into convex pieces, without moving a vertex."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import shapely
+
+from planners.world.problem import Floats, counter_clockwise
+
+LARGEST_COORDINATE_M: Final = 10_000.0  # float32 is exact to 1 mm up to there
+
+
+class PolygonError(ValueError):
+    """What is wrong with a polygon, and what to do; the end of a sentence that names it."""
+
+
+def convex_pieces(polygon: Floats) -> list[Floats]:
+    """Convex pieces ``[n, 2]`` that cover a simple polygon ``[m, 2]`` in any orientation, metres.
+
+    Vertices are rounded to float32 first, as every problem holds them, and none is added. A convex polygon is
+    its own only piece; others are triangulated, and triangles joined as long as they stay convex (Hertel and
+    Mehlhorn 1983).
+
+    PolygonError: fewer than 3 points, not finite, too far away, crossing itself, or without area.
+    """
+    corners = _corners(polygon)
+    shape = shapely.Polygon(corners)
+    if shape.convex_hull.area == 0.0:
+        raise PolygonError("has no area; remove it or move a point")
+    if not shape.is_valid:
+        reason = shapely.is_valid_reason(shape).partition("[")[0].lower()
+        raise PolygonError(f"crosses or touches itself ({reason}); draw it as a simple polygon")
+    corners = counter_clockwise(corners)
+    if _is_convex(corners):
+        return [corners]
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    pieces = [counter_clockwise(shapely.get_coordinates(triangle)[:-1]) for triangle in triangles]
+    return _joined([piece for piece in pieces if _is_convex(piece)])
+
+
+def _corners(polygon: Floats) -> Floats:
+    """The polygon in float32 steps, without repeated points."""
+    if len(polygon) < 3:
+        raise PolygonError(f"has {len(polygon)} points, wanted were at least 3; complete or remove it")
+    if not np.isfinite(polygon).all():
+        raise PolygonError("has a coordinate that is not a finite number; correct it")
+    if np.abs(polygon).max() > LARGEST_COORDINATE_M:
+        raise PolygonError(
+            f"reaches farther than {LARGEST_COORDINATE_M:.0f} m from the origin; "
+            "move the origin near the start"
+        )
+    rounded = polygon.astype(np.float32).astype(np.float64)
+    corners: Floats = rounded[(rounded != _after(rounded)).any(axis=1)]
+    if len(corners) < 3:
+        raise PolygonError("has no area; remove it or move a point")
+    return corners
+
+
+def _is_convex(corners: Floats) -> bool:
+    """Whether a simple counter-clockwise polygon with area is convex; straight angles are allowed."""
+    edges = _after(corners) - corners
+    after = _after(edges)
+    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    return bool((turns >= 0.0).all() and (turns > 0.0).any())
+
+
+def _after(corners: Floats) -> Floats:
+    """For each corner the next one; ``np.roll`` takes ten times as long."""
+    return np.concatenate((corners[1:], corners[:1]))
+
+
+def _joined(pieces: list[Floats]) -> list[Floats]:
+    """Join neighbours over their common edges, one edge after another, while the union stays convex."""
+    loops = [[tuple(corner) for corner in piece.tolist()] for piece in pieces]
+    owner = {edge: i for i, loop in enumerate(loops) for edge in _edges(loop)}
+    for begin, end in list(owner):
+        i, j = owner[begin, end], owner.get((end, begin))
+        if j is None or i == j:
+            continue
+        first, second = loops[i], loops[j]
+        at = first.index(end)
+        there = second.index(begin)
+        union = first[at:] + first[:at] + (second[there:] + second[:there])[1:-1]
+        if len(set(union)) == len(union) and _is_convex(np.array(union)):
+            loops[i], loops[j] = union, []
+            owner.update((edge, i) for edge in _edges(second))
+    return [np.array(loop) for loop in loops if loop]
+
+
+def _edges(loop: list[tuple[float, ...]]) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+    return list(zip(loop, [*loop[1:], loop[0]], strict=True))

@@ -1,0 +1,207 @@
+"""Problems as files that people hand in and get: ``.json`` (one), ``.jsonl`` (one a line), ``.parquet``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from planners.world.problem import Floats, Obstacles, Problem, obstacles_of
+from storage.checks import problem_fault
+from storage.errors import StorageError
+from storage.files import parse_json, read_text, whole_file, write_json
+from storage.polygons import PolygonError, convex_pieces
+from storage.schemas import PROBLEMS
+from storage.shards import table_of, write_table
+
+FORMATS: Final = (".json", ".jsonl", ".parquet")
+UNKNOWN_CLASS: Final = "unknown"
+_REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
+_OPTIONAL: Final = ("id", "class", "groups")
+
+
+def read_problems(path: Path) -> list[Problem]:
+    """All problems of a file, checked (``iterate_problems``)."""
+    return list(iterate_problems(path))
+
+
+def iterate_problems(path: Path) -> Iterator[Problem]:
+    """The problems of a file one by one, each checked when its turn comes.
+
+    StorageError: a problem is malformed, impossible or has another's id; the message names file, line, id
+    and what to do.
+    """
+    seen: set[str] = set()
+    for number, fields in _raw_problems(path):
+        place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
+        identity = fields.get("id") if isinstance(fields, Mapping) else None
+        named = f"{place} (id {_short(identity)})" if isinstance(identity, str) and identity else place
+        try:
+            problem = problem_of(
+                fields, default_id=path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
+            )
+        except ValueError as error:
+            raise StorageError(f"{named}: {error}.") from None
+        if problem.id in seen:
+            raise StorageError(f'{place}: id "{problem.id}" occurs twice; give every problem its own.')
+        seen.add(problem.id)
+        yield problem
+
+
+def write_problems(path: Path, problems: Sequence[Problem]) -> None:
+    """Write problems, whole or not at all, in the format that the file's ending says.
+
+    Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Reading gives the
+    same problems back, exactly.
+    """
+    rows = [_fields(problem) for problem in problems]
+    match _format(path):
+        case ".json":
+            if len(rows) != 1:
+                raise StorageError(f"{path} can hold one problem, got {len(rows)}; use .jsonl or .parquet.")
+            write_json(path, rows[0])
+        case ".jsonl":
+            with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+                file.writelines(json.dumps(row, allow_nan=False, ensure_ascii=False) + "\n" for row in rows)
+        case _:
+            write_table(path, table_of(rows, PROBLEMS, "problem"))
+
+
+def problem_of(fields: object, default_id: str) -> Problem:
+    """The problem that a contract's object describes, checked; ValueError says what is wrong with it."""
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
+    missing = [name for name in _REQUIRED if fields.get(name) is None]
+    if missing:
+        raise ValueError(f"field {missing[0]} is missing; wanted are {', '.join(_REQUIRED)}")
+    start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
+    bounds = _numbers(fields, "bounds", 4)
+    problem = Problem(
+        id=_text(fields, "id", default_id),
+        class_name=_text(fields, "class", UNKNOWN_CLASS),
+        start=(start[0], start[1], start[2]),
+        goal=(goal[0], goal[1]),
+        goal_radius=_number(fields["goal_radius"], "goal_radius"),
+        bounds=(bounds[0], bounds[1], bounds[2], bounds[3]),
+        obstacles=_obstacles(fields["obstacles"], fields.get("groups")),
+    )
+    fault = problem_fault(problem)
+    if fault is not None:
+        raise ValueError(fault)
+    return problem
+
+
+def _raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
+    """Objects and their numbers: of the line, or counted from 1."""
+    match _format(path):
+        case ".json":
+            yield 1, parse_json(read_text(path), str(path))
+        case ".jsonl":
+            for number, line in enumerate(read_text(path).split("\n"), start=1):
+                if line.strip():
+                    yield number, parse_json(line, f"{path} line {number}")
+        case _:
+            yield from enumerate(_parquet_rows(path), start=1)
+
+
+def _parquet_rows(path: Path) -> Iterator[Any]:
+    try:
+        with pq.ParquetFile(path) as file:
+            names = [name for name in file.schema_arrow.names if name in (*_REQUIRED, *_OPTIONAL)]
+            for batch in file.iter_batches(1024, columns=names):
+                yield from batch.to_pylist()
+    except FileNotFoundError:
+        raise StorageError(f"{path} does not exist; check the name.") from None
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise StorageError(f"{path} is no whole Parquet file ({reason}); write it again.") from None
+
+
+def _format(path: Path) -> str:
+    if path.suffix not in FORMATS:
+        raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
+    return path.suffix
+
+
+def _obstacles(polygons: object, groups: object) -> Obstacles:
+    if not isinstance(polygons, list):
+        raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
+    pieces = []
+    for number, points in enumerate(polygons, start=1):
+        try:
+            pieces.append(convex_pieces(_points(points)))
+        except PolygonError as error:
+            raise ValueError(f"obstacle {number} {error}") from None
+    if groups is None:
+        return obstacles_of(pieces)
+    if not isinstance(groups, list) or not all(isinstance(size, int) and size > 0 for size in groups):
+        raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
+    if sum(groups) != len(pieces):
+        raise ValueError(
+            f"groups are of {sum(groups)} polygons, obstacles are {len(pieces)}; make them agree"
+        )
+    ends = np.cumsum(groups).tolist()
+    return obstacles_of(
+        [
+            [piece for polygon in pieces[end - size : end] for piece in polygon]
+            for size, end in zip(groups, ends, strict=True)
+        ]
+    )
+
+
+def _points(points: object) -> Floats:
+    if not isinstance(points, list) or not all(
+        isinstance(point, list) and len(point) == 2 for point in points
+    ):
+        raise PolygonError("must be a list of points [x, y] in metres; correct it")
+    return np.array([[_number(x, "a point"), _number(y, "a point")] for x, y in points]).reshape(-1, 2)
+
+
+def _numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
+    values = fields[name]
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError(f"{name} must be a list of {count} numbers, got {_short(values)}")
+    return [_number(value, name) for value in values]
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name} must hold numbers, got {_short(value)}")
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf")  # which the checks refuse
+
+
+def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
+    value = fields.get(name)
+    if value is None or value == "":
+        return default
+    if not isinstance(value, str) or not value.isprintable():
+        raise ValueError(f"{name} must be a printable text, got {_short(value)}")
+    return value
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _fields(problem: Problem) -> dict[str, Any]:
+    obstacles = problem.obstacles
+    groups = np.diff(obstacles.obstacle_starts).tolist()
+    fields: dict[str, Any] = {
+        "id": problem.id,
+        "class": problem.class_name,
+        "start": list(problem.start),
+        "goal": list(problem.goal),
+        "goal_radius": problem.goal_radius,
+        "bounds": list(problem.bounds),
+        "obstacles": [piece.tolist() for piece in obstacles.pieces()],
+    }
+    return fields if all(size == 1 for size in groups) else {**fields, "groups": groups}

@@ -1,0 +1,39 @@
+"""Attempts: one row for every time a planner was asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+
+from storage.errors import StorageError
+from storage.schemas import ATTEMPTS
+from storage.shards import read_table, table_of, write_table
+
+
+def write_attempts(path: Path, rows: Sequence[dict[str, Any]], key: str = "") -> None:
+    """Write attempt rows (``schemas.ATTEMPTS``); a StorageError where a row has other fields or types."""
+    write_table(path, table_of(rows, ATTEMPTS, "attempt"), key)
+
+
+def read_attempts(place: Path) -> pd.DataFrame:
+    """All attempts of a file, or of every file below a folder in the order of their names.
+
+    Missing texts are None, missing numbers NaN; ``recalled`` holds one int32 array a row.
+    """
+    table = pa.concat_tables([read_table(path, ATTEMPTS) for path in tables_below(place, "benchmark")])
+    frame: pd.DataFrame = table.to_pandas()
+    return frame
+
+
+def tables_below(place: Path, stage: str) -> list[Path]:
+    """The file, or all Parquet files below a folder by name; a StorageError that names the stage if none."""
+    if not place.is_dir():
+        return [place]
+    paths = sorted(path for path in place.rglob("*.parquet") if not path.name.startswith("."))
+    if not paths:
+        raise StorageError(f"{place} holds no rows; run {stage}.")
+    return paths

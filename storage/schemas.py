@@ -1,0 +1,131 @@
+"""The tables: their columns, types and versions. A new field raises no version, a changed one does."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import pyarrow as pa
+
+GRID_BYTES: Final = 512  # 64 x 64 cells, one bit each
+
+_PROBLEM: Final = [
+    ("id", pa.string()),
+    ("class", pa.string()),
+    ("start", pa.list_(pa.float64())),  # x m, y m, heading rad
+    ("goal", pa.list_(pa.float64())),  # x m, y m
+    ("goal_radius", pa.float64()),  # m
+    ("bounds", pa.list_(pa.float64())),  # x_min, y_min, x_max, y_max, m
+]
+
+# Flat: a list of lists of lists costs ten times as much to read
+_GEOMETRY: Final = [
+    ("vertices", pa.list_(pa.float32())),  # x0 y0 x1 y1 ... m, exact: problems hold float32 numbers
+    ("piece_starts", pa.list_(pa.int32())),
+    ("obstacle_starts", pa.list_(pa.int32())),
+]
+
+
+def _schema(
+    name: str, fields: list[tuple[str, pa.DataType]], optional: tuple[str, ...] = (), **metadata: str
+) -> pa.Schema:
+    marked = [
+        pa.field(field, kind, metadata={"optional": "yes"} if field in optional else None)
+        for field, kind in fields
+    ]
+    return pa.schema(marked, metadata={"schema": name, **metadata})
+
+
+IMPORTED: Final = _schema("imported/1", [*_PROBLEM, *_GEOMETRY])
+
+# The contract's table of problems: what users hand in and get, nested as in JSON.
+PROBLEMS: Final = _schema(
+    "problems/1",
+    [
+        *_PROBLEM,
+        ("obstacles", pa.list_(pa.list_(pa.list_(pa.float64())))),  # polygons of [x, y], m
+        ("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
+    ],
+    optional=("groups",),
+)
+
+EXPERIENCES: Final = _schema(
+    "experiences/1",
+    [
+        *_PROBLEM,
+        *_GEOMETRY,
+        ("states", pa.list_(pa.float64())),  # T x (x m, y m, heading rad, speed m/s, steering rad)
+        ("controls", pa.list_(pa.float64())),  # (T - 1) x (acceleration m/s^2, steering rate rad/s)
+        ("dt", pa.float64()),  # s
+        ("planner", pa.string()),
+        ("seed", pa.int64()),
+        ("planning_seconds", pa.float64()),
+    ],
+)
+
+
+def hallucinated(plans: int) -> pa.Schema:
+    """Labelled problems; bit j of ``labels`` says whether plan j of ``plans`` is free."""
+    return _schema(
+        "hallucinated/1",
+        [
+            *_PROBLEM,
+            *_GEOMETRY,
+            ("plan_index", pa.int32()),  # the plan it was made from; -1: no stored plan is free
+            ("method", pa.string()),
+            ("grid", pa.binary(GRID_BYTES)),  # occupancy, row by row, most significant bit first
+            ("labels", pa.binary((plans + 7) // 8)),  # most significant bit first
+        ],
+        plans=str(plans),
+    )
+
+
+ATTEMPTS: Final = _schema(
+    "attempts/1",
+    [
+        ("problem_id", pa.string()),
+        ("problem_class", pa.string()),
+        ("planner", pa.string()),
+        ("assist", pa.string()),  # none, closed, open, repair, or one of these after "random-"
+        ("top_k", pa.int32()),
+        ("memory", pa.string()),
+        ("status", pa.string()),
+        ("solved", pa.bool_()),
+        ("source", pa.string()),  # recalled, repaired, searched; null where nothing was found
+        ("planning_seconds", pa.float64()),  # the whole, measured once around everything
+        ("occupancy_seconds", pa.float64()),
+        ("encode_seconds", pa.float64()),
+        ("recall_seconds", pa.float64()),
+        ("check_seconds", pa.float64()),
+        ("roadmap_seconds", pa.float64()),
+        ("search_seconds", pa.float64()),
+        ("recalled", pa.list_(pa.int32())),
+        ("collision_checks", pa.int64()),
+        ("expansions", pa.int64()),
+        ("nodes", pa.int64()),
+        ("length_m", pa.float64()),  # null where nothing was found
+        ("duration_s", pa.float64()),  # null where nothing was found
+        ("seed", pa.int64()),
+        ("run_id", pa.string()),
+        ("commit", pa.string()),
+        ("host", pa.string()),
+        ("verified", pa.bool_()),  # an independent check agreed; null where none was made
+    ],
+    optional=("verified",),
+)
+
+
+def recalls(plans: int) -> pa.Schema:
+    """What a memory of ``plans`` plans says to a problem, beside the truth."""
+    return _schema(
+        "recalls/1",
+        [
+            ("problem_id", pa.string()),
+            ("class", pa.string()),
+            ("memory", pa.string()),
+            ("protocol", pa.string()),  # held-out or fresh
+            ("order", pa.list_(pa.int16())),  # all plans, the best first
+            ("free", pa.binary((plans + 7) // 8)),  # which plans are free, most significant bit first
+            ("nothing_recalled", pa.bool_()),
+        ],
+        plans=str(plans),
+    )

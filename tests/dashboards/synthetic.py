@@ -1,0 +1,73 @@
+"""Rows as the storage gives them, made up."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+STANDARD = [("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("open", 5)]
+
+
+def attempts(
+    classes: tuple[str, ...] = ("curves", "random", "trap"),
+    planners: tuple[str, ...] = ("rrt", "gust", "follow"),
+    configurations: list[tuple[str, int]] = STANDARD,
+    problems: int = 40,
+    speed_up: float = 4.0,
+    seed: int = 0,
+    memory: str | None = None,
+) -> pd.DataFrame:
+    """Attempt rows in which memory makes planning ``speed_up`` times as fast, with noise."""
+    rng = np.random.default_rng(seed)
+    rows: list[dict[str, Any]] = []
+    for name, planner in product(classes, planners):
+        hardness = rng.lognormal(0.0, 1.0, problems)
+        for (assist, top_k), i in product(configurations, range(problems)):
+            seconds = 1e-3 * hardness[i] * rng.lognormal(0.0, 0.3) / (1.0 if assist == "none" else speed_up)
+            solved = bool(rng.random() < 0.95)
+            recalled = assist != "none" and rng.random() < 0.5
+            rows.append(
+                {
+                    "problem_id": f"{name}-{i}",
+                    "problem_class": name,
+                    "planner": planner,
+                    "assist": assist,
+                    "top_k": top_k,
+                    "memory": None if assist == "none" else memory or name,
+                    "solved": solved,
+                    "source": ("recalled" if recalled else "searched") if solved else None,
+                    "planning_seconds": seconds,
+                    "collision_checks": int(1e6 * seconds),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def recalls(
+    classes: tuple[str, ...] = ("curves", "random", "trap"),
+    problems: int = 60,
+    plans: int = 30,
+    protocols: tuple[str, ...] = ("held-out", "fresh"),
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Recall rows of a ranking better than chance."""
+    rng = np.random.default_rng(seed)
+    rows: list[dict[str, Any]] = []
+    for name, protocol, i in product(classes, protocols, range(problems)):
+        free = rng.random(plans) < 0.1
+        score = free + rng.normal(size=plans)
+        rows.append(
+            {
+                "problem_id": f"{name}-{i}",
+                "class": name,
+                "memory": name,
+                "protocol": protocol,
+                "order": np.argsort(-score).astype(np.int16),
+                "free": free,
+                "nothing_recalled": bool(rng.random() < 0.1),
+            }
+        )
+    return pd.DataFrame(rows)

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import io
+
+import pandas as pd
+import pytest
+from rich.console import Console, RenderableType
+
+from dashboards.retrieval import retrieval_curve, summarise_retrieval
+from dashboards.statistics import summarise
+from dashboards.tables import (
+    NOTHING,
+    as_csv,
+    configuration,
+    retrieval_markdown,
+    retrieval_table,
+    summary_markdown,
+    summary_table,
+)
+from tests.dashboards.synthetic import STANDARD, attempts, recalls
+
+ABLATION = [*STANDARD, ("random-open", 1), ("random-open", 5)]
+
+
+def rendered(table: RenderableType) -> list[str]:
+    text = io.StringIO()
+    Console(file=text, width=110).print(table)
+    return text.getvalue().splitlines()
+
+
+def test_the_table_holds_every_planner_configuration_and_class() -> None:
+    lines = rendered(summary_table(summarise(attempts(configurations=ABLATION), resamples=10)))
+    seen = set()
+    panel = planner = ""
+    for line in lines:
+        words = line.split()
+        if line.endswith("problems") or "problems" in words:
+            panel = words[0].rstrip(",")
+        elif words and words[0] in {"rrt", "gust", "follow"}:
+            planner, words = words[0], words[1:]
+        if words and words[0] in {assist for assist, _ in ABLATION}:
+            seen.add((panel, planner, words[0] if words[0] == "none" else " ".join(words[:2])))
+    assert seen == {
+        (name, planner, configuration(*each))
+        for name in ("curves", "random", "trap")
+        for planner in ("rrt", "gust", "follow")
+        for each in ABLATION
+    }
+
+
+@pytest.mark.parametrize("slowness", [1e-4, 1.0, 1e4])
+def test_the_tables_fit_110_columns_uncut(slowness: float) -> None:
+    rows = attempts(("multiple_bugtraps",), configurations=[*ABLATION, ("random-closed", 5)], speed_up=0.3)
+    rows["planning_seconds"] *= slowness
+    rows["collision_checks"] = (rows["collision_checks"] * slowness).astype(int)
+    retrieval = summarise_retrieval(retrieval_curve(recalls(("multiple_bugtraps",))))
+    for table in (summary_table(summarise(rows, resamples=50)), retrieval_table(retrieval)):
+        lines = rendered(table)
+        assert max(len(line) for line in lines) <= 110
+        assert not any("…" in line for line in lines)
+
+
+def test_what_was_not_attempted_is_seen_to_be_missing(attempt_rows: pd.DataFrame) -> None:
+    missing = (attempt_rows["problem_class"] == "trap") & (attempt_rows["assist"] == "open")
+    text = summary_markdown(summarise(attempt_rows[~missing], resamples=10))
+    trap = text[text.index("### trap") :].splitlines()
+    open_rows = [line for line in trap if "| open" in line]
+    assert len(open_rows) == 6
+    assert all(line.count(NOTHING) == 7 for line in open_rows)
+
+
+def test_markdown_columns_are_aligned(attempt_rows: pd.DataFrame, recall_rows: pd.DataFrame) -> None:
+    tables = summary_markdown(summarise(attempt_rows, resamples=10)).split("### ")[1:]
+    tables = [table.split("\n\n", 1)[1] for table in tables]
+    tables.append(retrieval_markdown(summarise_retrieval(retrieval_curve(recall_rows))))
+    for table in tables:
+        bars = [[i for i, letter in enumerate(line) if letter == "|"] for line in table.strip().splitlines()]
+        assert all(each == bars[0] for each in bars)
+
+
+def test_csv_reads_back_unrounded(attempt_rows: pd.DataFrame) -> None:
+    summary = summarise(attempt_rows, resamples=10)
+    back = pd.read_csv(io.StringIO(as_csv(summary)))
+    back = back.astype({name: summary[name].dtype for name in ("panel", "planner", "assist")})
+    pd.testing.assert_frame_equal(back, summary, rtol=1e-15)

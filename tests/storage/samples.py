@@ -1,0 +1,84 @@
+"""Problems and plans for the tests of this folder."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from planners.memory.experience import Experience
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    GOAL_RADIUS,
+    Floats,
+    Plan,
+    Problem,
+    obstacles_of,
+)
+
+quick = settings(deadline=None, max_examples=40)  # the first example compiles or makes folders
+
+
+def star(x: float, y: float, radii: list[float]) -> Floats:
+    """A simple polygon around (x, y), convex or not, counter-clockwise."""
+    angles = np.linspace(0.0, 2.0 * math.pi, len(radii), endpoint=False)
+    return np.stack([x + np.array(radii) * np.cos(angles), y + np.array(radii) * np.sin(angles)], axis=1)
+
+
+def box(x: float, y: float, half: float = 1.0) -> Floats:
+    """A square around (x, y)."""
+    return np.array([[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]])
+
+
+def problem_with(*groups: list[Floats], identity: str = "p-1", class_name: str = "curves") -> Problem:
+    """A canonical problem with these obstacles."""
+    return Problem(
+        identity, class_name, CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of(list(groups))
+    )
+
+
+# Away from start (0, 0) and goal (50, 50), whatever the radius
+_places = st.tuples(st.floats(12.0, 40.0), st.floats(12.0, 40.0))
+_boxes = st.builds(lambda place, half: box(*place, half), _places, st.floats(0.25, 4.0))
+_names = st.text("abcxyz-_0123äöß\"'\\ ", min_size=1, max_size=12).filter(str.strip)
+stars = st.builds(
+    lambda place, radii: star(*place, radii), _places, st.lists(st.floats(1.0, 6.0), min_size=4, max_size=12)
+)
+
+
+@st.composite
+def problems(draw: st.DrawFn) -> Problem:
+    """Canonical problems of boxes in groups, with awkward names."""
+    groups = draw(st.lists(st.lists(_boxes, min_size=1, max_size=3), max_size=5))
+    return problem_with(*groups, identity=draw(_names), class_name=draw(_names))
+
+
+def plan(length: int, seed: int = 0) -> Plan:
+    """Some plan; it need not be driveable to be stored."""
+    rng = np.random.default_rng(seed)
+    return Plan(rng.normal(size=(length, 5)), rng.normal(size=(length - 1, 2)))
+
+
+experiences = st.builds(Experience, problems(), st.builds(plan, st.integers(2, 20), st.integers(0, 99)))
+
+
+def same_problem(one: Problem, other: Problem) -> bool:
+    """Whether two problems agree in every field, to the last bit."""
+    plain = ("id", "class_name", "start", "goal", "goal_radius", "bounds")
+    return all(getattr(one, name) == getattr(other, name) for name in plain) and all(
+        a.dtype == b.dtype and np.array_equal(a, b)
+        for a, b in zip(one.obstacles, other.obstacles, strict=True)
+    )
+
+
+def same_plan(one: Plan, other: Plan) -> bool:
+    """Whether two plans agree to the last bit."""
+    return (
+        one.dt == other.dt
+        and np.array_equal(one.states, other.states)
+        and np.array_equal(one.controls, other.controls)
+    )

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from storage.errors import StorageError
+from storage.plans import PlanRecord, read_plan, write_plan
+from tests.storage.samples import plan, same_plan
+
+RECORD = PlanRecord("p-1", "solved", "repaired", "gust", "open", 0.012, plan(20))
+
+
+def test_a_plan_comes_back_exactly(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.json", RECORD)
+    read = read_plan(tmp_path / "plan.json")
+    assert RECORD.plan is not None
+    assert read.plan is not None
+    assert same_plan(read.plan, RECORD.plan)
+    assert replace(read, plan=None).__dict__ == replace(RECORD, plan=None).__dict__
+
+
+def test_the_file_has_exactly_the_fields_of_the_contract(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.json", RECORD)
+    found = json.loads((tmp_path / "plan.json").read_text())
+    assert list(found) == [
+        "problem_id", "status", "source", "planner", "assist", "dt", "states", "controls",
+        "planning_seconds", "length_m", "duration_s",
+    ]  # fmt: skip
+    assert RECORD.plan is not None
+    assert found["states"] == RECORD.plan.states.tolist()
+    assert found["duration_s"] == pytest.approx(1.9)
+
+
+def test_an_attempt_without_a_plan_can_be_written(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.json", replace(RECORD, plan=None, status="time-spent", source=None))
+    read = read_plan(tmp_path / "plan.json")
+    assert (read.plan, read.source, read.status) == (None, None, "time-spent")
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"states": [[1, 2, 3], [1, 2, 3]], "controls": [[0, 0]]}, r"states \[2, 3\].*another robot"),
+        ({"states": [[1, 2, 3, 4, 5]]}, "another robot"),
+        ({"states": [[1, 2, 3, 4, 5], [1, 2]]}, "is no plan"),
+        ({"states": "none"}, "is no plan"),
+        ({"dt": None}, "is no plan"),
+        ({"states": [[1, 2, 3, 4, float("nan")]], "controls": []}, "not a finite number"),
+    ],
+)
+def test_a_file_that_is_no_plan_is_refused_in_one_line(
+    tmp_path: Path, change: dict[str, Any], reason: str
+) -> None:
+    path = tmp_path / "plan.json"
+    write_plan(path, RECORD)
+    path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
+    with pytest.raises(StorageError, match=reason) as error:
+        read_plan(path)
+    assert "\n" not in str(error.value)
+
+
+def test_a_missing_field_is_named(tmp_path: Path) -> None:
+    (tmp_path / "plan.json").write_text("{}")
+    with pytest.raises(StorageError, match="has no field 'states'"):
+        read_plan(tmp_path / "plan.json")
