@@ -35,7 +35,7 @@ class Attempt:
     top_k: int  # 0 without assistance
     status: str
     solved: bool
-    source: str  # "recalled", "searched", or "" when not solved
+    source: str | None  # "recalled" or "searched"; None when not solved
     planning_seconds: float
     occupancy_seconds: float
     encode_seconds: float
@@ -48,8 +48,8 @@ class Attempt:
     collision_checks: int
     expansions: int
     nodes: int
-    length_m: float  # NaN when not solved
-    duration_s: float  # NaN when not solved
+    length_m: float | None  # None when not solved
+    duration_s: float | None  # None when not solved
     seed: int
     plan: Plan | None
 
@@ -150,7 +150,7 @@ def solve(
         top_k=0 if assist == "none" else top_k,
         status=str(Status.SOLVED if outcome is None else outcome.status),
         solved=answer is not None,
-        source="recalled" if outcome is None else "searched" if answer is not None else "",
+        source="recalled" if outcome is None else "searched" if answer is not None else None,
         planning_seconds=planning_seconds,
         occupancy_seconds=occupancy_seconds,
         encode_seconds=encode_seconds,
@@ -163,8 +163,8 @@ def solve(
         collision_checks=checks + (0 if outcome is None else outcome.collision_checks),
         expansions=0 if outcome is None else outcome.expansions,
         nodes=0 if outcome is None else outcome.nodes,
-        length_m=math.nan if answer is None else answer.length_m,
-        duration_s=math.nan if answer is None else answer.duration_s,
+        length_m=None if answer is None else answer.length_m,
+        duration_s=None if answer is None else answer.duration_s,
         seed=seed,
         plan=answer,
     )

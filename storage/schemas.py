@@ -108,9 +108,10 @@ ATTEMPTS: Final = _schema(
         ("run_id", pa.string()),
         ("commit", pa.string()),
         ("host", pa.string()),
+        ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
         ("verified", pa.bool_()),  # an independent check agreed; null where none was made
     ],
-    optional=("verified",),
+    optional=("scene_seconds", "verified"),
 )
 
 

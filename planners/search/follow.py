@@ -46,7 +46,7 @@ LENGTH, SINCE_FOLLOW, SINCE_GROUP = range(3)
 
 
 class FollowSettings(NamedTuple):
-    """algorithms.md, Follow; edges of the roadmap cost length / clearance.
+    """docs/planners.md, Follow; edges of the roadmap cost length / clearance.
 
     Distances and patience are published for a car of 2.25 m/s (3 m, 2 m, 150, 100); at 4 m/s these halve the
     median time.

@@ -42,7 +42,7 @@ SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all i
 
 
 class GustSettings(NamedTuple):
-    """Defaults of algorithms.md, GUST."""
+    """Defaults of docs/planners.md, GUST."""
 
     roadmap: RoadmapSettings = RoadmapSettings()
     distance_exponent: float = 8.0  # delta: how much nearer groups are preferred

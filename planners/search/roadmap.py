@@ -35,7 +35,7 @@ UNKNOWN, FREE, BLOCKED = range(3)
 
 
 class RoadmapSettings(NamedTuple):
-    """How a roadmap is built (algorithms.md, Roadmap)."""
+    """How a roadmap is built (docs/planners.md)."""
 
     batch: int = 100  # nodes drawn before the first, and between two, searches for a way from the start
     neighbours: int = 10

@@ -18,7 +18,7 @@ from planners.world.vehicle import CAR, Vehicle
 
 
 class RrtSettings(NamedTuple):
-    """Defaults of algorithms.md; without a guide the goal is drawn with ``NO_GUIDE.goal_probability``."""
+    """docs/planners.md; without a guide the goal is drawn with ``NO_GUIDE.goal_probability``."""
 
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0

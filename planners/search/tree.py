@@ -33,7 +33,7 @@ class Tree(NamedTuple):
 
 
 class Extension(NamedTuple):
-    """How a vertex is extended towards a target (algorithms.md, Vehicle)."""
+    """How a vertex is extended towards a target (docs/planners.md)."""
 
     steer_probability: float = 0.99  # else one random constant control
     metres_a_step: float = 0.5  # floor(distance / this) steps ...

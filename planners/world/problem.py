@@ -34,7 +34,7 @@ class Obstacles(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Start pose, goal disc, bounds and obstacles (method.md: ``S``)."""
+    """Start pose, goal disc, bounds and obstacles (docs/method.md: ``S``)."""
 
     id: str
     class_name: str
@@ -47,7 +47,7 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """States and the controls between them at a fixed time step (method.md: ``P``)."""
+    """States and the controls between them at a fixed time step (docs/method.md: ``P``)."""
 
     states: Floats  # [T, 5] x m, y m, heading rad, speed m/s, steering rad
     controls: Floats  # [T - 1, 2] acceleration m/s^2, steering rate rad/s
@@ -78,7 +78,7 @@ def obstacles_of(groups: list[list[Floats]]) -> Obstacles:
 def counter_clockwise(polygon: Floats) -> Floats:
     """The same polygon ``[n, 2]`` with its vertices in counter-clockwise order."""
     x, y = polygon[:, 0], polygon[:, 1]
-    area = float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    area = float(x[:-1] @ y[1:] - y[:-1] @ x[1:] + x[-1] * y[0] - y[-1] * x[0])
     return polygon if area >= 0.0 else polygon[::-1]
 
 

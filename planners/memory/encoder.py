@@ -1,0 +1,150 @@
+"""The encoder: occupancy grid to embedding, and its runtime, which needs no torch.
+
+Stages of convolution, max-pool and PReLU, then fully connected layers, no normalisation (algorithms.md). Two
+changes to the published network, for latency: the first convolution is 4x4 with stride 2, and pooling comes
+before the PReLU, which gives the same values for slopes that are not negative at a quarter of the work.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planners.world.occupancy import GRID, Grid
+
+Floats32 = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
+Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ..., "linear.0.weight", ...
+
+FIRST_KERNEL = 4  # of the first convolution, with stride 2; the others are 3x3
+PRELU_SLOPE = 0.25  # what a PReLU begins with (He et al. 2015)
+OPSET = 17
+IR_VERSION = 9  # the oldest that has the opset: readable by old runtimes
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Sizes of the encoder."""
+
+    channels: tuple[int, ...] = (8, 16, 32)  # of the convolutions; all but the last are followed by pooling
+    hidden: tuple[int, ...] = (128, 64)  # widths of the fully connected layers before the embedding
+    dimensions: int = 30  # of the embedding
+
+    def __post_init__(self) -> None:
+        smallest = min((*self.channels, *self.hidden, self.dimensions))
+        if not 1 <= len(self.channels) <= 5 or smallest < 1:
+            raise ValueError(f"{self} is no network: give 1 to 5 convolutions and sizes of at least 1")
+
+
+def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
+    """Weights to begin training with: normal, scaled for PReLU (He et al. 2015); biases zero."""
+    weights: Weights = {}
+
+    def add(name: str, shape: tuple[int, ...], slope_shape: tuple[int, ...] | None) -> None:
+        fan_in = float(np.prod(shape[1:]))
+        gain = 1.0 if slope_shape is None else 2.0 / (1.0 + PRELU_SLOPE**2)
+        weights[f"{name}.weight"] = rng.normal(0.0, np.sqrt(gain / fan_in), shape).astype(np.float32)
+        weights[f"{name}.bias"] = np.zeros(shape[0], np.float32)
+        if slope_shape is not None:
+            weights[f"{name}.slope"] = np.full(slope_shape, PRELU_SLOPE, np.float32)
+
+    inputs, side = 1, GRID // 2
+    for i, outputs in enumerate(architecture.channels):
+        kernel = FIRST_KERNEL if i == 0 else 3
+        add(f"convolution.{i}", (outputs, inputs, kernel, kernel), (outputs, 1, 1))
+        inputs = outputs
+        side //= 2 if i + 1 < len(architecture.channels) else 1
+    width = inputs * side * side
+    for i, outputs in enumerate((*architecture.hidden, architecture.dimensions)):
+        last = i == len(architecture.hidden)
+        add(f"linear.{i}", (outputs, width), None if last else (outputs,))
+        width = outputs
+    return weights
+
+
+def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
+    """How many convolutions and how many fully connected layers ``weights`` has."""
+    names = {name.rsplit(".", 1)[0] for name in weights}
+    convolutions = sum(name.startswith("convolution.") for name in names)
+    return convolutions, len(names) - convolutions
+
+
+def to_onnx(weights: Weights) -> bytes:
+    """The network as a serialised ONNX model: ``grid`` uint8 [n, 64, 64] to ``embedding`` float32 [n, D]."""
+    from onnx import TensorProto, helper, numpy_helper
+
+    convolutions, linears = layer_counts(weights)
+    nodes = [
+        helper.make_node("Cast", ["grid"], ["cells"], to=TensorProto.FLOAT),
+        helper.make_node("Reshape", ["cells", "image_shape"], ["image"]),
+    ]
+    value = "image"
+
+    def chain(operation: str, *inputs: str, **attributes: Any) -> None:
+        nonlocal value
+        output = f"value{len(nodes)}"
+        nodes.append(helper.make_node(operation, [value, *inputs], [output], **attributes))
+        value = output
+
+    for i in range(convolutions):
+        name = f"convolution.{i}"
+        stride = 2 if i == 0 else 1
+        chain("Conv", f"{name}.weight", f"{name}.bias", strides=[stride, stride], pads=[1, 1, 1, 1])
+        if i + 1 < convolutions:
+            chain("MaxPool", kernel_shape=[2, 2], strides=[2, 2])
+        chain("PRelu", f"{name}.slope")
+    chain("Flatten")
+    for i in range(linears):
+        chain("Gemm", f"linear.{i}.weight", f"linear.{i}.bias", transB=1)
+        if i + 1 < linears:
+            chain("PRelu", f"linear.{i}.slope")
+    nodes[-1].output[0] = "embedding"
+    dimensions = len(weights[f"linear.{linears - 1}.bias"])
+    graph = helper.make_graph(
+        nodes,
+        "encoder",
+        [helper.make_tensor_value_info("grid", TensorProto.UINT8, ["n", GRID, GRID])],
+        [helper.make_tensor_value_info("embedding", TensorProto.FLOAT, ["n", dimensions])],
+        [
+            numpy_helper.from_array(np.array([-1, 1, GRID, GRID], np.int64), "image_shape"),
+            *(numpy_helper.from_array(np.asarray(weights[name]), name) for name in weights),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    serialised: bytes = model.SerializeToString()
+    return serialised
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """Runs a serialised ONNX encoder on one thread; pickled as its bytes, its session made at first use."""
+
+    model: bytes
+
+    @functools.cached_property
+    def _run(self) -> Callable[..., list[Floats32]]:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        session = onnxruntime.InferenceSession(self.model, options, providers=["CPUExecutionProvider"])
+        run: Callable[..., list[Floats32]] = session.run
+        return run
+
+    def __getstate__(self) -> dict[str, bytes]:
+        return {"model": self.model}
+
+    def __call__(self, grids: Grid) -> Floats32:
+        """Embedding ``[D]`` of one grid ``[64, 64]``, or ``[n, D]`` of ``[n, 64, 64]``; cells are 0 or 1."""
+        if grids.dtype != np.uint8 or grids.ndim not in (2, 3) or grids.shape[-2:] != (GRID, GRID):
+            raise ValueError(
+                f"grid is {grids.dtype} {list(grids.shape)}, the encoder needs uint8 [{GRID}, {GRID}] "
+                f"or [n, {GRID}, {GRID}]. Was it drawn by planners.world.occupancy?"
+            )
+        embeddings = self._run(None, {"grid": grids.reshape(-1, GRID, GRID)})[0]
+        return embeddings.reshape(*grids.shape[:-2], -1)

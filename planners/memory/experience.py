@@ -1,0 +1,29 @@
+"""What is kept of a solved problem."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+from planners.memory.labels import PlanSweeps, sweep_plans, swept_boxes
+from planners.world.problem import Floats, Plan, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class Experience:
+    """One solved problem: the pair ``(S_i, P_i)`` of method.md, in the canonical frame."""
+
+    problem: Problem
+    plan: Plan
+    car: Vehicle = CAR
+
+    @functools.cached_property
+    def boxes(self) -> Floats:
+        """The plan's swept boxes ``[T, 6]`` in driving order, columns as in ``PlanSweeps``."""
+        return swept_boxes(self.plan.states, self.car)
+
+    @functools.cached_property
+    def sweep(self) -> PlanSweeps:
+        """The plan, ready to be checked against many problems."""
+        return sweep_plans([self.plan], self.car)

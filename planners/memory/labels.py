@@ -1,0 +1,165 @@
+"""Which stored plans are free in a problem: exact, and stopped at a plan's first collision.
+
+A plan's inflated footprints do not depend on the problem, so they are made once (``PlanSweeps``); a check
+only moves through them. They are exactly the boxes that ``collision.state_is_free`` tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.collision import Scene, box_is_free
+from planners.world.dynamics import step_margin
+from planners.world.jit import inlined, jit
+from planners.world.problem import Floats, Integers, Plan
+from planners.world.vehicle import CAR, Vehicle
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+COARSEST_STRIDE = 64  # first states visited are 64 steps apart: some 20 m of driving
+START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
+
+
+class PlanSweeps(NamedTuple):
+    """The swept boxes of N plans, packed for the kernels."""
+
+    boxes: Floats  # [S, 6] centre x, y (m), cos, sin of the heading, half length, half width with margin (m)
+    starts: Integers  # [N + 1] plan i owns boxes[starts[i] : starts[i + 1]], coarse steps first
+    first_poses: Floats  # [N, 3] x, y in metres, heading in radians
+    last_positions: Floats  # [N, 2] metres
+
+
+@jit
+def coarse_to_fine(count: int) -> Integers:
+    """A permutation of ``0 .. count - 1``: every 64th first, then those half way between, and so on.
+
+    Neighbouring states collide together, so states far apart find a collision sooner.
+    """
+    order = np.empty(count, np.int32)
+    placed = 0
+    stride = COARSEST_STRIDE
+    for i in range(0, count, stride):
+        order[placed] = i
+        placed += 1
+    while stride > 1:
+        for i in range(stride // 2, count, stride):
+            order[placed] = i
+            placed += 1
+        stride //= 2
+    return order
+
+
+@jit
+def swept_boxes(states: Floats, car: Vehicle) -> Floats:
+    """Boxes ``[T, 6]`` (as in ``PlanSweeps``) that ``collision.state_is_free`` tests, in driving order."""
+    ahead = 0.5 * (car.front - car.rear)
+    boxes = np.empty((states.shape[0], 6))
+    for i in range(states.shape[0]):
+        margin = step_margin(states[i, 3], states[i, 4], car)
+        cos = math.cos(states[i, 2])
+        sin = math.sin(states[i, 2])
+        boxes[i, 0] = states[i, 0] + ahead * cos
+        boxes[i, 1] = states[i, 1] + ahead * sin
+        boxes[i, 2] = cos
+        boxes[i, 3] = sin
+        boxes[i, 4] = 0.5 * (car.front + car.rear) + margin
+        boxes[i, 5] = 0.5 * car.width + margin
+    return boxes
+
+
+def sweep_plans(plans: Sequence[Plan], car: Vehicle = CAR) -> PlanSweeps:
+    """Pack the swept boxes of ``plans``."""
+    boxes = [swept_boxes(plan.states, car)[coarse_to_fine(len(plan.states))] for plan in plans]
+    return PlanSweeps(
+        np.concatenate(boxes) if boxes else np.empty((0, 6)),
+        np.cumsum([0] + [len(plan.states) for plan in plans], dtype=np.int32),
+        np.array([plan.states[0, :3] for plan in plans]).reshape(-1, 3),
+        np.array([plan.states[-1, :2] for plan in plans]).reshape(-1, 2),
+    )
+
+
+@inlined
+def _sweep_is_free(sweeps: PlanSweeps, i: int, scene: Scene) -> tuple[bool, int]:
+    boxes = sweeps.boxes
+    for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
+        if not box_is_free(
+            boxes[j, 0], boxes[j, 1], boxes[j, 2], boxes[j, 3], boxes[j, 4], boxes[j, 5], scene
+        ):
+            return False, j - sweeps.starts[i] + 1
+    return True, sweeps.starts[i + 1] - sweeps.starts[i]
+
+
+@jit
+def free_plans(sweeps: PlanSweeps, scene: Scene) -> Flags:
+    """Label vector ``[N]``: which plans' sweeps are free in a scene of the canonical frame."""
+    free = np.empty(sweeps.starts.shape[0] - 1, np.bool_)
+    for i in range(free.shape[0]):
+        free[i], _ = _sweep_is_free(sweeps, i, scene)
+    return free
+
+
+@jit
+def plan_is_free(
+    sweeps: PlanSweeps,
+    i: int,
+    scene: Scene,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    goal_radius: float,
+) -> tuple[bool, int]:
+    """Whether plan ``i`` answers a problem: begins at its start, ends in its goal disc, and is free.
+
+    Also how many footprints were checked to know.
+    """
+    pose = sweeps.first_poses[i]
+    if (
+        abs(pose[0] - start[0]) > START_TOLERANCE
+        or abs(pose[1] - start[1]) > START_TOLERANCE
+        or abs(pose[2] - start[2]) > START_TOLERANCE
+    ):
+        return False, 0
+    if math.hypot(sweeps.last_positions[i, 0] - goal[0], sweeps.last_positions[i, 1] - goal[1]) > goal_radius:
+        return False, 0
+    return _sweep_is_free(sweeps, i, scene)
+
+
+@jit
+def turned_plan_is_free(
+    sweeps: PlanSweeps,
+    i: int,
+    scene: Scene,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    goal_radius: float,
+) -> tuple[bool, int]:
+    """Like ``plan_is_free`` for plan ``i`` turned rigidly about its first position to the start's heading."""
+    pose = sweeps.first_poses[i]
+    px = pose[0]
+    py = pose[1]
+    if abs(px - start[0]) > START_TOLERANCE or abs(py - start[1]) > START_TOLERANCE:
+        return False, 0
+    cos = math.cos(start[2] - pose[2])
+    sin = math.sin(start[2] - pose[2])
+    dx = sweeps.last_positions[i, 0] - px
+    dy = sweeps.last_positions[i, 1] - py
+    if math.hypot(px + cos * dx - sin * dy - goal[0], py + sin * dx + cos * dy - goal[1]) > goal_radius:
+        return False, 0
+    boxes = sweeps.boxes
+    for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
+        dx = boxes[j, 0] - px
+        dy = boxes[j, 1] - py
+        if not box_is_free(
+            px + cos * dx - sin * dy,
+            py + sin * dx + cos * dy,
+            cos * boxes[j, 2] - sin * boxes[j, 3],
+            sin * boxes[j, 2] + cos * boxes[j, 3],
+            boxes[j, 4],
+            boxes[j, 5],
+            scene,
+        ):
+            return False, j - sweeps.starts[i] + 1
+    return True, sweeps.starts[i + 1] - sweeps.starts[i]

@@ -1,0 +1,43 @@
+"""The encoder in torch, for training; ``encoder.to_onnx`` writes the same network for recall."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from planners.memory.encoder import layer_counts
+from planners.world.occupancy import GRID
+
+Parameters = dict[str, Tensor]
+
+
+def unpacked(bits: Tensor) -> Tensor:
+    """Images float32 ``[n, 1, 64, 64]`` of packed grids uint8 ``[n, 512]``."""
+    shifts = torch.arange(7, -1, -1, dtype=torch.uint8, device=bits.device)
+    return ((bits[:, :, None] >> shifts) & 1).to(torch.float32).view(-1, 1, GRID, GRID)
+
+
+def embed(parameters: Parameters, bits: Tensor) -> Tensor:
+    """Embeddings ``[n, D]`` of packed grids uint8 ``[n, 512]``."""
+    convolutions, linears = layer_counts(parameters)
+    value = unpacked(bits)
+    for i in range(convolutions):
+        name = f"convolution.{i}"
+        weight, bias = parameters[f"{name}.weight"], parameters[f"{name}.bias"]
+        value = functional.conv2d(value, weight, bias, stride=2 if i == 0 else 1, padding=1)
+        if i + 1 < convolutions:
+            value = functional.max_pool2d(value, 2)
+        value = functional.prelu(value, parameters[f"{name}.slope"].flatten())
+    value = value.flatten(1)
+    for i in range(linears):
+        value = functional.linear(value, parameters[f"linear.{i}.weight"], parameters[f"linear.{i}.bias"])
+        if i + 1 < linears:
+            value = functional.prelu(value, parameters[f"linear.{i}.slope"])
+    return value
+
+
+@torch.no_grad()
+def embed_all(parameters: Parameters, bits: Tensor, batch: int = 1024) -> Tensor:
+    """Like ``embed``, in batches and without gradients."""
+    return torch.cat([embed(parameters, part) for part in torch.split(bits, batch)])

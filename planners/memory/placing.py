@@ -1,0 +1,118 @@
+"""Kernels that put single obstacles into a set being made, and tell whether they meet swept boxes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planners.world.collision import box_meets_piece
+from planners.world.jit import jit
+from planners.world.problem import Floats, Obstacles
+
+
+@jit
+def take_obstacle(source: Obstacles, o: int, target: Obstacles, count: int) -> None:
+    """Write obstacle ``o`` of ``source`` as number ``count`` of ``target``, in place of what was there."""
+    moved_obstacle(source, o, 0.0, 0.0, 0.0, target, count)
+
+
+@jit
+def moved_obstacle(
+    source: Obstacles, o: int, dx: float, dy: float, turn: float, target: Obstacles, count: int
+) -> None:
+    """Like ``take_obstacle``, moved by (dx, dy) metres and turned by ``turn`` radians about its centre.
+
+    The centre is the mean of its vertices. Coordinates are rounded to float32, as everywhere in Obstacles.
+    """
+    first_piece = source.obstacle_starts[o]
+    last_piece = source.obstacle_starts[o + 1]
+    first = source.piece_starts[first_piece]
+    last = source.piece_starts[last_piece]
+    centre_x = 0.0
+    centre_y = 0.0
+    for i in range(first, last):
+        centre_x += source.vertices[i, 0] / (last - first)
+        centre_y += source.vertices[i, 1] / (last - first)
+    still = dx == 0.0 and dy == 0.0 and turn == 0.0
+    cos = math.cos(turn)
+    sin = math.sin(turn)
+    piece = target.obstacle_starts[count]
+    end = target.piece_starts[piece]
+    for i in range(first, last):
+        x = source.vertices[i, 0]
+        y = source.vertices[i, 1]
+        if not still:
+            u = x - centre_x
+            w = y - centre_y
+            x = np.float64(np.float32(centre_x + dx + cos * u - sin * w))
+            y = np.float64(np.float32(centre_y + dy + sin * u + cos * w))
+        target.vertices[end + i - first, 0] = x
+        target.vertices[end + i - first, 1] = y
+    for p in range(first_piece, last_piece):
+        target.piece_starts[piece + p - first_piece + 1] = end + source.piece_starts[p + 1] - first
+    target.obstacle_starts[count + 1] = piece + last_piece - first_piece
+
+
+@jit
+def largest_stride(boxes: Floats) -> float:
+    """The most, in metres, by which a gap in x or y can shrink from one of ``boxes [T, 6]`` to the next."""
+    largest = 0.0
+    for t in range(1, boxes.shape[0]):
+        way = max(abs(boxes[t, 0] - boxes[t - 1, 0]), abs(boxes[t, 1] - boxes[t - 1, 1]))
+        growth = abs(boxes[t, 4] - boxes[t - 1, 4]) + abs(boxes[t, 5] - boxes[t - 1, 5])
+        largest = max(largest, way + growth)
+    return largest
+
+
+@jit
+def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float, stride_m: float) -> bool:
+    """Whether obstacle ``o`` meets any of ``boxes [T, 6]`` (as in PlanSweeps), widened on every side.
+
+    ``stride_m`` is their largest stride, infinite for boxes in no order: boxes that cannot have come near
+    since the last look are skipped.
+    """
+    first_piece = obstacles.obstacle_starts[o]
+    last_piece = obstacles.obstacle_starts[o + 1]
+    first = obstacles.piece_starts[first_piece]
+    last = obstacles.piece_starts[last_piece]
+    normals = np.empty((last - first, 2))
+    offsets = np.empty(last - first)
+    starts = np.empty(2, np.int32)
+    for p in range(first_piece, last_piece):
+        vertices = obstacles.vertices[obstacles.piece_starts[p] : obstacles.piece_starts[p + 1]]
+        count = vertices.shape[0]
+        x_min = math.inf
+        y_min = math.inf
+        x_max = -math.inf
+        y_max = -math.inf
+        for i in range(count):
+            j = i + 1 if i + 1 < count else 0
+            ex = vertices[j, 0] - vertices[i, 0]
+            ey = vertices[j, 1] - vertices[i, 1]
+            length = math.hypot(ex, ey)
+            normals[i, 0] = ey / length
+            normals[i, 1] = -ex / length
+            offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
+            x_min = min(x_min, vertices[i, 0])
+            x_max = max(x_max, vertices[i, 0])
+            y_min = min(y_min, vertices[i, 1])
+            y_max = max(y_max, vertices[i, 1])
+        starts[0] = 0
+        starts[1] = count
+        t = 0
+        while t < boxes.shape[0]:
+            x = boxes[t, 0]
+            y = boxes[t, 1]
+            half_length = boxes[t, 4] + widened_m
+            half_width = boxes[t, 5] + widened_m
+            gap = max(x_min - x, x - x_max, y_min - y, y - y_max) - math.hypot(half_length, half_width)
+            if gap > 0.0:
+                t += 1 + int(gap / stride_m)
+            elif box_meets_piece(
+                x, y, boxes[t, 2], boxes[t, 3], half_length, half_width, 0, vertices, normals, offsets, starts
+            ):
+                return True
+            else:
+                t += 1
+    return False

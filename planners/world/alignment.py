@@ -1,0 +1,101 @@
+"""Any problem brought to the canonical frame by a rotation and a translation, and plans brought back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.problem import (
+    CANONICAL_DISTANCE,
+    CANONICAL_START,
+    Floats,
+    Plan,
+    Problem,
+    obstacles_of,
+)
+
+SAME_ANGLE = 1e-9  # radians: less turn than this moves nothing by as much as a float32's last digit
+SLIVER = 1e-4  # metres: thinner than this a triangle is left out, float32 would turn it inside out
+
+
+class Alignment(NamedTuple):
+    """The motion from a problem's own frame to the canonical one: a turn about ``origin``, which goes to 0."""
+
+    origin: tuple[float, float]  # metres, own frame: where the canonical start is
+    turn: float  # radians
+
+
+def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
+    """The same problem with its start at (0, 0) and its goal on the diagonal, and the motion that does it.
+
+    Bounds that come to lie askew get a box around them, and what it holds besides them becomes obstacles.
+    ValueError where start and goal are not
+    50 sqrt(2) m apart within the goal radius. Obstacles are rounded to float32, as everywhere.
+    """
+    (x, y, heading), goal = problem.start, problem.goal
+    distance = math.dist((x, y), goal)
+    if not abs(distance - CANONICAL_DISTANCE) <= problem.goal_radius:
+        raise ValueError(
+            f"Problem {problem.id}: start and goal are {distance:.2f} m apart, wanted"
+            f" {CANONICAL_DISTANCE:.2f} m within the goal radius {problem.goal_radius:g} m;"
+            " cut longer ways into a chain of local goals."
+        )
+    turn = math.atan2(goal[1] - y, goal[0] - x) - CANONICAL_START[2]
+    turn = (turn + math.pi) % (2.0 * math.pi) - math.pi
+    alignment = Alignment((x, y), 0.0 if abs(turn) < SAME_ANGLE else -turn)
+    if alignment == Alignment((0.0, 0.0), 0.0):
+        return problem, alignment
+    groups = [[_turned(piece, alignment) for piece in group] for group in _groups(problem)]
+    x_min, y_min, x_max, y_max = problem.bounds
+    corners = _turned(np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]]), alignment)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if alignment.turn != 0.0:
+        groups += [[triangle] for triangle in _cut_off(corners, low, high)]
+    goal_x, goal_y = _turned(np.array([goal]), alignment)[0]
+    return replace(
+        problem,
+        start=(0.0, 0.0, heading + alignment.turn),
+        goal=(float(goal_x), float(goal_y)),
+        bounds=(float(low[0]), float(low[1]), float(high[0]), float(high[1])),
+        obstacles=obstacles_of(groups),
+    ), alignment
+
+
+def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
+    """The plan in the frame that its problem came in; controls know no frame."""
+    cos, sin = math.cos(-alignment.turn), math.sin(-alignment.turn)
+    states = plan.states.copy()
+    states[:, 0] = alignment.origin[0] + cos * plan.states[:, 0] - sin * plan.states[:, 1]
+    states[:, 1] = alignment.origin[1] + sin * plan.states[:, 0] + cos * plan.states[:, 1]
+    states[:, 2] -= alignment.turn
+    return Plan(states, plan.controls, plan.dt)
+
+
+def _turned(points: Floats, alignment: Alignment) -> Floats:
+    """Points ``[n, 2]`` of the own frame in the canonical one."""
+    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
+    turned: Floats = (points - alignment.origin) @ np.array([[cos, sin], [-sin, cos]])
+    return turned
+
+
+def _groups(problem: Problem) -> list[list[Floats]]:
+    """The obstacles, each a list of convex pieces ``[n, 2]``."""
+    pieces = problem.obstacles.pieces()
+    starts = problem.obstacles.obstacle_starts
+    return [pieces[first:last] for first, last in pairwise(starts)]
+
+
+def _cut_off(corners: Floats, low: Floats, high: Floats) -> list[Floats]:
+    """What the box from ``low`` to ``high`` holds besides the turned rectangle in it: triangles ``[3, 2]``."""
+    triangles = []
+    for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        way = end - begin
+        outward = np.array([way[1], -way[0]])
+        triangle = np.array([begin, np.where(outward > 0.0, high, low), end])
+        if np.abs(way).min() > SLIVER:
+            triangles.append(triangle)
+    return triangles

@@ -1,0 +1,246 @@
+"""The independent judge of plans: own equations in NumPy, collision by FCL; shares no code with the planners.
+
+What it accepts is a plan: driven by its controls from the problem's start, inside the car's limits, to the
+goal, its swept footprint free and inside the bounds at every instant.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import fcl
+import numpy as np
+
+from planners.world.problem import Floats, Plan, Problem
+from planners.world.vehicle import CAR, Vehicle
+
+TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
+ROUNDING = 1e-9  # on limits, metres and so on
+_HEIGHT = 1.0  # FCL's world has three dimensions: everything here is a prism that high
+_WALL = 20.0  # metres, thickness of the walls that stand for the bounds
+_RUN = 32  # steps whose common box is tried at once
+# Verified against dense samples of the motion: of FCL's solvers and motions only these jump nothing. The
+# default solver samples, and the linear motion misses what a turning corner hits. A screw is an arc here.
+_MOTION = fcl.ContinuousCollisionRequest(
+    num_max_iterations=1000,
+    toc_err=1e-6,
+    ccd_motion_type=fcl.CCDMotionType.CCDM_SCREW,
+    ccd_solver_type=fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT,
+)
+
+
+def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
+    """What is wrong with ``plan`` as an answer to ``problem``: one line each, none when it is good."""
+    states, controls = plan.states, plan.controls
+    if states.ndim != 2 or states.shape[1] != 5 or controls.shape != (len(states) - 1, 2):
+        return [f"Shapes: states {states.shape}, controls {controls.shape}; wanted (T, 5) and (T - 1, 2)."]
+    if not (np.isfinite(states).all() and np.isfinite(controls).all()):
+        return ["Numbers: the plan holds NaN or infinity."]
+    found = []
+    if plan.dt != vehicle.dt:
+        found.append(f"Time step: {plan.dt} s; the car's is {vehicle.dt} s.")
+    offset = np.abs(states[0] - [*problem.start, 0.0, 0.0]).max()
+    if offset > TOLERANCE:
+        found.append(f"Start: state 0 is {offset:.3g} off the problem's start at rest.")
+    found += _limit_faults(states, controls, vehicle)
+    error = np.abs(simulate_again(states[0], controls, vehicle) - states).max(axis=1)
+    if error.max() > TOLERANCE:
+        first = int(np.argmax(error > TOLERANCE))
+        found.append(f"Dynamics: state {first} is {error[first]:.3g} off where the controls lead.")
+    miss = math.dist(states[-1, :2], problem.goal)
+    if miss > problem.goal_radius + ROUNDING:
+        found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
+    return found + _sweep_faults(problem, states, controls, vehicle)
+
+
+def simulate_again(start: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
+    """States ``[T, 5]`` from ``start [5]`` under ``controls [T - 1, 2]``: RK4, speed and steering clamped.
+
+    Heading depends on speed and steering alone, and position on these three alone: sums do the rest.
+    """
+    states = np.tile(np.asarray(start, dtype=float), (len(controls) + 1, 1))
+    speed, steering = float(start[3]), float(start[4])
+    for i, (acceleration, steering_rate) in enumerate(controls.tolist()):
+        speed = min(max(speed + vehicle.dt * acceleration, vehicle.min_speed), vehicle.max_speed)
+        steering += vehicle.dt * steering_rate
+        steering = min(max(steering, -vehicle.max_steering), vehicle.max_steering)
+        states[i + 1, 3:] = speed, steering
+    states[1:, 2] = start[2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, 2])
+    states[1:, :2] = start[:2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, :2], axis=0)
+    return states
+
+
+def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
+    """What one Runge-Kutta step adds to each of ``states [T, 5]``."""
+
+    def slopes(at: Floats) -> Floats:
+        _, _, heading, speed, steering = at.T
+        turn = speed * np.tan(steering) / vehicle.wheelbase
+        return np.column_stack((speed * np.cos(heading), speed * np.sin(heading), turn, controls))
+
+    h = vehicle.dt
+    k1 = slopes(states)
+    k2 = slopes(states + 0.5 * h * k1)
+    k3 = slopes(states + 0.5 * h * k2)
+    k4 = slopes(states + h * k3)
+    return h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+def _limit_faults(states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
+    limits = (
+        ("Speed", states[:, 3], vehicle.min_speed, vehicle.max_speed, "m/s"),
+        ("Steering", states[:, 4], -vehicle.max_steering, vehicle.max_steering, "rad"),
+        ("Acceleration", controls[:, 0], -vehicle.max_acceleration, vehicle.max_acceleration, "m/s^2"),
+        ("Steering rate", controls[:, 1], -vehicle.max_steering_rate, vehicle.max_steering_rate, "rad/s"),
+    )
+    return [
+        f"{name}: {values.min():.4g} to {values.max():.4g} {unit}; the car allows {low:.4g} to {high:.4g}."
+        for name, values, low, high, unit in limits
+        if len(values) and (values.min() < low - ROUNDING or values.max() > high + ROUNDING)
+    ]
+
+
+def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
+    """The first step in which the footprint meets an obstacle or the bounds' walls.
+
+    A box around the footprints of a run of steps is tried first, and halved while it meets something; a
+    single step is then judged by continuous collision.
+    """
+    x_min, y_min, x_max, y_max = problem.bounds
+    outside = (states[:, :2] < (x_min, y_min)).any(axis=1) | (states[:, :2] > (x_max, y_max)).any(axis=1)
+    if outside.any():
+        return [f"Bounds: state {int(np.argmax(outside))} lies outside of them."]
+    manager, walls = _world(problem)
+    half_length = 0.5 * (vehicle.front + vehicle.rear)
+    half_width = 0.5 * vehicle.width
+    along = np.column_stack((np.cos(states[:, 2]), np.sin(states[:, 2])))
+    across = np.column_stack((-along[:, 1], along[:, 0]))
+    centres = states[:, :2] + 0.5 * (vehicle.front - vehicle.rear) * along
+    corners = np.stack(
+        [centres + u * half_length * along + w * half_width * across for u in (-1, 1) for w in (-1, 1)],
+        axis=1,
+    )
+    bend = _bend(states, controls, vehicle)
+    runs = [(i, min(i + _RUN, len(states) - 1)) for i in range(0, max(len(states) - 1, 1), _RUN)][::-1]
+    while runs:
+        first, last = runs.pop()
+        if last - first > 1:
+            if _meets(manager, _box_around(corners[first : last + 1], bend[first:last].max())):
+                middle = (first + last) // 2
+                runs += [(middle, last), (first, middle)]
+            continue
+        slack = bend[first] if last > first else 0.0
+        body = fcl.Box(2.0 * (half_length + slack), 2.0 * (half_width + slack), _HEIGHT)
+        begin = _pose(centres[first], along[first])
+        end = _pose(centres[last], along[last])
+        around = _box_around(corners[first : last + 1], slack)
+        for other in _near(manager, around):
+            if _hits(fcl.CollisionObject(body, begin), end, other):
+                return [
+                    f"Collision: the footprint meets {what} between states {first} and {last}"
+                    f" near ({x:.2f}, {y:.2f})."
+                ]
+    return []
+
+
+def _bend(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
+    """Farthest way ``[T - 1]``, metres, of a body point from where straight lines or arcs would have it.
+
+    A motion differs from a straight one between the same places by an eighth of the squared time step times
+    its largest second derivative, so two motions differ by at most twice that.
+    """
+    acceleration, steering_rate = np.abs(controls).T
+    speed = np.abs(states[:-1, 3]) + vehicle.dt * acceleration
+    steering = np.abs(states[:-1, 4]) + vehicle.dt * steering_rate
+    turn = speed * np.tan(steering) / vehicle.wheelbase
+    twist = acceleration * np.tan(steering) + speed * steering_rate / np.cos(steering) ** 2
+    reach = math.hypot(max(vehicle.front, vehicle.rear), 0.5 * vehicle.width)
+    second: Floats = acceleration + speed * turn + reach * (turn**2 + twist / vehicle.wheelbase)
+    return 2.0 * vehicle.dt**2 / 8.0 * second
+
+
+@functools.cache
+def _faces(corners: int) -> Floats:
+    """FCL's face list of a prism over a polygon: bottom, top, sides."""
+    faces = [corners, *range(corners - 1, -1, -1), corners, *range(corners, 2 * corners)]
+    for i in range(corners):
+        j = (i + 1) % corners
+        faces += [4, i, j, corners + j, corners + i]
+    return np.array(faces)
+
+
+def prism(polygon: Floats) -> fcl.CollisionObject:
+    """FCL's body for a convex polygon ``[n, 2]``."""
+    n = len(polygon)
+    vertices = np.zeros((2 * n, 3))
+    vertices[:n, :2] = polygon
+    vertices[n:, :2] = polygon
+    vertices[:n, 2] = -0.5 * _HEIGHT
+    vertices[n:, 2] = 0.5 * _HEIGHT
+    return fcl.CollisionObject(fcl.Convex(vertices, n + 2, _faces(n)))
+
+
+def _world(problem: Problem) -> tuple[fcl.DynamicAABBTreeCollisionManager, set[int]]:
+    """All obstacles and the bounds' four walls; and which objects are walls."""
+    x_min, y_min, x_max, y_max = problem.bounds
+    middle = np.array([0.5 * (x_min + x_max), 0.5 * (y_min + y_max)])
+    width, height = x_max - x_min, y_max - y_min
+    walls = []
+    for u, w in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        centre = middle + 0.5 * np.array([u * (width + _WALL), w * (height + _WALL)])
+        size = (_WALL, height + 2.0 * _WALL) if u else (width + 2.0 * _WALL, _WALL)
+        walls.append(fcl.CollisionObject(fcl.Box(*size, _HEIGHT), _pose(centre, np.array([1.0, 0.0]))))
+    manager = fcl.DynamicAABBTreeCollisionManager()
+    manager.registerObjects([prism(piece) for piece in problem.obstacles.pieces()] + walls)
+    manager.setup()
+    return manager, {id(wall) for wall in walls}
+
+
+def _pose(centre: Floats, along: Floats) -> fcl.Transform:
+    cos, sin = along
+    return fcl.Transform(
+        np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]), np.array([*centre, 0.0])
+    )
+
+
+def _box_around(corners: Floats, slack: float) -> fcl.CollisionObject:
+    """A box around footprints' ``corners [T, 4, 2]`` along the way from the first to the last."""
+    way = corners[-1].mean(axis=0) - corners[0].mean(axis=0)
+    length = math.hypot(*way)
+    along = way / length if length > 0.0 else np.array([1.0, 0.0])
+    axes = np.array([along, (-along[1], along[0])])
+    local = corners.reshape(-1, 2) @ axes.T
+    low, high = local.min(axis=0), local.max(axis=0)
+    size = high - low + 2.0 * slack
+    return fcl.CollisionObject(fcl.Box(*size, _HEIGHT), _pose(0.5 * (low + high) @ axes, along))
+
+
+def _meets(manager: fcl.DynamicAABBTreeCollisionManager, body: fcl.CollisionObject) -> bool:
+    data = fcl.CollisionData()
+    manager.collide(body, data, fcl.defaultCollisionCallback)
+    return bool(data.result.is_collision)
+
+
+def _near(
+    manager: fcl.DynamicAABBTreeCollisionManager, body: fcl.CollisionObject
+) -> list[fcl.CollisionObject]:
+    """Everything whose axis-aligned box meets that of ``body``."""
+    near: list[fcl.CollisionObject] = []
+
+    def collect(one: fcl.CollisionObject, other: fcl.CollisionObject, _: None) -> bool:
+        near.append(other if one is body else one)
+        return False
+
+    manager.collide(body, None, collect)
+    return near
+
+
+def _hits(body: fcl.CollisionObject, end: fcl.Transform, other: fcl.CollisionObject) -> bool:
+    """Whether ``body``, moved from its pose to ``end``, meets ``other`` on the way."""
+    touching = fcl.CollisionResult()
+    if fcl.collide(body, other, fcl.CollisionRequest(), touching):
+        return True
+    result = fcl.ContinuousCollisionResult()
+    fcl.continuousCollide(body, end, other, other.getTransform(), _MOTION, result)
+    return bool(result.is_collide)

@@ -1,0 +1,104 @@
+"""The named problem classes, each easy, standard or hard, drawn from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from planners.world.layouts import Curves, Random, Scatter, Trap, draw_curves, draw_random, draw_trap
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    GOAL_RADIUS,
+    Obstacles,
+    Problem,
+)
+from planners.world.randomness import generator
+
+CLASSES: Final = ("curves", "random", "trap")
+DIFFICULTIES: Final = ("easy", "standard", "hard")
+
+
+# The figures beside each setting are measured, see docs/decisions/0002-problem-classes.md: oracle@100; the best
+# planner's median and mean milliseconds from scratch; RRT's collision checks, in those of an empty world.
+
+_CURVES_STANDARD: Final = Curves(
+    curves=4,
+    inner_m=8.0,
+    outer_m=26.5,
+    segments=5,
+    gap_m=4.75,
+    slip_m=1.25,
+    shift_m=0.5,
+    presence=0.85,
+    thickness_m=0.5,
+    small=Scatter(sites=16, presence=0.85, jitter_m=1.25, radius_min_m=0.8, radius_max_m=1.8, strays=0),
+)
+_CURVES: Final = {
+    "easy": _CURVES_STANDARD._replace(curves=3, outer_m=24.0, gap_m=6.0, presence=0.8),
+    "standard": _CURVES_STANDARD,
+    "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=28.0, gap_m=4.0),
+}
+
+_RANDOM_STANDARD: Final = Random(
+    Scatter(sites=40, presence=0.95, jitter_m=0.6, radius_min_m=2.4, radius_max_m=3.7, strays=0)
+)
+_RANDOM: Final = {
+    "easy": Random(_RANDOM_STANDARD.shapes._replace(sites=34, radius_min_m=1.6, radius_max_m=2.6)),
+    "standard": _RANDOM_STANDARD,
+    "hard": Random(_RANDOM_STANDARD.shapes._replace(sites=44, jitter_m=0.9, strays=1)),
+}
+
+_TRAP_STANDARD: Final = Trap(
+    width_m=23.0,
+    flank_m=15.0,
+    gap_m=7.5,
+    depth_m=12.0,
+    thickness_m=1.0,
+    jitter_m=2.5,
+    turn=0.25,
+    small=Scatter(sites=26, presence=0.85, jitter_m=2.0, radius_min_m=1.0, radius_max_m=2.5, strays=1),
+)
+_TRAP: Final = {
+    "easy": _TRAP_STANDARD._replace(width_m=18.0, flank_m=12.0, gap_m=9.0, depth_m=8.0),
+    "standard": _TRAP_STANDARD,
+    "hard": _TRAP_STANDARD._replace(width_m=26.0, flank_m=18.0, gap_m=6.0, depth_m=14.0),
+}
+
+
+@dataclass(frozen=True)
+class ProblemClass:
+    """A source of problems that are alike."""
+
+    name: str
+    difficulty: str
+    draw_obstacles: Callable[[np.random.Generator], Obstacles]
+
+    def draw(self, seed: int, index: int) -> Problem:
+        """The canonical problem number ``index`` of ``seed``: the same one whoever draws it."""
+        return Problem(
+            id=f"{self.name}-{self.difficulty}-{seed}-{index}",
+            class_name=self.name,
+            start=CANONICAL_START,
+            goal=CANONICAL_GOAL,
+            goal_radius=GOAL_RADIUS,
+            bounds=BOUNDS,
+            obstacles=self.draw_obstacles(generator(seed, self.name, self.difficulty, index)),
+        )
+
+
+def problem_class(name: str, difficulty: str = "standard") -> ProblemClass:
+    """The class of that name and difficulty; ValueError with the known ones where there is none."""
+    if name not in CLASSES:
+        raise ValueError(f"Unknown problem class {name!r}; choose one of {', '.join(CLASSES)}.")
+    if difficulty not in DIFFICULTIES:
+        raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
+    if name == "curves":
+        return ProblemClass(name, difficulty, lambda rng: draw_curves(_CURVES[difficulty], rng))
+    if name == "random":
+        return ProblemClass(name, difficulty, lambda rng: draw_random(_RANDOM[difficulty], rng))
+    return ProblemClass(name, difficulty, lambda rng: draw_trap(_TRAP[difficulty], rng))
