@@ -1,0 +1,156 @@
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
+from planners.memory.labels import sweep_plans
+from planners.memory.recall import Memory
+from planners.search.outcome import Limits
+from planners.search.registry import PLANNERS, plan
+from planners.solve import ASSISTS, solve, turned
+from planners.world.authority import faults
+from planners.world.randomness import generator
+from planners.world.vehicle import CAR
+from tests.worlds import box, problem_of, strewn
+
+PARTS = ("occupancy", "encode", "recall", "scene", "check", "roadmap", "search")
+
+
+def memory_that_prefers(biases):
+    """Five plans through strewn boxes, ranked by ``biases`` whatever the problem; row 0 is "no plan"."""
+    plans = tuple(plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5))
+    network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
+    weights = initial_weights(network, generator(0))
+    zeros = np.zeros((6, 3), np.float32)
+    return Memory(
+        class_name="test",
+        vehicle=CAR,
+        plans=plans,
+        sweeps=sweep_plans(plans),
+        centroids=zeros,
+        vectors=zeros,
+        biases=np.array(biases, np.float32),
+        objective="labels",
+        encoder=Encoder(to_onnx(weights)),
+    )
+
+
+@functools.cache
+def shared_memory():
+    return memory_that_prefers([-1, 1, 2, 3, 4, 5])
+
+
+@pytest.fixture
+def memory():
+    return shared_memory()
+
+
+def blocked_everywhere():
+    """A wall with one gap that no stored plan takes."""
+    return problem_of([box(10, -2, 2.35, 4, 1), box(24, 30, 2.35, 30, 0.5)], "wall")
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_without_assistance_the_answer_is_the_planners_own(planner):
+    problem = strewn(3, 30)
+    attempt = solve(problem, planner, seed=4)
+    own = plan(planner, problem, generator(4, "search", problem.id, planner))
+    np.testing.assert_array_equal(attempt.plan.states, own.plan.states)
+    assert (attempt.source, attempt.recalled, attempt.top_k) == ("searched", (), 0)
+    assert attempt.collision_checks == own.collision_checks
+
+
+@pytest.mark.parametrize("assist", ["closed", "open"])
+def test_the_best_recalled_plan_that_is_free_is_the_answer(memory, assist):
+    attempt = solve(problem_of([]), "gust", assist, 5, memory)
+    assert attempt.recalled == (4, 3, 2, 1, 0)
+    assert attempt.plan is memory.plans[4]
+    assert (attempt.source, attempt.expansions, attempt.search_seconds) == ("recalled", 0, 0.0)
+    assert attempt.collision_checks == len(memory.plans[4].states)
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_a_closed_box_without_a_free_plan_searches_as_if_alone(memory, planner):
+    problem = blocked_everywhere()
+    alone = solve(problem, planner)
+    assisted = solve(problem, planner, "closed", 5, memory)
+    assert assisted.source == "searched"
+    np.testing.assert_array_equal(assisted.plan.states, alone.plan.states)
+    assert assisted.collision_checks > alone.collision_checks
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_an_open_box_is_guided_elsewhere(memory, planner):
+    problem = blocked_everywhere()
+    alone, guided = solve(problem, planner), solve(problem, planner, "open", 5, memory)
+    assert guided.solved
+    assert not np.array_equal(alone.plan.states, guided.plan.states)
+
+
+@pytest.mark.parametrize("assist", ["closed", "open"])
+def test_where_no_plan_scores_best_nothing_is_recalled(assist):
+    problem = strewn(3, 20)
+    attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]))
+    assert attempt.recalled == ()
+    np.testing.assert_array_equal(attempt.plan.states, solve(problem, "rrt").plan.states)
+
+
+@given(st.sampled_from(list(PLANNERS)), st.sampled_from(ASSISTS), st.integers(0, 40), st.floats(-0.02, 0.02))
+@settings(max_examples=40)
+def test_every_answer_passes_the_authority_whatever_the_start_heading(planner, assist, seed, off):
+    straight = strewn(seed, 15)
+    problem = replace(straight, start=(0.0, 0.0, straight.start[2] + off))
+    attempt = solve(problem, planner, assist, 5, shared_memory(), limits=Limits(expansions=3000))
+    if attempt.plan is not None:
+        assert faults(problem, attempt.plan) == []
+
+
+@pytest.mark.parametrize("assist", ASSISTS)
+def test_the_whole_time_covers_its_parts(memory, assist):
+    attempt = solve(blocked_everywhere(), "follow", assist, 5, memory)
+    parts = sum(getattr(attempt, f"{part}_seconds") for part in PARTS)
+    assert 0.0 < parts <= attempt.planning_seconds
+
+
+@given(st.integers(1, 9), st.integers(0, 100))
+@settings(max_examples=20)
+def test_random_plans_are_distinct_and_the_same_for_a_seed(k, seed):
+    memory = shared_memory()
+    attempt = solve(problem_of([]), "rrt", "random-closed", k, memory, seed)
+    assert len(set(attempt.recalled)) == min(k, 5)
+    assert attempt.recalled == solve(problem_of([]), "rrt", "random-closed", k, memory, seed).recalled
+
+
+def test_a_turned_plan_is_driven_by_the_same_controls(memory):
+    stored = memory.plans[0]
+    moved = turned(stored, stored.states[0, 2] + 0.3)
+    assert moved.controls is stored.controls
+    start, goal = (0.0, 0.0, moved.states[0, 2]), tuple(moved.states[-1, :2])
+    problem = replace(problem_of([]), start=start, goal=goal, bounds=(-90.0, -90.0, 90.0, 90.0))
+    assert faults(problem, moved) == []
+
+
+@pytest.mark.parametrize(
+    ("planner", "assist", "k", "with_memory", "says"),
+    [
+        ("astar", "none", 1, True, "unknown planner 'astar'"),
+        ("rrt", "ajar", 1, True, "unknown assist 'ajar'"),
+        ("rrt", "closed", 1, False, "needs a memory"),
+        ("rrt", "open", 0, True, "top k is 0"),
+    ],
+)
+def test_a_wrong_question_is_refused(memory, planner, assist, k, with_memory, says):
+    with pytest.raises(ValueError, match=says):
+        solve(problem_of([]), planner, assist, k, memory if with_memory else None)
+
+
+def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
+    problem = problem_of([box(*memory.plans[4].states[40, :2], 0.0, 0.2, 0.2)])
+    attempt = solve(problem, "rrt", "closed", 5, memory)
+    assert attempt.recalled[0] == 4
+    assert attempt.plan is not memory.plans[4]
+    assert faults(problem, memory.plans[4]) != []
