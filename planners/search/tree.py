@@ -10,7 +10,7 @@ import numpy as np
 
 from planners.search.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.collision import Scene, state_is_free
-from planners.world.dynamics import step
+from planners.world.dynamics import admissible, step
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers, Plan
 from planners.world.vehicle import Vehicle
@@ -169,9 +169,8 @@ def extend(
             )
             last_turn = turn
             last_speed = lack
-        x, y, heading, speed, steering = step(
-            x, y, heading, speed, steering, acceleration, steering_rate, car
-        )
+        drive, turn_rate = admissible(speed, steering, acceleration, steering_rate, car)
+        x, y, heading, speed, steering = step(x, y, heading, speed, steering, drive, turn_rate, car)
         counts[CHECKS] += 1
         if not state_is_free(x, y, heading, speed, steering, car, scene):
             break
@@ -193,8 +192,8 @@ def extend(
         states[new, 2] = heading
         states[new, 3] = speed
         states[new, 4] = steering
-        tree.controls[new, 0] = acceleration
-        tree.controls[new, 1] = steering_rate
+        tree.controls[new, 0] = drive
+        tree.controls[new, 1] = turn_rate
         tree.parents[new] = parent
         tree.depths[new] = tree.depths[parent] + 1
         tree.waypoints[new] = waypoint

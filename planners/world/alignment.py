@@ -23,7 +23,7 @@ SLIVER = 1e-4  # metres: thinner than this a triangle is left out, float32 would
 
 
 class Alignment(NamedTuple):
-    """The motion from a problem's own frame to the canonical one: a turn about ``origin``, which goes to 0."""
+    """The motion from a problem's own frame to the canonical one: a turn around ``origin``, moved to 0."""
 
     origin: tuple[float, float]  # metres, own frame: where the canonical start is
     turn: float  # radians
@@ -90,7 +90,7 @@ def _groups(problem: Problem) -> list[list[Floats]]:
 
 
 def _cut_off(corners: Floats, low: Floats, high: Floats) -> list[Floats]:
-    """What the box from ``low`` to ``high`` holds besides the turned rectangle in it: triangles ``[3, 2]``."""
+    """What the box from ``low`` to ``high`` holds besides the turned rectangle: triangles ``[3, 2]``."""
     triangles = []
     for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         way = end - begin

@@ -12,13 +12,12 @@ import math
 import fcl
 import numpy as np
 
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.problem import Floats, Integers, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
 ROUNDING = 1e-9  # on limits, metres and so on
 _HEIGHT = 1.0  # FCL's world has three dimensions: everything here is a prism that high
-_WALL = 20.0  # metres, thickness of the walls that stand for the bounds
 _RUN = 32  # steps whose common box is tried at once
 # Verified against dense samples of the motion: of FCL's solvers and motions only these jump nothing. The
 # default solver samples, and the linear motion misses what a turning corner hits. A screw is an arc here.
@@ -43,7 +42,9 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     offset = np.abs(states[0] - [*problem.start, 0.0, 0.0]).max()
     if offset > TOLERANCE:
         found.append(f"Start: state 0 is {offset:.3g} off the problem's start at rest.")
-    found += _limit_faults(states, controls, vehicle)
+    beyond = _limit_faults(states, controls, vehicle)
+    if beyond:  # how far a step may bend is known of the car within its limits only
+        return found + beyond
     error = np.abs(simulate_again(states[0], controls, vehicle) - states).max(axis=1)
     if error.max() > TOLERANCE:
         first = int(np.argmax(error > TOLERANCE))
@@ -102,16 +103,11 @@ def _limit_faults(states: Floats, controls: Floats, vehicle: Vehicle) -> list[st
 
 
 def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
-    """The first step in which the footprint meets an obstacle or the bounds' walls.
+    """The first step in which the footprint leaves the bounds or meets an obstacle.
 
     A box around the footprints of a run of steps is tried first, and halved while it meets something; a
     single step is then judged by continuous collision.
     """
-    x_min, y_min, x_max, y_max = problem.bounds
-    outside = (states[:, :2] < (x_min, y_min)).any(axis=1) | (states[:, :2] > (x_max, y_max)).any(axis=1)
-    if outside.any():
-        return [f"Bounds: state {int(np.argmax(outside))} lies outside of them."]
-    manager, walls = _world(problem)
     half_length = 0.5 * (vehicle.front + vehicle.rear)
     half_width = 0.5 * vehicle.width
     along = np.column_stack((np.cos(states[:, 2]), np.sin(states[:, 2])))
@@ -122,6 +118,12 @@ def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: V
         axis=1,
     )
     bend = _bend(states, controls, vehicle)
+    slack = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))[:, None, None]
+    low, high = problem.bounds[:2], problem.bounds[2:]
+    outside = ((corners - slack < low) | (corners + slack > high)).any(axis=(1, 2))
+    if outside.any():
+        return [f"Bounds: the footprint leaves them at state {int(np.argmax(outside))}."]
+    manager = _manager(problem)
     runs = [(i, min(i + _RUN, len(states) - 1)) for i in range(0, max(len(states) - 1, 1), _RUN)][::-1]
     while runs:
         first, last = runs.pop()
@@ -130,15 +132,16 @@ def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: V
                 middle = (first + last) // 2
                 runs += [(middle, last), (first, middle)]
             continue
-        slack = bend[first] if last > first else 0.0
-        body = fcl.Box(2.0 * (half_length + slack), 2.0 * (half_width + slack), _HEIGHT)
+        wider = bend[first] if last > first else 0.0
+        body = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
         begin = _pose(centres[first], along[first])
         end = _pose(centres[last], along[last])
-        around = _box_around(corners[first : last + 1], slack)
+        around = _box_around(corners[first : last + 1], wider)
         for other in _near(manager, around):
             if _hits(fcl.CollisionObject(body, begin), end, other):
+                x, y = states[first, :2]
                 return [
-                    f"Collision: the footprint meets {what} between states {first} and {last}"
+                    f"Collision: the footprint meets an obstacle between states {first} and {last},"
                     f" near ({x:.2f}, {y:.2f})."
                 ]
     return []
@@ -161,13 +164,13 @@ def _bend(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
 
 
 @functools.cache
-def _faces(corners: int) -> Floats:
+def _faces(corners: int) -> Integers:
     """FCL's face list of a prism over a polygon: bottom, top, sides."""
     faces = [corners, *range(corners - 1, -1, -1), corners, *range(corners, 2 * corners)]
     for i in range(corners):
         j = (i + 1) % corners
         faces += [4, i, j, corners + j, corners + i]
-    return np.array(faces)
+    return np.array(faces, np.int32)
 
 
 def prism(polygon: Floats) -> fcl.CollisionObject:
@@ -181,20 +184,13 @@ def prism(polygon: Floats) -> fcl.CollisionObject:
     return fcl.CollisionObject(fcl.Convex(vertices, n + 2, _faces(n)))
 
 
-def _world(problem: Problem) -> tuple[fcl.DynamicAABBTreeCollisionManager, set[int]]:
-    """All obstacles and the bounds' four walls; and which objects are walls."""
-    x_min, y_min, x_max, y_max = problem.bounds
-    middle = np.array([0.5 * (x_min + x_max), 0.5 * (y_min + y_max)])
-    width, height = x_max - x_min, y_max - y_min
-    walls = []
-    for u, w in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-        centre = middle + 0.5 * np.array([u * (width + _WALL), w * (height + _WALL)])
-        size = (_WALL, height + 2.0 * _WALL) if u else (width + 2.0 * _WALL, _WALL)
-        walls.append(fcl.CollisionObject(fcl.Box(*size, _HEIGHT), _pose(centre, np.array([1.0, 0.0]))))
+@functools.lru_cache(maxsize=1)  # many plans are judged in one problem
+def _manager(problem: Problem) -> fcl.DynamicAABBTreeCollisionManager:
+    """FCL's tree of all pieces."""
     manager = fcl.DynamicAABBTreeCollisionManager()
-    manager.registerObjects([prism(piece) for piece in problem.obstacles.pieces()] + walls)
+    manager.registerObjects([prism(piece) for piece in problem.obstacles.pieces()])
     manager.setup()
-    return manager, {id(wall) for wall in walls}
+    return manager
 
 
 def _pose(centre: Floats, along: Floats) -> fcl.Transform:
@@ -228,8 +224,8 @@ def _near(
     """Everything whose axis-aligned box meets that of ``body``."""
     near: list[fcl.CollisionObject] = []
 
-    def collect(one: fcl.CollisionObject, other: fcl.CollisionObject, _: None) -> bool:
-        near.append(other if one is body else one)
+    def collect(mine: fcl.CollisionObject, _body: fcl.CollisionObject, _data: None) -> bool:
+        near.append(mine)  # verified: the manager's own object comes first
         return False
 
     manager.collide(body, None, collect)

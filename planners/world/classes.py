@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -23,7 +24,7 @@ CLASSES: Final = ("curves", "random", "trap")
 DIFFICULTIES: Final = ("easy", "standard", "hard")
 
 
-# The figures beside each setting are measured, see docs/decisions/0002-problem-classes.md: oracle@100; the best
+# The figures beside each setting are measured (docs/decisions/0002-problem-classes.md): oracle@100; the best
 # planner's median and mean milliseconds from scratch; RRT's collision checks, in those of an empty world.
 
 _CURVES_STANDARD: Final = Curves(
@@ -39,18 +40,24 @@ _CURVES_STANDARD: Final = Curves(
     small=Scatter(sites=16, presence=0.85, jitter_m=1.25, radius_min_m=0.8, radius_max_m=1.8, strays=0),
 )
 _CURVES: Final = {
+    # 1.000; 1.02, 1.11 ms; 7.9 x
     "easy": _CURVES_STANDARD._replace(curves=3, outer_m=24.0, gap_m=6.0, presence=0.8),
+    # 0.908; 1.17, 1.41 ms; 28.7 x
     "standard": _CURVES_STANDARD,
+    # 0.762; 1.78, 2.97 ms; 56.6 x
     "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=28.0, gap_m=4.0),
 }
 
 _RANDOM_STANDARD: Final = Random(
-    Scatter(sites=40, presence=0.95, jitter_m=0.6, radius_min_m=2.4, radius_max_m=3.7, strays=0)
+    Scatter(sites=36, presence=0.97, jitter_m=0.5, radius_min_m=2.9, radius_max_m=4.2, strays=0)
 )
 _RANDOM: Final = {
-    "easy": Random(_RANDOM_STANDARD.shapes._replace(sites=34, radius_min_m=1.6, radius_max_m=2.6)),
+    # 1.000; 1.09, 1.88 ms; 4.8 x
+    "easy": Random(_RANDOM_STANDARD.shapes._replace(radius_min_m=1.8, radius_max_m=2.8)),
+    # 0.964; 1.14, 1.99 ms; 22.7 x
     "standard": _RANDOM_STANDARD,
-    "hard": Random(_RANDOM_STANDARD.shapes._replace(sites=44, jitter_m=0.9, strays=1)),
+    # 0.660; 1.56, 4.05 ms; 30.1 x
+    "hard": Random(_RANDOM_STANDARD.shapes._replace(sites=38, jitter_m=0.8, strays=2)),
 }
 
 _TRAP_STANDARD: Final = Trap(
@@ -64,8 +71,11 @@ _TRAP_STANDARD: Final = Trap(
     small=Scatter(sites=26, presence=0.85, jitter_m=2.0, radius_min_m=1.0, radius_max_m=2.5, strays=1),
 )
 _TRAP: Final = {
+    # 0.992; 1.00, 1.08 ms; 8.8 x
     "easy": _TRAP_STANDARD._replace(width_m=18.0, flank_m=12.0, gap_m=9.0, depth_m=8.0),
+    # 0.932; 1.23, 1.39 ms; 24.8 x
     "standard": _TRAP_STANDARD,
+    # 0.730; 1.22, 5.67 ms; 44.4 x
     "hard": _TRAP_STANDARD._replace(width_m=26.0, flank_m=18.0, gap_m=6.0, depth_m=14.0),
 }
 
@@ -98,7 +108,7 @@ def problem_class(name: str, difficulty: str = "standard") -> ProblemClass:
     if difficulty not in DIFFICULTIES:
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
     if name == "curves":
-        return ProblemClass(name, difficulty, lambda rng: draw_curves(_CURVES[difficulty], rng))
+        return ProblemClass(name, difficulty, partial(draw_curves, _CURVES[difficulty]))
     if name == "random":
-        return ProblemClass(name, difficulty, lambda rng: draw_random(_RANDOM[difficulty], rng))
-    return ProblemClass(name, difficulty, lambda rng: draw_trap(_TRAP[difficulty], rng))
+        return ProblemClass(name, difficulty, partial(draw_random, _RANDOM[difficulty]))
+    return ProblemClass(name, difficulty, partial(draw_trap, _TRAP[difficulty]))

@@ -55,8 +55,23 @@ def step(
 
 
 @inlined
+def admissible(
+    speed: float, steering: float, acceleration: float, steering_rate: float, car: Vehicle
+) -> tuple[float, float]:
+    """The controls, reduced where a step with them would lead past the limits of speed or steering.
+
+    So nothing is clamped in the middle of a plan, and ``step_margin`` holds.
+    """
+    h = car.dt
+    return (
+        min(max(acceleration, (car.min_speed - speed) / h), (car.max_speed - speed) / h),
+        min(max(steering_rate, (-car.max_steering - steering) / h), (car.max_steering - steering) / h),
+    )
+
+
+@inlined
 def step_margin(speed: float, steering: float, car: Vehicle) -> float:
-    """Half of the farthest way, in metres, that a body point goes in a step into or out of this state.
+    """Half of the farthest way, in metres, that a body point goes in an admissible step at a state.
 
     A footprint inflated by it at both ends of a step covers the sweep between them: nothing is jumped.
     """

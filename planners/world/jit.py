@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import numba
+
+_SOURCES = Path(__file__).parents[1]
+
+
+def _digest_of_sources() -> str:
+    digest = hashlib.sha256()
+    for source in sorted(_SOURCES.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+# Numba looks only at a kernel's own file for changes: after an edit to a kernel in another file, a compiled
+# caller would go on with the old one. So each state of the sources has a cache of its own.
+_config: Any = numba.config
+_cache = Path(_config.CACHE_DIR or _SOURCES / "__pycache__")
+_config.CACHE_DIR = str(_cache / f"kernels-{_digest_of_sources()}")
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

@@ -2,7 +2,7 @@
 
 ``python -m tests.speed.class_difficulty [CLASS...]`` prints, per class and difficulty: oracle@100 (share of
 new problems in which one of the plans of the first 100 is free), and for each planner from scratch: share
-solved, median and mean milliseconds; and RRT's mean collision checks, also as a multiple of the empty world's.
+solved, median and mean milliseconds; and RRT's mean collision checks, also in those of an empty world.
 """
 
 from __future__ import annotations

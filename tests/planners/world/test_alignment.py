@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planners.world.alignment import Alignment, from_canonical, to_canonical
+from planners.world.authority import faults
+from planners.world.classes import problem_class
+from planners.world.collision import box_is_free, scene_of
+from planners.world.problem import CANONICAL_DISTANCE, Floats, Plan, Problem, obstacles_of
+from tests.planners.world.strategies import angles, seeds
+from tests.planners.world.test_authority import good_plan
+
+places = st.floats(-500.0, 500.0)
+
+
+def moved(points: Floats, turn: float, x: float, y: float) -> Floats:
+    cos, sin = math.cos(turn), math.sin(turn)
+    return points @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
+
+
+def elsewhere(problem: Problem, turn: float, x: float, y: float) -> Problem:
+    """The same problem in another frame, with bounds wide enough to contain all of its own."""
+    corners = np.array([[-7.0, -7.0], [57.0, -7.0], [57.0, 57.0], [-7.0, 57.0]])
+    corners = moved(corners, turn, x, y)
+    return replace(
+        problem,
+        start=(x, y, problem.start[2] + turn),
+        goal=tuple(moved(np.array([problem.goal]), turn, x, y)[0].tolist()),
+        bounds=(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()),
+        obstacles=obstacles_of([[moved(piece, turn, x, y)] for piece in problem.obstacles.pieces()]),
+    )
+
+
+@given(angles, places, places, seeds)
+def test_a_plan_goes_there_and_back(turn: float, x: float, y: float, seed: int) -> None:
+    states = np.random.default_rng(seed).normal(scale=50.0, size=(20, 5))
+    plan = Plan(states, np.zeros((19, 2)))
+    there = from_canonical(plan, Alignment((x, y), turn))
+    back = from_canonical(there, Alignment((0.0, 0.0), -turn))
+    shift = from_canonical(
+        Plan(np.array([[x, y, 0.0, 0.0, 0.0]]), plan.controls), Alignment((0.0, 0.0), -turn)
+    )
+    back.states[:, :2] -= shift.states[0, :2]
+    assert np.abs(back.states - states).max() < 1e-9
+
+
+@given(angles, places, places)
+def test_start_and_goal_come_to_their_canonical_places(turn: float, x: float, y: float) -> None:
+    canonical, _ = to_canonical(elsewhere(problem_class("trap").draw(0, 0), turn, x, y))
+    assert canonical.start[:2] == (0.0, 0.0)
+    assert math.remainder(canonical.start[2] - math.pi / 4, 2 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    assert canonical.goal == pytest.approx((50.0, 50.0), abs=1e-9)
+
+
+@given(angles, places, places)
+def test_a_plan_for_the_canonical_problem_is_one_for_the_problem(turn: float, x: float, y: float) -> None:
+    problem = elsewhere(replace(problem_class("trap").draw(0, 0), obstacles=obstacles_of([])), turn, x, y)
+    canonical, alignment = to_canonical(problem)
+    plan = good_plan()
+    assert faults(canonical, plan) == []
+    assert faults(problem, from_canonical(plan, alignment)) == []
+
+
+@given(angles, places, places, seeds)
+def test_alignment_changes_nothing_that_is_free(turn: float, x: float, y: float, seed: int) -> None:
+    """A box in the own frame is as free as the same box in the canonical one, nearer than 1 mm aside."""
+    problem = elsewhere(problem_class("random").draw(0, 1), turn, x, y)
+    canonical, alignment = to_canonical(problem)
+    own, aligned = scene_of(problem), scene_of(canonical)
+    rng = np.random.default_rng(seed)
+    x_min, y_min, x_max, y_max = problem.bounds
+    states = np.zeros((200, 5))
+    states[:, :3] = rng.uniform((x_min, y_min, -math.pi), (x_max, y_max, math.pi), (200, 3))
+    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
+    for u, w, heading in states[:, :3]:
+        du, dw = u - alignment.origin[0], w - alignment.origin[1]
+        there = (cos * du - sin * dw, sin * du + cos * dw, heading + alignment.turn)
+        for one, other, pose, image in (
+            (own, aligned, (u, w, heading), there),
+            (aligned, own, there, (u, w, heading)),
+        ):
+            roomy = box_is_free(*pose[:2], math.cos(pose[2]), math.sin(pose[2]), 1.001, 0.451, one)
+            if roomy:
+                assert box_is_free(*image[:2], math.cos(image[2]), math.sin(image[2]), 1.0, 0.45, other)
+
+
+def test_a_canonical_problem_stays_as_it_is() -> None:
+    problem = problem_class("curves").draw(0, 0)
+    assert to_canonical(problem) == (problem, Alignment((0.0, 0.0), 0.0))
+
+
+def test_a_wrong_distance_is_refused_in_one_line() -> None:
+    problem = replace(problem_class("curves").draw(0, 0), goal=(60.0, 60.0))
+    with pytest.raises(ValueError, match=r"84\.85 m apart, wanted 70\.71 m") as refusal:
+        to_canonical(problem)
+    assert "\n" not in str(refusal.value)
+
+
+def test_the_goal_radius_is_the_distance_that_is_forgiven() -> None:
+    reach = (CANONICAL_DISTANCE + 1.9) / math.sqrt(2.0)
+    canonical, _ = to_canonical(replace(problem_class("curves").draw(0, 0), goal=(reach, reach)))
+    assert canonical.goal == pytest.approx((reach, reach))
