@@ -16,6 +16,7 @@ from planners.world.problem import Integers, Plan
 from planners.world.vehicle import CAR, Vehicle
 
 BATCH = 256  # grids embedded at once
+NO_PLAN_ODDS = 20.0  # recalling in vain costs microseconds, not recalling a free plan costs a search
 
 
 def centroids_of(encoder: Encoder, grids_packed: Grid, plan_index: Integers, plans: int) -> Floats32:
@@ -70,8 +71,9 @@ def build_memory(
     centroids = centroids_of(encoder, grids_packed, plan_index, len(plans))
     if trained.vectors is None or trained.biases is None:
         vectors, biases = nearest_readout(centroids)
-    else:
-        vectors, biases = trained.vectors, trained.biases
+    else:  # logits: recall unless the odds that no plan is free are that many times those of the best plan
+        vectors, biases = trained.vectors, trained.biases.copy()
+        biases[0] -= np.float32(np.log(NO_PLAN_ODDS))
     return Memory(
         class_name=class_name,
         vehicle=vehicle,

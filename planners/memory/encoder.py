@@ -1,8 +1,9 @@
 """The encoder: occupancy grid to embedding, and its runtime, which needs no torch.
 
-Stages of convolution, max-pool and PReLU, then fully connected layers, no normalisation (algorithms.md). Two
-changes to the published network, for latency: the first convolution is 4x4 with stride 2, and pooling comes
-before the PReLU, which gives the same values for slopes that are not negative at a quarter of the work.
+Convolutions with PReLU, then fully connected layers, no normalisation, as published (algorithms.md). In place
+of max-pooling the first convolution takes patches of 4x4 cells with stride 4: where exactly an obstacle lies
+decides whether a plan is free, and pooling loses it. On fresh problems of class random the first plan was
+free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of training).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from planners.world.occupancy import GRID, Grid
 Floats32 = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
 Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ..., "linear.0.weight", ...
 
-FIRST_KERNEL = 4  # of the first convolution, with stride 2; the others are 3x3
+PATCH = 4  # cells a side that the first convolution takes, and its stride; the others are 3x3
 PRELU_SLOPE = 0.25  # what a PReLU begins with (He et al. 2015)
 OPSET = 17
 IR_VERSION = 9  # the oldest that has the opset: readable by old runtimes
@@ -29,14 +30,14 @@ IR_VERSION = 9  # the oldest that has the opset: readable by old runtimes
 class Architecture:
     """Sizes of the encoder."""
 
-    channels: tuple[int, ...] = (8, 16, 32)  # of the convolutions; all but the last are followed by pooling
-    hidden: tuple[int, ...] = (128, 64)  # widths of the fully connected layers before the embedding
+    channels: tuple[int, ...] = (16,)  # of the convolutions
+    hidden: tuple[int, ...] = (128,)  # widths of the fully connected layers before the embedding
     dimensions: int = 30  # of the embedding
 
     def __post_init__(self) -> None:
         smallest = min((*self.channels, *self.hidden, self.dimensions))
-        if not 1 <= len(self.channels) <= 5 or smallest < 1:
-            raise ValueError(f"{self} is no network: give 1 to 5 convolutions and sizes of at least 1")
+        if not self.channels or smallest < 1:
+            raise ValueError(f"{self} is no network: give a convolution, and sizes of at least 1")
 
 
 def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
@@ -51,13 +52,12 @@ def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Wei
         if slope_shape is not None:
             weights[f"{name}.slope"] = np.full(slope_shape, PRELU_SLOPE, np.float32)
 
-    inputs, side = 1, GRID // 2
+    inputs = 1
     for i, outputs in enumerate(architecture.channels):
-        kernel = FIRST_KERNEL if i == 0 else 3
+        kernel = PATCH if i == 0 else 3
         add(f"convolution.{i}", (outputs, inputs, kernel, kernel), (outputs, 1, 1))
         inputs = outputs
-        side //= 2 if i + 1 < len(architecture.channels) else 1
-    width = inputs * side * side
+    width = inputs * (GRID // PATCH) ** 2
     for i, outputs in enumerate((*architecture.hidden, architecture.dimensions)):
         last = i == len(architecture.hidden)
         add(f"linear.{i}", (outputs, width), None if last else (outputs,))
@@ -91,10 +91,8 @@ def to_onnx(weights: Weights) -> bytes:
 
     for i in range(convolutions):
         name = f"convolution.{i}"
-        stride = 2 if i == 0 else 1
-        chain("Conv", f"{name}.weight", f"{name}.bias", strides=[stride, stride], pads=[1, 1, 1, 1])
-        if i + 1 < convolutions:
-            chain("MaxPool", kernel_shape=[2, 2], strides=[2, 2])
+        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        chain("Conv", f"{name}.weight", f"{name}.bias", strides=[stride] * 2, pads=[padding] * 4)
         chain("PRelu", f"{name}.slope")
     chain("Flatten")
     for i in range(linears):

@@ -34,10 +34,13 @@ NO_PLAN_DRAWS = 1000  # a class whose obstacles miss a plan this often can never
 class Rearrange:
     """The paper's method: near obstacles move a little, all others are drawn afresh.
 
-    An obstacle is near when it meets the plan's swept footprints widened by ``near_m`` on every side.
+    An obstacle is near when it meets the plan's swept footprints widened by ``near_m`` on every side. The
+    wider that is, the more an encoder learns to know the origin by its obstacles, which helps with no new
+    problem: on class random, label training had a free plan first in 46 % of what is possible with 3 m, in
+    50 % with 1 m (one seed).
     """
 
-    near_m: float = 3.0  # metres
+    near_m: float = 0.3  # metres; measured on fresh problems of class random
     position_std_m: float = 0.3  # metres, in x and in y
     heading_std_rad: float = 0.05  # radians, about the obstacle's centre
     attempts: int = 20  # moves tried until one is clear of the plan; then the obstacle stays where it was
@@ -158,6 +161,7 @@ def _rearranged(
                 or obstacle_meets(result, count, goal_box, 0.0, stride_m)
             ):
                 break
+        else:
             take_obstacle(origin, o, result, count)
         count += 1
     for o in range(fresh.obstacle_starts.shape[0] - 1):

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from planners.memory.encoder import layer_counts
+from planners.memory.encoder import PATCH, layer_counts
 from planners.world.occupancy import GRID
 
 Parameters = dict[str, Tensor]
@@ -25,9 +25,8 @@ def embed(parameters: Parameters, bits: Tensor) -> Tensor:
     for i in range(convolutions):
         name = f"convolution.{i}"
         weight, bias = parameters[f"{name}.weight"], parameters[f"{name}.bias"]
-        value = functional.conv2d(value, weight, bias, stride=2 if i == 0 else 1, padding=1)
-        if i + 1 < convolutions:
-            value = functional.max_pool2d(value, 2)
+        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        value = functional.conv2d(value, weight, bias, stride=stride, padding=padding)
         value = functional.prelu(value, parameters[f"{name}.slope"].flatten())
     value = value.flatten(1)
     for i in range(linears):

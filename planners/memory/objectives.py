@@ -9,14 +9,13 @@ import torch
 from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, linear, relu
 
-from planners.memory.network import Parameters
 from planners.world.problem import Integers
 
 
 class Objective(Protocol):
-    """A loss over a batch, and the batches it wants."""
+    """A loss over a batch, the batches it wants, and how it ranks."""
 
-    readout: Parameters  # parameters of its own, trained with the encoder's; may be none
+    parameters: list[Tensor]  # of its own, trained with the encoder's; may be none
 
     def epoch(self, plan_index: Integers, rng: np.random.Generator) -> Integers:
         """Problem indices in the order in which an epoch's batches take them."""
@@ -24,16 +23,18 @@ class Objective(Protocol):
     def loss(self, embeddings: Tensor, rows: Tensor, targets: Tensor) -> Tensor:
         """Loss of embeddings ``[B, D]`` with origin rows ``[B]`` and free rows bool ``[B, N + 1]``."""
 
+    def readout(self, embeddings: Tensor, rows: Tensor, count: int) -> tuple[Tensor, Tensor]:
+        """Vectors ``[N + 1, D]`` and biases that score rows; may look at a sample ``[n, D]`` of training."""
+
 
 class Labels:
     """Multi-label cross entropy: row i's logit is ``e . w_i + b_i``; row 0 says that no plan is free."""
 
     def __init__(self, rows: int, dimensions: int, rng: np.random.Generator, device: torch.device) -> None:
         vectors = rng.normal(0.0, dimensions**-0.5, (rows, dimensions)).astype(np.float32)
-        self.readout = {
-            "vectors": torch.from_numpy(vectors).to(device),
-            "biases": torch.zeros(rows, device=device),
-        }
+        self.vectors = torch.from_numpy(vectors).to(device)
+        self.biases = torch.zeros(rows, device=device)
+        self.parameters = [self.vectors, self.biases]
 
     def epoch(self, plan_index: Integers, rng: np.random.Generator) -> Integers:
         """Every problem once."""
@@ -41,9 +42,13 @@ class Labels:
 
     def loss(self, embeddings: Tensor, rows: Tensor, targets: Tensor) -> Tensor:
         """Mean over problems of the sum over rows: a row is pulled alike however many plans there are."""
-        logits = linear(embeddings, self.readout["vectors"], self.readout["biases"])
+        logits = linear(embeddings, self.vectors, self.biases)
         losses = binary_cross_entropy_with_logits(logits, targets.to(torch.float32), reduction="none")
         return losses.sum(1).mean()
+
+    def readout(self, embeddings: Tensor, rows: Tensor, count: int) -> tuple[Tensor, Tensor]:
+        """What was learned."""
+        return self.vectors.detach(), self.biases.detach()
 
 
 class Triplet:
@@ -55,7 +60,7 @@ class Triplet:
     """
 
     def __init__(self, margin: float) -> None:
-        self.readout: Parameters = {}
+        self.parameters: list[Tensor] = []
         self.margin = margin
 
     def epoch(self, plan_index: Integers, rng: np.random.Generator) -> Integers:
@@ -74,6 +79,13 @@ class Triplet:
         push = torch.cdist(anchors, embeddings, compute_mode="donot_use_mm_for_euclid_dist")
         violations = relu(pull[:, None] - push + self.margin) * negatives(rows[0::2], targets)
         return violations.sum() / (violations.detach() > 0.0).sum().clamp(min=1)
+
+    def readout(self, embeddings: Tensor, rows: Tensor, count: int) -> tuple[Tensor, Tensor]:
+        """The sample's centroids, ranked by distance (``centroids.nearest_readout``)."""
+        sizes = torch.bincount(rows, minlength=count)
+        sums = embeddings.new_zeros((count, embeddings.shape[1])).index_add_(0, rows, embeddings)
+        centroids = sums / sizes.clamp(min=1)[:, None]
+        return centroids, torch.where(sizes > 0, -0.5 * centroids.square().sum(1), -torch.inf)
 
 
 def negatives(rows: Tensor, targets: Tensor) -> Tensor:

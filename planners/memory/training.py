@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -26,9 +27,10 @@ class TrainingSettings:
     """How to train."""
 
     objective: str = "labels"
-    epochs: int = 15
+    epochs: int = 12
     batch: int = 128  # problems
-    learning_rate: float = 3e-3  # the highest of a one-cycle schedule, for Adam
+    learning_rate: float = 3e-3  # the highest of a one-cycle schedule
+    weight_decay: float = 0.1  # decoupled, AdamW
     margin: float = 1.0  # of the triplet objective
     architecture: Architecture = field(default_factory=Architecture)
     validation_share: float = 0.1  # of the problems, held out
@@ -91,43 +93,37 @@ def train(
     order = generator(settings.seed, "split").permutation(len(labels)).astype(np.int32)
     held_out = max(1, round(settings.validation_share * len(labels)))
     validation, training = np.sort(order[:held_out]), np.sort(order[held_out:])
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # what makes cuBLAS deterministic
+    free_rows = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    threads, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
-    torch.set_num_threads(settings.threads)
-    torch.use_deterministic_algorithms(True)
-    try:
+    objective: Objective = Triplet(settings.margin)
+    if settings.objective == "labels":
+        rng = generator(settings.seed, "readout")
+        objective = Labels(free_rows.shape[1], settings.architecture.dimensions, rng, device)
+    orders = [
+        training[objective.epoch(plan_index[training], generator(settings.seed, "epoch", i))]
+        for i in range(settings.epochs)
+    ]
+    sample = orders[0][_first_of_each(plan_index[orders[0]], CENTROID_SAMPLE)]
+    history: list[Epoch] = []
+    with _deterministic(settings.threads):
         bits = torch.from_numpy(np.ascontiguousarray(grids_packed)).to(device)
         rows = torch.from_numpy(plan_index.astype(np.int64) + 1).to(device)
-        free = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
-        targets = torch.from_numpy(free).to(device)
+        targets = torch.from_numpy(free_rows).to(device)
         weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
         parameters = {name: torch.from_numpy(value).to(device) for name, value in weights.items()}
-        objective: Objective
-        if settings.objective == "labels":
-            rng = generator(settings.seed, "readout")
-            objective = Labels(free.shape[1], settings.architecture.dimensions, rng, device)
-        else:
-            objective = Triplet(settings.margin)
-        trained = [*parameters.values(), *objective.readout.values()]
+        trained = [*parameters.values(), *objective.parameters]
         for parameter in trained:
             parameter.requires_grad_(True)
-        optimiser = torch.optim.Adam(trained, lr=settings.learning_rate)
-        orders = [
-            training[objective.epoch(plan_index[training], generator(settings.seed, "epoch", epoch))]
-            for epoch in range(settings.epochs)
-        ]
-        steps = sum(-(-len(epoch_order) // settings.batch) for epoch_order in orders)
+        optimiser = torch.optim.AdamW(
+            trained, lr=settings.learning_rate, weight_decay=settings.weight_decay
+        )
+        steps = sum(-(-len(each) // settings.batch) for each in orders)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimiser, settings.learning_rate, total_steps=steps, pct_start=WARM_UP
         )
-        sample = torch.from_numpy(_first_of_each(plan_index[orders[0]], CENTROID_SAMPLE))
-        sample = torch.from_numpy(orders[0]).to(device)[sample]
-        held = torch.from_numpy(validation).to(device)
-        history: list[Epoch] = []
-        for number, epoch_order in enumerate(orders, 1):
+        for i in range(settings.epochs):
             losses = []
-            for batch in torch.split(torch.from_numpy(epoch_order).to(device), settings.batch):
+            for batch in torch.split(torch.from_numpy(orders[i]).to(device), settings.batch):
                 loss = objective.loss(embed(parameters, bits[batch]), rows[batch], targets[batch])
                 optimiser.zero_grad()
                 torch.autograd.backward(loss)
@@ -135,31 +131,44 @@ def train(
                 schedule.step()
                 losses.append(loss.detach())
             with torch.no_grad():
-                if objective.readout:
-                    vectors, biases = objective.readout["vectors"], objective.readout["biases"]
-                else:
-                    vectors = torch.zeros((free.shape[1], settings.architecture.dimensions), device=device)
-                    counts = torch.bincount(rows[sample], minlength=len(vectors)).clamp(min=1)
-                    vectors.index_add_(0, rows[sample], embed_all(parameters, bits[sample]))
-                    vectors /= counts[:, None]
-                    biases = -0.5 * vectors.square().sum(1)
-                scores = embed_all(parameters, bits[held]) @ vectors.T + biases
-            hit_1, hit_5 = (hit_rate(scores[:, 1:].cpu().numpy(), labels[validation], k) for k in (1, 5))
-            mean_loss = float(torch.stack(losses).mean())
-            oracle = float(labels[validation].any(1).mean())
-            history.append(Epoch(number, mean_loss, hit_1, hit_5, oracle, time.perf_counter() - began))
+                embeddings = embed_all(parameters, bits[sample])
+                vectors, biases = objective.readout(embeddings, rows[sample], free_rows.shape[1])
+                scores = (embed_all(parameters, bits[validation]) @ vectors.T + biases)[:, 1:].cpu().numpy()
+            epoch = Epoch(
+                epoch=i + 1,
+                loss=float(torch.stack(losses).mean()),
+                hit_1=hit_rate(scores, labels[validation], 1),
+                hit_5=hit_rate(scores, labels[validation], 5),
+                oracle=float(labels[validation].any(1).mean()),
+                seconds=time.perf_counter() - began,
+            )
+            history.append(epoch)
             if on_epoch is not None:
-                on_epoch(history[-1])
-        return TrainedEncoder(
-            settings,
-            {name: value.detach().cpu().numpy() for name, value in parameters.items()},
-            vectors.detach().cpu().numpy() if objective.readout else None,
-            biases.detach().cpu().numpy() if objective.readout else None,
-            tuple(history),
-            validation,
-        )
+                on_epoch(epoch)
+    learned = bool(objective.parameters)
+    return TrainedEncoder(
+        settings,
+        {name: value.detach().cpu().numpy() for name, value in parameters.items()},
+        vectors.cpu().numpy() if learned else None,
+        biases.cpu().numpy() if learned else None,
+        tuple(history),
+        validation,
+    )
+
+
+@contextmanager
+def _deterministic(threads: int) -> Iterator[None]:
+    """Torch on that many threads, with deterministic kernels only; as it was before, afterwards."""
+    import torch
+
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS is not deterministic
+    before, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield
     finally:
-        torch.set_num_threads(threads)
+        torch.set_num_threads(before)
         torch.use_deterministic_algorithms(deterministic)
 
 

@@ -21,6 +21,7 @@ from planners.search.gust import (
     join_groups,
     keep,
 )
+from planners.search.neighbours import Indices
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.roadmap import (
     CHECKS as ROADMAP_CHECKS,
@@ -37,7 +38,7 @@ from planners.search.sampling import in_disc
 from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import jit
-from planners.world.problem import Floats, Integers, Problem
+from planners.world.problem import Floats, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 LONGEST_LEAD = 256  # waypoints
@@ -69,9 +70,9 @@ class Lead(NamedTuple):
 
     points: Floats  # [LONGEST_LEAD, 2] metres
     weights: Floats  # [LONGEST_LEAD] logarithms
-    counts: Integers  # [LONGEST_LEAD] vertices ever put into each group
-    members: Integers  # [LONGEST_LEAD, SAMPLE] a uniform sample of them
-    marks: Integers  # [3] LENGTH of the path, iterations SINCE_FOLLOW and SINCE_GROUP were new
+    counts: Indices  # [LONGEST_LEAD] vertices ever put into each group
+    members: Indices  # [LONGEST_LEAD, SAMPLE] a uniform sample of them
+    marks: Indices  # [3] LENGTH of the path, iterations SINCE_FOLLOW and SINCE_GROUP were new
 
 
 @functools.lru_cache(maxsize=1)
@@ -80,9 +81,9 @@ def allocate_lead() -> Lead:
     return Lead(
         np.empty((LONGEST_LEAD, 2)),
         np.empty(LONGEST_LEAD),
-        np.empty(LONGEST_LEAD, np.int32),
-        np.empty((LONGEST_LEAD, SAMPLE), np.int32),
-        np.zeros(3, np.int32),
+        np.empty(LONGEST_LEAD, np.int64),
+        np.empty((LONGEST_LEAD, SAMPLE), np.int64),
+        np.zeros(3, np.int64),
     )
 
 
@@ -108,7 +109,7 @@ def _new_lead(
 ) -> None:
     """Follow the way of ``node``'s group from now on; its vertices are where to begin."""
     lead.marks[LENGTH] = resample_way(roadmap, node, settings.spacing_m, lead.points)
-    lead.counts[:] = 0
+    lead.counts.fill(0)
     for k in range(min(groups.counts[node], SAMPLE)):
         vertex = groups.members[node, k]
         tree.waypoints[vertex] = 0
@@ -125,6 +126,7 @@ def _grow(
     groups: Groups,
     lead: Lead,
     settings: FollowSettings,
+    exploring: GustSettings,
     car: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
@@ -136,7 +138,7 @@ def _grow(
         known = groups.size[0]
         if marks[SINCE_GROUP] >= settings.group_patience:
             last = min(counts[EXPANSIONS] + settings.explorations, until)
-            grow_gust(tree, goal, last, True, roadmap, groups, gust, car, scene, rng)
+            grow_gust(tree, goal, last, roadmap, groups, exploring, car, scene, rng)
             if counts[GOAL_VERTEX] >= 0:
                 return
             marks[SINCE_GROUP] = 0
@@ -198,6 +200,7 @@ def follow(
     roadmap = allocate_roadmap(on_roadmap.most_nodes, on_roadmap.neighbours)
     groups = allocate_groups(on_roadmap.most_nodes)
     lead = allocate_lead()
+    exploring = settings.gust._replace(guide_probability=0.0)
 
     def prepare(tree: Tree, goal: Floats) -> None:
         root = tree.states[0]
@@ -209,6 +212,6 @@ def follow(
         _new_lead(tree, node_of(roadmap, root[0], root[1]), roadmap, groups, lead, settings, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        _grow(tree, goal, until, roadmap, groups, lead, settings, car, ready, rng)
+        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, car, ready, rng)
 
     return attempt(problem, ready, limits or Limits(), car, prepare, grow)

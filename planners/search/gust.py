@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.search.attempt import attempt
+from planners.search.neighbours import Indices
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.roadmap import (
     CHECKS as ROADMAP_CHECKS,
@@ -27,7 +28,6 @@ from planners.search.tree import (
     EXPANSIONS,
     EXTENSION,
     GOAL_VERTEX,
-    NO_PATH,
     SIZE,
     Extension,
     Tree,
@@ -35,7 +35,7 @@ from planners.search.tree import (
 )
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import inlined, jit
-from planners.world.problem import Floats, Integers, Problem
+from planners.world.problem import Floats, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
@@ -58,10 +58,10 @@ class Groups(NamedTuple):
     """Groups of tree vertices by nearest roadmap node; weights are logarithms, so none underflows."""
 
     weights: Floats  # [C] log weight by node
-    counts: Integers  # [C] vertices ever put into each group
-    members: Integers  # [C, SAMPLE] a uniform sample of them
-    active: Integers  # [C] nodes that have a group, in the order in which they got it
-    size: Integers  # [1] how many those are
+    counts: Indices  # [C] vertices ever put into each group
+    members: Indices  # [C, SAMPLE] a uniform sample of them
+    active: Indices  # [C] nodes that have a group, in the order in which they got it
+    size: Indices  # [1] how many those are
     way: Floats  # [8, 2] points ahead of a group, metres
 
 
@@ -70,10 +70,10 @@ def allocate_groups(capacity: int) -> Groups:
     """Buffers for groups of ``capacity`` roadmap nodes."""
     return Groups(
         np.empty(capacity),
-        np.empty(capacity, np.int32),
-        np.empty((capacity, SAMPLE), np.int32),
-        np.empty(capacity, np.int32),
-        np.zeros(1, np.int32),
+        np.empty(capacity, np.int64),
+        np.empty((capacity, SAMPLE), np.int64),
+        np.empty(capacity, np.int64),
+        np.zeros(1, np.int64),
         np.empty((8, 2)),
     )
 
@@ -81,12 +81,12 @@ def allocate_groups(capacity: int) -> Groups:
 @jit
 def clear_groups(groups: Groups) -> None:
     """Forget all groups."""
-    groups.counts[:] = 0
+    groups.counts.fill(0)
     groups.size[0] = 0
 
 
 @inlined
-def keep(members: Integers, count: int, vertex: int, rng: np.random.Generator) -> None:
+def keep(members: Indices, count: int, vertex: int, rng: np.random.Generator) -> None:
     """Keep a uniform sample of all vertices ever put, ``count`` of them before this one (algorithm R)."""
     place = count
     if count >= members.shape[0]:
@@ -129,7 +129,7 @@ def heaviest(groups: Groups) -> int:
 @jit
 def choose_member(
     tree: Tree,
-    members: Integers,
+    members: Indices,
     count: int,
     x: float,
     y: float,
@@ -161,7 +161,6 @@ def grow_gust(
     tree: Tree,
     goal: Floats,
     until: int,
-    uniform: bool,
     roadmap: Roadmap,
     groups: Groups,
     settings: GustSettings,
@@ -169,12 +168,13 @@ def grow_gust(
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
-    """Extend the heaviest group until solved or ``until`` expansions; ``uniform`` ignores its way ahead."""
+    """Extend the heaviest group until solved or ``until`` expansions."""
+    no_lead = np.empty((0, 2))
     counts = tree.counts
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         node = heaviest(groups)
         groups.weights[node] += math.log(settings.selection_penalty)
-        if not uniform and rng.random() < settings.guide_probability:
+        if rng.random() < settings.guide_probability:
             ahead = 1 + int(rng.random() * settings.guide_steps)
             filled = resample_way(roadmap, node, settings.guide_spacing_m, groups.way[: ahead + 2])
             point = groups.way[min(ahead, filled - 1)]
@@ -183,7 +183,7 @@ def grow_gust(
             x, y = in_bounds(scene.bounds, rng)
         vertex = choose_member(tree, groups.members[node], groups.counts[node], x, y, car, rng)
         first = counts[SIZE]
-        added = extend(tree, vertex, x, y, goal, NO_PATH, 0.0, 0.0, settings.extension, car, scene, rng)
+        added = extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, car, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return
         join_groups(tree, first, added, roadmap, groups, settings.distance_exponent, rng)
@@ -211,6 +211,6 @@ def gust(
         join_groups(tree, 0, 1, roadmap, groups, settings.distance_exponent, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        grow_gust(tree, goal, until, False, roadmap, groups, settings, car, ready, rng)
+        grow_gust(tree, goal, until, roadmap, groups, settings, car, ready, rng)
 
     return attempt(problem, ready, limits or Limits(), car, prepare, grow)

@@ -12,7 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.jit import inlined, jit
-from planners.world.problem import Floats, Integers
+from planners.world.problem import Floats
+
+# one width of integer in all search buffers: another would compile each kernel twice
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 BUCKETS_A_SIDE = 64
 NEWEST = 16  # points looked at in a bucket
@@ -21,8 +24,8 @@ NEWEST = 16  # points looked at in a bucket
 class Buckets(NamedTuple):
     """The newest points of each bucket."""
 
-    items: Integers  # [BUCKETS_A_SIDE^2, NEWEST] point numbers, used as a ring
-    counts: Integers  # [BUCKETS_A_SIDE^2] points ever put into each bucket
+    items: Indices  # [BUCKETS_A_SIDE^2, NEWEST] point numbers, used as a ring
+    counts: Indices  # [BUCKETS_A_SIDE^2] points ever put into each bucket
     frame: Floats  # [3] x_min, y_min, bucket size, metres
     points: Floats  # [C, >= 2] positions in metres, by point number
 
@@ -30,13 +33,13 @@ class Buckets(NamedTuple):
 def allocate_buckets(points: Floats) -> Buckets:
     """Empty buckets over a buffer of ``points``."""
     cells = BUCKETS_A_SIDE**2
-    return Buckets(np.empty((cells, NEWEST), np.int32), np.zeros(cells, np.int32), np.zeros(3), points)
+    return Buckets(np.empty((cells, NEWEST), np.int64), np.zeros(cells, np.int64), np.zeros(3), points)
 
 
 @jit
 def clear_buckets(buckets: Buckets, bounds: Floats, size_m: float) -> None:
     """Empty the buckets and lay them over ``bounds``, ``size_m`` wide or as wide as the bounds need."""
-    buckets.counts[:] = 0
+    buckets.counts.fill(0)
     buckets.frame[0] = bounds[0]
     buckets.frame[1] = bounds[1]
     widest = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
@@ -103,7 +106,7 @@ def nearest(buckets: Buckets, x: float, y: float) -> int:
 
 
 @jit
-def nearest_k(buckets: Buckets, x: float, y: float, items: Integers, distances: Floats) -> int:
+def nearest_k(buckets: Buckets, x: float, y: float, items: Indices, distances: Floats) -> int:
     """Fill ``items`` and ``distances`` (both ``[k]``, nearest first); returns how many there are."""
     size = buckets.frame[2]
     column = bucket_index(x - buckets.frame[0], size)

@@ -14,6 +14,7 @@ import numpy as np
 
 from planners.search.neighbours import (
     Buckets,
+    Indices,
     allocate_buckets,
     clear_buckets,
     nearest,
@@ -24,13 +25,13 @@ from planners.search.outcome import Guide
 from planners.search.sampling import guided
 from planners.world.collision import REACH_M, Scene, box_is_free
 from planners.world.jit import inlined, jit
-from planners.world.problem import Floats, Integers
+from planners.world.problem import Floats
 from planners.world.vehicle import Vehicle
 
 BUCKET_M = 4.0  # nodes lie some 6 m apart
 GOAL, START = 0, 1  # the first two nodes
 # places in Roadmap.counts
-NODES, CHECKS, EDGES = range(3)
+NODES, CHECKS, EDGES, QUEUED = range(4)
 UNKNOWN, FREE, BLOCKED = range(3)
 
 
@@ -53,18 +54,18 @@ class Roadmap(NamedTuple):
     nodes: Floats  # [C, 2] metres
     clearances: Floats  # [C] metres to the nearest obstacle
     distances: Floats  # [C] d(q): cost of the way to the goal, infinite where there is none
-    following: Integers  # [C] next node of that way
-    heads: Integers  # [C] first edge of a node, -1: none
-    edge_next: Integers  # [E] edges come in pairs 2i, 2i + 1, one a direction
-    edge_to: Integers  # [E]
-    edge_state: Integers  # [E / 2] UNKNOWN, FREE, BLOCKED
+    following: Indices  # [C] next node of that way
+    heads: Indices  # [C] first edge of a node, -1: none
+    edge_next: Indices  # [E] edges come in pairs 2i, 2i + 1, one a direction
+    edge_to: Indices  # [E]
+    edge_state: Indices  # [E / 2] UNKNOWN, FREE, BLOCKED
     edge_length: Floats  # [E / 2] metres
-    heap: Integers  # [C] binary heap of Dijkstra's search
-    places: Integers  # [C] a node's place in the heap, -1: not in it
-    counts: Integers  # [3] NODES, CHECKS, EDGES
+    heap: Indices  # [C] binary heap of Dijkstra's search
+    places: Indices  # [C] a node's place in the heap, -1: not in it
+    counts: Indices  # [4] NODES, CHECKS, EDGES, QUEUED
     sampled: Buckets  # all nodes
     connected: Buckets  # those that reach the goal
-    near_items: Integers  # [k]
+    near_items: Indices  # [k]
     near_distances: Floats  # [k]
 
 
@@ -77,18 +78,18 @@ def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
         nodes,
         np.empty(capacity),
         np.empty(capacity),
-        np.empty(capacity, np.int32),
-        np.empty(capacity, np.int32),
-        np.empty(edges, np.int32),
-        np.empty(edges, np.int32),
-        np.empty(edges // 2, np.int32),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty(edges, np.int64),
+        np.empty(edges, np.int64),
+        np.empty(edges // 2, np.int64),
         np.empty(edges // 2),
-        np.empty(capacity, np.int32),
-        np.empty(capacity, np.int32),
-        np.zeros(3, np.int32),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.zeros(4, np.int64),
         allocate_buckets(nodes),
         allocate_buckets(nodes),
-        np.empty(neighbours, np.int32),
+        np.empty(neighbours, np.int64),
         np.empty(neighbours),
     )
 
@@ -190,18 +191,20 @@ def sift_up(roadmap: Roadmap, place: int) -> None:
 
 
 @inlined
-def pop(roadmap: Roadmap, size: int) -> int:
-    """Take the nearest node off a heap of ``size`` entries."""
+def pop(roadmap: Roadmap) -> int:
+    """Take the nearest node off the heap."""
     heap = roadmap.heap
+    roadmap.counts[QUEUED] -= 1
+    size = roadmap.counts[QUEUED]
     top = heap[0]
     roadmap.places[top] = -1
-    node = heap[size - 1]
+    node = heap[size]
     place = 0
     while True:
         child = 2 * place + 1
-        if child >= size - 1:
+        if child >= size:
             break
-        if child + 1 < size - 1 and (roadmap.distances[heap[child + 1]] < roadmap.distances[heap[child]]):
+        if child + 1 < size and (roadmap.distances[heap[child + 1]] < roadmap.distances[heap[child]]):
             child += 1
         if roadmap.distances[heap[child]] >= roadmap.distances[node]:
             break
@@ -226,10 +229,9 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, 
     roadmap.distances[GOAL] = 0.0
     roadmap.heap[0] = GOAL
     roadmap.places[GOAL] = 0
-    size = 1
-    while size > 0:
-        node = pop(roadmap, size)
-        size -= 1
+    roadmap.counts[QUEUED] = 1
+    while roadmap.counts[QUEUED] > 0:
+        node = pop(roadmap)
         put(roadmap.connected, node)
         edge = roadmap.heads[node]
         while edge >= 0:
@@ -255,9 +257,9 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, 
                     roadmap.distances[other] = cost
                     roadmap.following[other] = node
                     if roadmap.places[other] < 0:
-                        roadmap.heap[size] = other
-                        roadmap.places[other] = size
-                        size += 1
+                        roadmap.heap[roadmap.counts[QUEUED]] = other
+                        roadmap.places[other] = roadmap.counts[QUEUED]
+                        roadmap.counts[QUEUED] += 1
                     sift_up(roadmap, roadmap.places[other])
             edge = roadmap.edge_next[edge]
 
@@ -303,7 +305,7 @@ def build_roadmap(
 ) -> bool:
     """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
     anywhere = Guide(guide.points[:0], guide.starts[:1], guide.probabilities[:0], 0.0)
-    roadmap.counts[:] = 0
+    roadmap.counts.fill(0)
     clear_buckets(roadmap.sampled, scene.bounds, BUCKET_M)
     add_node(roadmap, goal[0], goal[1], settings, scene)
     add_node(roadmap, start[0], start[1], settings, scene)

@@ -10,7 +10,7 @@ from planners.search.attempt import attempt
 from planners.search.neighbours import nearest
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.sampling import guided
-from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, NO_PATH, SIZE, Extension, Tree, extend
+from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, SIZE, Extension, Tree, extend
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import jit
 from planners.world.problem import Floats, Problem
@@ -37,10 +37,11 @@ def _grow(
     rng: np.random.Generator,
 ) -> None:
     counts = tree.counts
+    no_lead = np.empty((0, 2))
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         x, y = guided(guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng)
         vertex = nearest(tree.buckets, x, y)
-        extend(tree, vertex, x, y, goal, NO_PATH, 0.0, 0.0, settings.extension, car, scene, rng)
+        extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, car, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return
 

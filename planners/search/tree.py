@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.search.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
+from planners.search.neighbours import Buckets, Indices, allocate_buckets, clear_buckets, put, remove
 from planners.world.collision import Scene, state_is_free
 from planners.world.dynamics import admissible, step
 from planners.world.jit import inlined, jit
-from planners.world.problem import Floats, Integers, Plan
+from planners.world.problem import Floats, Plan
 from planners.world.vehicle import Vehicle
 
 # places in Tree.counts
@@ -24,11 +24,11 @@ class Tree(NamedTuple):
 
     states: Floats  # [C, 5]
     controls: Floats  # [C, 2] that led here from the parent
-    parents: Integers  # [C]
-    depths: Integers  # [C] steps from the root
-    waypoints: Integers  # [C] next waypoint of the lead path (Follow)
-    spent: Integers  # [C] 1 where an extension collided in its first step: no control leads on from there
-    counts: Integers  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
+    parents: Indices  # [C]
+    depths: Indices  # [C] steps from the root
+    waypoints: Indices  # [C] next waypoint of the lead path (Follow)
+    spent: Indices  # [C] 1 where an extension collided in its first step: no control leads on from there
+    counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
     buckets: Buckets
 
 
@@ -47,7 +47,6 @@ class Extension(NamedTuple):
 
 
 EXTENSION = Extension()
-NO_PATH = np.empty((0, 2))
 BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
@@ -58,11 +57,11 @@ def allocate_tree(capacity: int) -> Tree:
     return Tree(
         states,
         np.empty((capacity, 2)),
-        np.empty(capacity, np.int32),
-        np.empty(capacity, np.int32),
-        np.empty(capacity, np.int32),
-        np.empty(capacity, np.int32),
-        np.zeros(4, np.int32),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.zeros(4, np.int64),
         allocate_buckets(states),
     )
 
@@ -70,13 +69,15 @@ def allocate_tree(capacity: int) -> Tree:
 @jit
 def plant(tree: Tree, root: Floats, bounds: Floats) -> None:
     """Begin a new tree at the state ``root [5]``."""
-    tree.states[0] = root
-    tree.controls[0] = 0.0
+    for i in range(5):  # one by one: assigning a row compiles for two seconds
+        tree.states[0, i] = root[i]
+    tree.controls[0, 0] = 0.0
+    tree.controls[0, 1] = 0.0
     tree.parents[0] = -1
     tree.depths[0] = 0
     tree.waypoints[0] = 0
     tree.spent[0] = 0
-    tree.counts[:] = 0
+    tree.counts.fill(0)
     tree.counts[SIZE] = 1
     tree.counts[GOAL_VERTEX] = -1
     clear_buckets(tree.buckets, bounds, BUCKET_M)

@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.memory.experience import Experience
+from planners.memory.hallucination import METHODS, Rearrange, _rearranged, hallucinate, no_plan
+from planners.memory.labels import free_plans, sweep_plans
+from planners.memory.placing import largest_stride, obstacle_meets
+from planners.world.collision import count_free_prefix, scene_of
+from planners.world.problem import CAR, obstacles_of
+from planners.world.randomness import generator
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@given(seed=SEEDS, which=st.integers(0, 7))
+def test_a_hallucinated_problem_is_solved_by_its_own_plan(experiences, draw, method, seed, which):
+    experience = experiences[which]
+    problem = hallucinate(method, experience, draw, generator(seed), 3)
+    states = experience.plan.states
+    assert count_free_prefix(states, CAR, scene_of(problem)) == len(states)
+    assert problem.id == f"{experience.problem.id}~{method}-3"
+    vertices = problem.obstacles.vertices
+    assert (vertices == vertices.astype(np.float32)).all()
+
+
+@given(seed=SEEDS)
+@settings(max_examples=20)
+def test_the_same_generator_hallucinates_the_same_problem(experiences, draw, seed):
+    first, second = (hallucinate("rearrange", experiences[0], draw, generator(seed), 0) for _ in range(2))
+    for a, b in zip(first.obstacles, second.obstacles, strict=True):
+        assert (a == b).all()
+
+
+@given(seed=SEEDS, which=st.integers(0, 7))
+@settings(max_examples=30)
+def test_rearranging_keeps_the_near_obstacles_and_draws_the_far_ones_anew(experiences, draw, seed, which):
+    experience = experiences[which]
+    fresh = draw(generator(seed, "fresh"))
+    obstacles = Rearrange(near_m=3.0)(experience, lambda _: fresh, generator(seed))
+    origin = experience.problem.obstacles
+    stride = largest_stride(experience.boxes)
+    obstacle_count = len(origin.obstacle_starts) - 1
+    near = [obstacle_meets(origin, o, experience.boxes, 3.0, stride) for o in range(obstacle_count)]
+    kept, corners = sum(near), obstacles.obstacle_starts
+    assert [int(n) for n in np.diff(corners)[:kept]] == [
+        int(n) for n, is_near in zip(np.diff(origin.obstacle_starts), near, strict=True) if is_near
+    ]
+    fresh_vertices = {tuple(vertex) for vertex in fresh.vertices}
+    far = obstacles.vertices[obstacles.piece_starts[corners[kept]] :]
+    assert all(tuple(vertex) in fresh_vertices for vertex in far)
+
+
+@given(seed=SEEDS, widened=st.floats(0.0, 4.0))
+@settings(max_examples=30)
+def test_skipping_boxes_changes_no_verdict(experiences, draw, seed, widened):
+    obstacles = draw(generator(seed))
+    boxes = experiences[seed % 8].boxes
+    stride = largest_stride(boxes)
+    for o in range(len(obstacles.obstacle_starts) - 1):
+        every = obstacle_meets(obstacles, o, boxes, widened, np.inf)
+        assert obstacle_meets(obstacles, o, boxes, widened, stride) == every
+
+
+def test_jitted_rearranging_equals_interpreted(experiences, draw):
+    experience = experiences[0]
+    fresh = draw(generator(5), 4)
+    goal_box = np.array([[*experience.problem.goal, 1.0, 0.0, 2.0, 2.0]])
+    arguments = (experience.problem.obstacles, fresh, experience.boxes[::8], goal_box, 3.0, 0.3, 0.05, 5)
+    jitted = _rearranged(*arguments, generator(9))
+    interpreted = _rearranged.py_func(*arguments, generator(9))
+    for a, b in zip(jitted, interpreted, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=30)
+def test_a_no_plan_problem_is_solved_by_no_plan(experiences, draw, seed):
+    plans = [e.plan for e in experiences]
+    problem = no_plan(sweep_plans(plans), draw, generator(seed), "boxes", 7)
+    scene = scene_of(problem)
+    assert all(count_free_prefix(plan.states, CAR, scene) < len(plan.states) for plan in plans)
+    assert problem.id == "boxes~no-plan-7"
+
+
+def test_a_class_that_cannot_block_a_plan_is_reported(experiences):
+    empty = obstacles_of([])
+    with pytest.raises(RuntimeError, match="never blocked plans"):
+        no_plan(sweep_plans([experiences[0].plan]), lambda _: empty, generator(0), "empty", 0)
+
+
+def test_an_experience_that_its_plan_does_not_solve_is_refused(experiences, draw):
+    wrong = dataclasses.replace(experiences[0].problem, goal=(20.0, -6.0))
+    with pytest.raises(RuntimeError, match="does not solve it"):
+        hallucinate("rearrange", Experience(wrong, experiences[0].plan), draw, generator(0), 0)
+
+
+def test_an_unknown_method_is_refused_by_name(experiences, draw):
+    with pytest.raises(ValueError, match="'dream'; choose one of rearrange"):
+        hallucinate("dream", experiences[0], draw, generator(0), 0)
+
+
+def test_a_worlds_empty_draw_is_fine(experiences):
+    problem = hallucinate("rearrange", experiences[0], lambda _: obstacles_of([]), generator(0), 0)
+    assert free_plans(experiences[0].sweep, scene_of(problem))[0]
