@@ -45,7 +45,7 @@ _CURVES: Final = {
     # 0.908; 1.17, 1.41 ms; 28.7 x
     "standard": _CURVES_STANDARD,
     # 0.762; 1.78, 2.97 ms; 56.6 x
-    "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=28.0, gap_m=4.0),
+    "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=29.0, gap_m=4.25),
 }
 
 _RANDOM_STANDARD: Final = Random(
