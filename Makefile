@@ -43,5 +43,5 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
 	$(PIP) install -c constraints.txt $(TORCH)
-	$(PIP) install -c constraints.txt --editable '.[dev]'
+	$(PIP) install -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
 	touch $(READY)

@@ -1,0 +1,1 @@
+"""When things happen: one verb, one file, one paragraph."""

@@ -1,0 +1,23 @@
+"""Hallucinate problems for the plans that were collected."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from tasks.engine import fan_out, task_runner
+from tasks.hallucinate import (
+    hallucinate_problems,
+    hallucination_chunks,
+    is_hallucinated,
+    relabel_chunks,
+    relabel_problems,
+)
+from tasks.settings import RunSettings
+
+
+@flow(name="hallucinate", task_runner=task_runner())
+def hallucinate(settings: RunSettings, data: str) -> None:
+    """Make many problems for each plan, label them, and label them once more for the combined memory."""
+    chunks = hallucination_chunks(data, settings)
+    fan_out(hallucinate_problems, chunks, "hallucinate", is_hallucinated)
+    fan_out(relabel_problems, relabel_chunks(data, settings), "relabel", is_hallucinated)

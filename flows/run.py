@@ -1,0 +1,27 @@
+"""The main job: every stage, one after another."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from flows.benchmark import benchmark
+from flows.build_memory import build_memory
+from flows.collect import collect
+from flows.hallucinate import hallucinate
+from flows.report import report
+from flows.train import train
+from tasks.engine import cluster
+from tasks.logbook import run_logged
+from tasks.settings import RunSettings
+
+
+@flow(name="run")
+def run(settings: RunSettings, data: str) -> None:
+    """Collect, hallucinate, train, build the memories, benchmark them, and report."""
+    with cluster(), run_logged(data, settings):
+        collect(settings, data)
+        hallucinate(settings, data)
+        train(settings, data)
+        build_memory(settings, data)
+        benchmark(settings, data)
+        report(settings, data)

@@ -1,0 +1,20 @@
+"""Train an encoder for each memory."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from tasks.engine import fan_out, task_runner
+from tasks.logbook import log_training
+from tasks.settings import RunSettings
+from tasks.train import epochs_done, is_trained, train_chunks, train_encoder
+
+
+@flow(name="train", task_runner=task_runner())
+def train(settings: RunSettings, data: str) -> None:
+    """Train one encoder for each class, and one for all of them if wanted, epoch by epoch."""
+    chunks = train_chunks(data, settings)
+    results = fan_out(
+        train_encoder, chunks, "train, epochs", is_trained, partly_done=lambda: epochs_done(chunks)
+    )
+    log_training(data, settings, chunks, results)

@@ -1,0 +1,152 @@
+"""Benchmark: every planner with and without memory on problems that nobody has seen, one row an attempt."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from planners.memory.labels import free_plans
+from planners.memory.recall import Memory, rank
+from planners.solve import Attempt, solve
+from planners.world.collision import scene_of
+from planners.world.occupancy import occupancy_of
+from planners.world.problem import Problem
+from planners.world.randomness import generator
+from storage.memories import load_memory
+from storage.recalls import write_recalls
+from storage.results import write_attempts
+from storage.shards import shard_is_done
+from tasks.attempts import attempt_row, check_attempt
+from tasks.build_memory import memory_chunks
+from tasks.caching import Chunk, chunk_task, chunks_of
+from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
+from tasks.worlds import source_key, source_of
+
+CHUNK_PROBLEMS: Final = 100  # some 10 s of work
+COMBINED_SHARDS: Final = 1000  # a class, in the folder of the combined memory's recall rows
+
+
+class Configuration(NamedTuple):
+    """A planner and what it may use."""
+
+    planner: str
+    assist: Assist
+    memory: str | None  # name of the memory
+
+
+def configurations(settings: RunSettings, class_name: str) -> list[Configuration]:
+    """Every way in which each problem of a class is solved."""
+    found = []
+    for planner in settings.planners:
+        found.append(Configuration(planner, UNASSISTED, None))
+        for memory in memories_of(settings, class_name):
+            found += [Configuration(planner, assist, memory) for assist in settings.assists]
+        if planner == ABLATION_PLANNER:
+            found += [Configuration(planner, assist, class_name) for assist in ABLATION]
+    return found
+
+
+def memories_of(settings: RunSettings, class_name: str) -> list[str]:
+    """The memories that are measured on a class: its own, and the combined one if there is one."""
+    return [class_name, COMBINED] if settings.combined else [class_name]
+
+
+def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
+    """Solve a range of unseen problems in every way, check the plans, write attempts and recalls."""
+    settings, name = chunk.settings, chunk.class_name
+    source = source_of(chunk.data, settings, name)
+    memories = {memory: load_memory(chunk.run.memory(memory)) for memory in memories_of(settings, name)}
+    asked = configurations(settings, name)
+    rows: list[dict[str, Any]] = []
+    recalls: dict[str, list[dict[str, Any]]] = {memory: [] for memory in memories}
+    for asked_first in asked:  # code and caches are warm before the first time counts
+        _attempt(source.problem("test", chunk.first), asked_first, memories, settings.seed)
+    with _no_garbage_collection():
+        for index in range(chunk.first, chunk.last):
+            problem = source.problem("test", index)
+            order = generator(settings.seed, "order", problem.id).permutation(len(asked))
+            attempts = {int(i): _attempt(problem, asked[i], memories, settings.seed) for i in order}
+            checked: set[bytes] = set()
+            for i in range(len(asked)):
+                check_attempt(problem, attempts[i], checked)
+                rows.append(attempt_row(attempts[i], asked[i].memory, settings.run_name))
+            for memory, recalled in recalls.items():
+                recalled.append(_recall(problem, memories[memory], memory))
+            gc.collect()
+    for memory, path in _recall_paths(chunk).items():
+        write_recalls(path, recalls[memory], plans=len(memories[memory].plans), key=chunk.key)
+    write_attempts(chunk.run.shard("results", name, chunk.index), rows, key=chunk.key)
+    return {"attempts": len(rows), "solved": sum(row["solved"] for row in rows)}
+
+
+benchmark_problems = chunk_task(benchmark_chunk)
+
+
+def is_benchmarked(chunk: Chunk) -> bool:
+    """Whether the chunk's attempts and recalls are there."""
+    paths = [chunk.run.shard("results", chunk.class_name, chunk.index), *_recall_paths(chunk).values()]
+    return all(shard_is_done(path, chunk.key) for path in paths)
+
+
+def benchmark_chunks(data: str, settings: RunSettings) -> list[Chunk]:
+    """Chunks of unseen problems of every class."""
+    memories = {chunk.class_name: chunk.key for chunk in memory_chunks(data, settings)}
+    return [
+        chunk
+        for name in settings.class_names
+        for chunk in chunks_of(
+            data,
+            settings,
+            "benchmark",
+            name,
+            source_of(data, settings, name).count("test", settings.test_problems),
+            CHUNK_PROBLEMS,
+            [
+                settings.seed,
+                configurations(settings, name),
+                [memories[memory] for memory in memories_of(settings, name)],
+                *source_key(settings, name),
+            ],
+        )
+    ]
+
+
+def _attempt(problem: Problem, asked: Configuration, memories: dict[str, Memory], seed: int) -> Attempt:
+    memory = memories[asked.memory] if asked.memory else None
+    return solve(problem, asked.planner, asked.assist.name, asked.assist.top_k, memory, seed)
+
+
+def _recall(problem: Problem, memory: Memory, name: str) -> dict[str, Any]:
+    order, nothing = rank(memory, occupancy_of(problem))
+    return {
+        "problem_id": problem.id,
+        "class": problem.class_name,
+        "memory": name,
+        "protocol": "fresh",
+        "order": order,
+        "free": free_plans(memory.sweeps, scene_of(problem)),
+        "nothing_recalled": nothing,
+    }
+
+
+def _recall_paths(chunk: Chunk) -> dict[str, Path]:
+    own = {chunk.class_name: chunk.run.shard("recalls", chunk.class_name, chunk.index)}
+    if not chunk.settings.combined:
+        return own
+    index = COMBINED_SHARDS * chunk.settings.class_names.index(chunk.class_name) + chunk.index
+    return own | {COMBINED: chunk.run.shard("recalls", COMBINED, index)}
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()

@@ -1,0 +1,187 @@
+"""The fan-out: chunks to Dask workers that survive a killed one, with a live progress bar."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import Any, Final
+
+import dask
+import distributed
+from prefect.tasks import Task
+from prefect_dask.task_runners import DaskTaskRunner
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from tasks.caching import Chunk
+from tasks.settings import RunError
+
+KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
+CONNECT_SECONDS: Final = 5
+CLOSE_SECONDS: Final = 5
+KILLED_CLOSE_SECONDS: Final = 0.3
+POLL_SECONDS: Final = 0.05
+LINE_SECONDS: Final = 5.0  # between lines of progress where there is no terminal
+
+Client: Any = distributed.Client  # Dask has no types
+LocalCluster: Any = distributed.LocalCluster
+
+_shared: ContextVar[str | None] = ContextVar("scheduler", default=None)
+
+
+class ChunkError(RunError):
+    """A chunk could not be done."""
+
+
+@contextmanager
+def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[str]:
+    """Address of the scheduler that every flow inside shares: the one around it, the given one, or a new one.
+
+    A new one is local: ``workers`` processes (default: one a core) of one thread, reachable on loopback only.
+    RuntimeError with one line when nobody answers at ``scheduler``.
+    """
+    around = _shared.get()
+    if around is not None:
+        yield around
+        return
+    with _connected(scheduler) if scheduler else _local(workers or os.cpu_count() or 1) as address:
+        token = _shared.set(address)
+        try:
+            yield address
+        finally:
+            _shared.reset(token)
+
+
+def task_runner() -> Any:
+    """What a flow gives its tasks to: the shared cluster, found when the first task is submitted."""
+    shared: Any = cluster  # entered by the runner, which is all that it wants of a cluster
+    return DaskTaskRunner(cluster_class=shared)
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[str]:
+    try:
+        with Client(address, timeout=CONNECT_SECONDS, set_as_default=False):
+            yield address
+    except (OSError, ValueError) as error:
+        raise RuntimeError(
+            f"No Dask scheduler answers at {address}; start one with `dask scheduler`."
+        ) from error
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[str]:
+    settings = {
+        "distributed.scheduler.allowed-failures": KILLS_ALLOWED,
+        "distributed.scheduler.worker-saturation": 1.0,  # a chunk waits for whoever is free, not in a queue
+        # a worker that may spill has a folder `storage` on its path, which would hide our package
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.memory.terminate": False,  # a machine's memory is its owner's business
+    }
+    with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(settings):
+        local = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            local_directory=scratch,
+            silence_logs="CRITICAL",
+        )
+        try:
+            yield local.scheduler_address
+        except BaseException:
+            _kill(local)  # nobody waits for work that nobody wants
+            _close(local, KILLED_CLOSE_SECONDS)
+            raise
+        _close(local, CLOSE_SECONDS)
+
+
+def _kill(local: Any) -> None:
+    for nanny in local.workers.values():
+        nanny.close_gracefully()  # that is: do not start it again
+        with suppress(AttributeError, ProcessLookupError):  # between two workers there is no process
+            nanny.process.process.kill()
+
+
+def _close(local: Any, seconds: float) -> None:
+    with suppress(TimeoutError):  # what is left then dies with this process
+        local.close(timeout=seconds)
+
+
+def fan_out(
+    task: Task[[Chunk], dict[str, Any]],
+    chunks: Sequence[Chunk],
+    description: str,
+    is_done: Callable[[Chunk], bool],
+    units: Callable[[Chunk], int] = lambda chunk: chunk.last - chunk.first,
+    partly_done: Callable[[], int] = lambda: 0,
+) -> list[dict[str, Any]]:
+    """Do chunks on the flow's workers; results in the order of the chunks.
+
+    A chunk whose shard is not ``is_done`` is done again, whatever the cache says. ``units`` are what the bar
+    counts; ``partly_done`` tells those of chunks still at work. ChunkError at the first failure.
+    """
+    futures: list[Any] = [
+        task.with_options(refresh_cache=not is_done(chunk)).submit(chunk) for chunk in chunks
+    ]
+    sizes = [units(chunk) for chunk in chunks]
+    with _progress(description, sum(sizes)) as show:
+        pending = dict(zip(range(len(chunks)), futures, strict=True))
+        done = 0
+        while pending:
+            for i in [i for i, future in pending.items() if future.wrapped_future.done()]:
+                _check(pending.pop(i), chunks[i], description)
+                done += sizes[i]
+            show(max(done, min(partly_done(), sum(sizes))))
+            time.sleep(POLL_SECONDS)
+    return [future.result() for future in futures]
+
+
+def _check(future: Any, chunk: Chunk, description: str) -> None:
+    where = f"{description}: chunk {chunk.index} of {chunk.class_name}"
+    dask_future = future.wrapped_future
+    if dask_future.status != "finished":
+        cause = dask_future.exception()
+        if isinstance(cause, distributed.KilledWorker):
+            raise ChunkError(
+                f"{where} ended {KILLS_ALLOWED + 1} worker processes; was there too little memory?"
+            ) from cause
+        raise ChunkError(f"{where} was lost: {cause}") from cause
+    try:
+        future.result()
+    except Exception as error:
+        reason = str(error).partition("\n")[0]
+        raise ChunkError(f"{where} failed: {reason or type(error).__name__}") from error
+
+
+@contextmanager
+def _progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A bar with the time left on a terminal, a line now and then elsewhere; both on the error stream."""
+    console = Console(file=sys.stderr)
+    began = time.monotonic()
+    if console.is_terminal:
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console) as bar:
+            row = bar.add_task(description, total=total)
+            yield lambda done: bar.update(row, completed=done)
+        return
+    told = began
+    complete = False
+
+    def tell(done: int) -> None:
+        nonlocal told, complete
+        now = time.monotonic()
+        if now - told >= LINE_SECONDS or (done == total and not complete):
+            told, complete = now, done == total
+            left = f", {(now - began) / done * (total - done):.0f} s left" if 0 < done < total else ""
+            console.print(
+                f"{description}: {done} of {total} after {now - began:.0f} s{left}", highlight=False
+            )
+
+    yield tell

@@ -1,0 +1,93 @@
+"""What each stage of a run leaves in MLflow."""
+
+from __future__ import annotations
+
+import functools
+import math
+import platform
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Any
+
+from storage.layout import open_data_folder
+from tasks.attempts import commit
+from tasks.benchmark import benchmark_chunks
+from tasks.caching import Chunk, key_of, run_folder
+from tasks.report import Report
+from tasks.settings import RunSettings
+from tasks.tracking import Tracker
+
+_SHOWN = ("solved", "mean_ms", "median_ms", "p90_ms", "reduction", "recalled", "collision_checks")
+
+
+@functools.cache
+def tracker(data: str) -> Tracker:
+    """The tracker of a data folder; the first call begins to connect."""
+    return Tracker(open_data_folder(data))
+
+
+@contextmanager
+def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
+    """The parent run: settings as parameters, where and from which commit it was made."""
+    tags = {"commit": commit(), "host": platform.node()}
+    with tracker(data).run(settings.run_name, "run", tags) as run_id:
+        tracker(data).parameters(run_id, asdict(settings))
+        yield run_id
+
+
+def log_training(
+    data: str, settings: RunSettings, chunks: Sequence[Chunk], results: Sequence[dict[str, Any]]
+) -> None:
+    """One child run for each encoder: parameters, metrics of every epoch, the data it learned from."""
+    log, run = tracker(data), run_folder(data, settings)
+    for chunk, result in zip(chunks, results, strict=True):
+        with _child(data, settings, f"train {chunk.class_name}") as run_id:
+            if log.is_logged(run_id, chunk.key):
+                continue
+            asked = {"class": chunk.class_name, "objective": settings.objective, "seed": settings.seed}
+            log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
+            log.metrics(run_id, result["epochs"], step="epoch")
+            place = run.path / "hallucinated" / chunk.class_name
+            log.dataset(run_id, f"hallucinated-{chunk.class_name}", place, chunk.key, "training")
+            log.mark_logged(run_id, chunk.key)
+
+
+def log_memories(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
+    """Each memory as an artifact of its training."""
+    log, run = tracker(data), run_folder(data, settings)
+    for chunk in chunks:
+        with _child(data, settings, f"train {chunk.class_name}") as run_id:
+            if not log.is_logged(run_id, chunk.key, "memory"):
+                log.artifacts(run_id, run.memory(chunk.class_name), "memory")
+                log.mark_logged(run_id, chunk.key, "memory")
+
+
+def log_report(data: str, settings: RunSettings, report: Report) -> None:
+    """The benchmark's child run: every figure of the summary as a metric, figures and tables as artifacts."""
+    log, run = tracker(data), run_folder(data, settings)
+    key = key_of([chunk.key for chunk in benchmark_chunks(data, settings)])
+    with _child(data, settings, "benchmark") as run_id:
+        if log.is_logged(run_id, key):
+            return
+        rows: dict[str, float] = {}
+        for row in report.summary.to_dict("records"):
+            place = f"{row['panel']}/{row['planner']}/{row['assist']}-{row['top_k']}"
+            rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
+        for row in report.retrieval.to_dict("records"):
+            place = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}"
+            numbers = {name: value for name, value in row.items() if isinstance(value, float)}
+            rows |= {f"{place}/{str(name).replace('@', '-')}": value for name, value in numbers.items()}
+        log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
+        log.dataset(run_id, "attempts", run.results, key, "benchmark")
+        log.artifacts(run_id, run.figures, "figures")
+        for suffix in ("csv", "md"):
+            log.artifacts(run_id, run.summary(suffix))
+        log.mark_logged(run_id, key)
+
+
+@contextmanager
+def _child(data: str, settings: RunSettings, stage: str) -> Iterator[str]:
+    log = tracker(data)
+    with log.run(settings.run_name, stage, {}, parent=log.find(settings.run_name, "run")) as run_id:
+        yield run_id

@@ -1,0 +1,75 @@
+"""One command: its folder, its server, its workers, its tracker, and the flow that runs among them."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
+from pathlib import Path
+
+from storage.layout import MARK, DataFolder, open_data_folder
+from tasks.local_server import LocalServer, local_server, set_environment
+from tasks.settings import RunError, RunSettings, UsageError
+
+
+def run_stage(
+    module: str, name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
+) -> None:
+    """Run the flow ``module.name``; afterwards say where everything lies."""
+    folder = open_data_folder(data)
+    with (
+        folder.lock(),
+        local_server(folder.path) as server,
+        _workers_for(name, folder, workers, scheduler, server),
+    ):
+        flow = getattr(importlib.import_module(module), name)
+        flow(settings, str(folder.path))
+    _tell(folder, settings)
+
+
+def verify(folder: Path, sample: float, workers: int) -> None:
+    """Check what lies in a data folder; nothing is written where there is none."""
+    if not 0.0 <= sample <= 1.0:
+        raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")
+    if not (folder / MARK).is_file():
+        raise RunError(f"{folder} is no data folder: it has no {MARK}.")
+    set_environment(folder)
+    from tasks.verify import verify_folder
+
+    verify_folder(folder, sample, workers)
+
+
+@contextmanager
+def _workers_for(
+    name: str, folder: DataFolder, workers: int, scheduler: str | None, server: LocalServer | None
+) -> Iterator[None]:
+    """Start workers and tracker, compile meanwhile, and wait for the server; all of it at the same time."""
+    from tasks.engine import cluster  # Prefect and Dask, after the environment is set
+    from tasks.logbook import tracker
+    from tasks.warm_up import warm_up
+
+    with ExitStack() as stack:
+        if name in ("run", "train", "build_memory", "report"):
+            tracker(str(folder.path))
+        if name != "report":
+            address = stack.enter_context(cluster(workers, scheduler))
+            stack.enter_context(warm_up(address) if scheduler is None else nullcontext())
+        if server is not None:
+            print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
+            server.wait()
+        yield
+
+
+def _tell(folder: DataFolder, settings: RunSettings) -> None:
+    from tasks.logbook import tracker
+
+    run = folder.run(settings.run_name)
+    print(f"data     {run.path}")
+    if run.figures.exists():
+        print(f"figures  {run.figures}")
+    print(f"MLflow   mlflow ui --backend-store-uri {tracker(str(folder.path)).uri}")
+    print(
+        f"Prefect  PREFECT_API_DATABASE_CONNECTION_URL=sqlite+aiosqlite:///{folder.prefect / 'prefect.db'} "
+        "prefect server start"
+    )

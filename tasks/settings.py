@@ -1,0 +1,192 @@
+"""What a run is asked to do: one frozen value, its presets, and the name that follows from it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple, get_args
+
+Objective = Literal["labels", "triplet"]
+
+
+class Assist(NamedTuple):
+    """How much of a memory an attempt may use."""
+
+    name: str  # "none", "closed", "open", or one of these after "random-"
+    top_k: int  # recalled plans; 0 with "none"
+
+
+UNASSISTED: Final = Assist("none", 0)
+ASSISTS: Final = (Assist("closed", 1), Assist("closed", 5), Assist("open", 1), Assist("open", 5))
+ABLATION: Final = (Assist("random-open", 1), Assist("random-open", 5))  # the paper's: plans drawn blindly
+COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
+ABLATION_PLANNER: Final = "gust"
+COMBINED: Final = "combined"  # the memory that does not distinguish the classes
+
+
+class UsageError(ValueError):
+    """What was asked cannot be done as asked; the message says what to ask instead (exit code 2)."""
+
+
+class RunError(RuntimeError):
+    """A stage cannot go on; the message is one line that says why and what to do (exit code 1)."""
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """One run. Equal settings, wherever the data lies and whoever works, give equal rows."""
+
+    preset: str
+    classes: tuple[str, ...]  # generated problem classes
+    worlds: tuple[str, ...]  # folders of worlds; each is one more class, named as its folder
+    difficulty: str
+    seed: int
+    objective: Objective
+    experiences: int  # solved problems kept a class
+    problems_per_experience: int  # hallucinated for each plan, its own problem included
+    test_problems: int  # unseen problems a class
+    collector: str  # the planner whose plans are kept
+    planners: tuple[str, ...]  # those that are measured
+    assists: tuple[Assist, ...]  # how, besides without memory
+    epochs: int
+    combined: bool  # also one memory for all classes together
+    strict: bool = False  # a bad world stops the run instead of being skipped
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """All classes of the run, folders of worlds after the generated ones."""
+        return self.classes + tuple(world_class(folder) for folder in self.worlds)
+
+    @property
+    def digest(self) -> str:
+        """Eight hexadecimal digits that tell settings with different results apart."""
+        asked = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
+        del asked["strict"]
+        return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+
+    @property
+    def run_name(self) -> str:
+        """Name of the run's folder and of its parent run in MLflow, like ``laptop-labels-3f2a91c0``."""
+        return f"{self.preset}-{self.objective}-{self.digest}"
+
+    def to_json(self) -> str:
+        """The settings as one JSON object; ``from_json`` gives them back."""
+        return json.dumps(asdict(self), indent=2, sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> RunSettings:
+        """The settings that ``to_json`` wrote; ValueError with one line when they are of another version."""
+        values: dict[str, Any] = json.loads(text)
+        known = {field.name for field in fields(cls)}
+        if set(values) != known:
+            odd = ", ".join(sorted(set(values) ^ known))
+            raise ValueError(
+                f"Settings of another version: {odd} missing or unknown. Start a new data folder."
+            )
+        values["assists"] = tuple(Assist(*assist) for assist in values["assists"])
+        for name in ("classes", "worlds", "planners"):
+            values[name] = tuple(values[name])
+        return cls(**values)
+
+
+def world_class(folder: str) -> str:
+    """The class name of a folder of worlds: the folder's own name."""
+    return Path(folder).resolve().name
+
+
+class _Preset(NamedTuple):
+    experiences: int
+    problems_per_experience: int
+    test_problems: int
+    epochs: int
+    combined: bool
+
+
+PRESETS: Final = {
+    "smoke": _Preset(6, 20, 20, 2, False),
+    "laptop": _Preset(100, 200, 1_000, 5, False),
+    "paper": _Preset(100, 1_000, 10_000, 5, True),
+}
+
+
+def for_preset(
+    preset: str = "laptop",
+    *,
+    classes: Sequence[str] | None = None,
+    worlds: Sequence[str] = (),
+    difficulty: str = "standard",
+    seed: int = 1,
+    objective: str = "labels",
+    planners: Sequence[str] | None = None,
+    experiences: int | None = None,
+    problems_per_experience: int | None = None,
+    test_problems: int | None = None,
+    epochs: int | None = None,
+    strict: bool = False,
+) -> RunSettings:
+    """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
+
+    Without ``classes`` a run takes every generated class, or, with ``worlds``, these alone.
+    """
+    from planners.search.registry import PLANNERS  # imported late: Numba costs half a second
+    from planners.world.classes import CLASSES, DIFFICULTIES
+
+    _check_known("preset", [preset], PRESETS)
+    base = PRESETS[preset]
+    asked = tuple(CLASSES) if classes is None and not worlds else tuple(dict.fromkeys(classes or ()))
+    named = tuple(PLANNERS) if planners is None else tuple(dict.fromkeys(planners))
+    _check_known("class", asked, CLASSES)
+    _check_known("planner", named, PLANNERS)
+    _check_known("difficulty", [difficulty], DIFFICULTIES)
+    _check_known("objective", [objective], get_args(Objective))
+    if not asked and not worlds:
+        raise UsageError(f"No class to work on. Name some of: {', '.join(CLASSES)}.")
+    if not named:
+        raise UsageError(f"No planner to measure. Name some of: {', '.join(PLANNERS)}.")
+    for folder in worlds:
+        for part in ("train", "test"):
+            if not (Path(folder) / part).is_dir():
+                raise UsageError(f"{folder} is no folder of worlds: it has no {part} in it.")
+    if seed < 0:
+        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+    settings = RunSettings(
+        preset=preset,
+        classes=asked,
+        worlds=tuple(str(Path(folder).resolve()) for folder in worlds),
+        difficulty=difficulty,
+        seed=seed,
+        objective="triplet" if objective == "triplet" else "labels",
+        experiences=_count("experiences", experiences, base.experiences),
+        problems_per_experience=_count(
+            "problems a plan", problems_per_experience, base.problems_per_experience
+        ),
+        test_problems=_count("test problems", test_problems, base.test_problems),
+        collector=COLLECTOR,
+        planners=named,
+        assists=ASSISTS,
+        epochs=_count("epochs", epochs, base.epochs),
+        combined=base.combined,
+        strict=strict,
+    )
+    names = settings.class_names
+    twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))
+    if twice:
+        raise UsageError(f"Two classes would be called {', '.join(twice)}. Rename the folder of worlds.")
+    return settings
+
+
+def _check_known(kind: str, asked: Sequence[str], known: Sequence[str] | dict[str, Any]) -> None:
+    for name in asked:
+        if name not in known:
+            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+
+
+def _count(what: str, asked: int | None, otherwise: int) -> int:
+    if asked is None:
+        return otherwise
+    if asked < 1:
+        raise UsageError(f"{asked} {what}: give 1 or more.")
+    return asked

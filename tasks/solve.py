@@ -1,0 +1,150 @@
+"""Solve problems of one's own: rows, plans and pictures in files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from dashboards.pictures import picture
+from planners.memory.recall import Memory
+from planners.search.registry import PLANNERS
+from planners.solve import ASSISTS, Attempt, solve
+from planners.world.alignment import from_canonical, to_canonical
+from planners.world.problem import Plan, Problem
+from storage.errors import StorageError
+from storage.files import whole_file
+from storage.memories import load_memory
+from storage.plans import PlanRecord, write_plan
+from storage.problems import read_problems
+from storage.results import write_attempts
+from tasks.attempts import attempt_row, check_attempt
+from tasks.settings import COMBINED, RunError, UsageError
+
+PICTURES: Final = (".png", ".svg", ".pdf")
+
+
+class Assistant:
+    """A way to solve: planner, assist, seed, and the memory of each class that turns up."""
+
+    def __init__(self, planner: str, assist: str, top_k: int, memory: Path | None, seed: int) -> None:
+        """UsageError with one line for an unknown planner or assist, a top k below 1, a missing memory."""
+        for kind, name, known in (("planner", planner, tuple(PLANNERS)), ("assist", assist, ASSISTS)):
+            if name not in known:
+                raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+        if top_k < 1:
+            raise UsageError(f"Top k is {top_k}: give 1 or more.")
+        if seed < 0:
+            raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+        if assist != "none" and memory is None:
+            raise UsageError(f"Assist {assist!r} needs --memory: the folder of a run, or of one memory.")
+        self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
+        self._place = memory if assist != "none" else None
+        self._memories: dict[Path, Memory] = {}
+
+    def memory_of(self, class_name: str) -> Memory | None:
+        """The memory for problems of a class: its own, else the combined, else the only one there is."""
+        if self._place is None:
+            return None
+        memories = self._place / "memories"
+        candidates = [memories / class_name, memories / COMBINED, *memories.glob("[!.]*/")]
+        found = [folder for folder in candidates if (folder / "memory.json").is_file()]
+        several = len({folder.name for folder in found}) > 1 and found[0].name not in (class_name, COMBINED)
+        if several:
+            names = ", ".join(sorted(folder.name for folder in found))
+            raise RunError(
+                f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}."
+            )
+        folder = found[0] if found else self._place
+        if folder not in self._memories:
+            self._memories[folder] = load_memory(folder)
+        return self._memories[folder]
+
+    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
+        """The attempt, its plan and the recalled plans, these in the frame of the problem."""
+        canonical, alignment = to_canonical(problem)
+        memory = self.memory_of(problem.class_name)
+        attempt = solve(canonical, self.planner, self.assist, self.top_k, memory, self.seed)
+        check_attempt(canonical, attempt, set())
+        recalled = [from_canonical(memory.plans[i], alignment) for i in attempt.recalled] if memory else []
+        return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
+
+
+def plan_one(
+    problem: Path,
+    planner: str,
+    assist: str,
+    top_k: int,
+    memory: Path | None,
+    seed: int,
+    out: Path | None,
+    drawing: Path | None,
+) -> None:
+    """Plan for the one problem of a file; RunError when it has another number, or no plan was found."""
+    assistant = Assistant(planner, assist, top_k, memory, seed)
+    if drawing is not None and drawing.suffix not in PICTURES:
+        raise UsageError(f"{drawing} is no picture's name. Known: {', '.join(PICTURES)}.")
+    problems = read_problems(problem)
+    if len(problems) != 1:
+        raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
+    assistant(problems[0])  # code is warm before the time counts
+    attempt, plan, recalled = assistant(problems[0])
+    if out is not None:
+        write_plan(out, _record(problems[0], attempt, plan))
+    told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
+    if drawing is not None:
+        with whole_file(drawing) as temporary:
+            figure = picture(problems[0], plan, f"{planner}, {assist}: {told}", recalled)
+            figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+    if plan is None:
+        raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
+    print(f"{told}, {plan.length_m:.1f} m, {plan.duration_s:.1f} s")
+
+
+def solve_many(
+    problems: Path,
+    planner: str,
+    assist: str,
+    top_k: int,
+    memory: Path | None,
+    seed: int,
+    out: Path,
+    plans: Path | None,
+) -> None:
+    """Solve every problem of a file; one attempt row each, and if asked its plan."""
+    assistant = Assistant(planner, assist, top_k, memory, seed)
+    if out.suffix != ".parquet":
+        raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
+    asked = read_problems(problems)
+    if not asked:
+        raise StorageError(f"{problems} holds no problems; nothing to solve.")
+    assistant(asked[0])  # code is warm before the first time counts
+    rows = []
+    for problem in asked:
+        attempt, plan, _ = assistant(problem)
+        found = assistant.memory_of(problem.class_name)
+        rows.append(attempt_row(attempt, found.class_name if found else None, None))
+        if plans is not None:
+            write_plan(plans / f"{_file_name(problem.id, asked)}.json", _record(problem, attempt, plan))
+    write_attempts(out, rows)
+    solved = sum(row["solved"] for row in rows)
+    print(f"{solved} of {len(rows)} solved, rows in {out}")
+
+
+def _record(problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
+    return PlanRecord(
+        problem.id,
+        attempt.status,
+        attempt.source or None,
+        attempt.planner,
+        attempt.assist,
+        attempt.planning_seconds,
+        plan,
+    )
+
+
+def _file_name(identity: str, problems: Sequence[Problem]) -> str:
+    """A problem's id if it can name a file, else its place in the list."""
+    plain = all(letter.isalnum() or letter in "-_.~" for letter in identity) and not identity.startswith(".")
+    place = next(i for i, problem in enumerate(problems) if problem.id == identity)
+    return identity if plain and identity else f"problem-{place}"

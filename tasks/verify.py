@@ -1,0 +1,197 @@
+"""Verify: shards and archives are whole, stored plans are good, and attempts come out the same again."""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import groupby
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from planners.memory.labels import free_plans, sweep_plans
+from planners.solve import solve
+from planners.world.authority import faults
+from planners.world.collision import scene_of
+from planners.world.occupancy import occupancy_of
+from planners.world.randomness import generator
+from storage.encoders import load_encoder
+from storage.errors import StorageError
+from storage.experiences import read_experiences
+from storage.files import read_text
+from storage.hallucinated import read_hallucinated_problems, read_labelled
+from storage.layout import RunFolder, open_data_folder
+from storage.memories import load_memory
+from storage.recalls import read_recalls
+from storage.results import read_attempts
+from tasks.attempts import PlanFaultError, check_attempt, same_outcome
+from tasks.benchmark import CHUNK_PROBLEMS
+from tasks.settings import RunError, RunSettings
+from tasks.train import memory_names
+from tasks.worlds import source_of
+
+LABELS_EVERY: Final = 50  # hallucinated problems whose grid and labels are drawn again
+SHOWN: Final = 20  # faults listed
+
+Findings = tuple[Counter[str], list[str]]  # what was checked, and what is wrong
+Job = Callable[[], Findings]
+
+
+def verify_folder(folder: Path, sample: float, workers: int) -> None:
+    """Check a whole data folder and print what was checked; RunError when something is wrong."""
+    runs = open_data_folder(folder).runs()
+    if not runs:
+        raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
+    jobs = [job for run in runs for job in _jobs(str(folder), run, sample)]
+    checked: Counter[str] = Counter()
+    wrong: list[str] = []
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
+        for counts, found in pool.map(_do, jobs):
+            checked += counts
+            wrong += found
+    for what, count in checked.items():
+        print(f"{count:9,} {what}")
+    if wrong:
+        print(*wrong[:SHOWN], sep="\n", file=sys.stderr)
+        raise RunError(
+            f"{len(wrong)} faults in {folder}; delete what is named and run the same command again."
+        )
+    print("No fault found.")
+
+
+def _do(job: Job) -> Findings:
+    try:
+        return job()
+    except (StorageError, PlanFaultError) as error:
+        return Counter(), [str(error)]
+
+
+def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
+    try:
+        settings = RunSettings.from_json(read_text(run.settings))
+    except ValueError as error:
+        raise RunError(f"{run.settings}: {error}") from None
+    for name in memory_names(settings):
+        if run.experiences(name).exists():
+            yield partial(_experiences, run.experiences(name))
+        for path in run.shards("hallucinated", name):
+            yield partial(_hallucinated, run, name, path)
+        for path in run.shards("recalls", name):
+            yield partial(_recalls, path)
+        if run.model(name).exists():
+            yield partial(_encoder, run, name)
+        if run.memory(name).exists():
+            yield partial(_memory, run, name)
+        for path in run.shards("results", name):
+            yield partial(_attempts, data, settings, run, name, path, sample)
+
+
+def _experiences(path: Path) -> Findings:
+    experiences = read_experiences(path)
+    wrong = [
+        f"{path}: plan of {experience.problem.id}: {fault}"
+        for experience in experiences
+        for fault in faults(experience.problem, experience.plan)
+    ]
+    return Counter({"plans of experiences re-simulated and checked by FCL": len(experiences)}), wrong
+
+
+def _hallucinated(run: RunFolder, name: str, path: Path) -> Findings:
+    problems, labelled = read_hallucinated_problems(path), read_labelled([path])
+    free = np.unpackbits(labelled.labels, axis=1, count=labelled.plans).astype(bool)
+    sweeps = sweep_plans([experience.plan for experience in read_experiences(run.experiences(name))])
+    made_for = labelled.plan_index
+    rows = np.arange(len(made_for))
+    solved = np.where(made_for >= 0, free[rows, np.maximum(made_for, 0)], ~free.any(axis=1))
+    wrong = [f"{path}: {problems[i].id} has a label that denies what it was made for" for i in rows[~solved]]
+    again = range(0, len(problems), LABELS_EVERY)
+    for i in again:
+        if (free_plans(sweeps, scene_of(problems[i])) != free[i]).any():
+            wrong.append(f"{path}: {problems[i].id} has other labels than its obstacles say")
+        if (np.packbits(occupancy_of(problems[i])) != labelled.grids[i]).any():
+            wrong.append(f"{path}: {problems[i].id} has another grid than its obstacles say")
+    read = {"hallucinated problems read": len(problems), "of these, grids and labels drawn again": len(again)}
+    return Counter(read), wrong
+
+
+def _recalls(path: Path) -> Findings:
+    rows: list[dict[str, Any]] = _records(read_recalls(path))
+    wrong = [
+        f"{path}: {row['problem_id']} ranks {len(row['order'])} of {len(row['free'])} plans, or some twice"
+        for row in rows
+        if sorted(row["order"]) != list(range(len(row["free"])))
+    ]
+    return Counter({"recalls read": len(rows)}), wrong
+
+
+def _encoder(run: RunFolder, name: str) -> Findings:
+    load_encoder(run.model(name))
+    return Counter({"encoders read": 1}), []
+
+
+def _memory(run: RunFolder, name: str) -> Findings:
+    memory = load_memory(run.memory(name))
+    kept = [experience.plan for experience in read_experiences(run.experiences(name))]
+    same = len(kept) == len(memory.plans) and all(
+        np.array_equal(ours.states, theirs.states) and np.array_equal(ours.controls, theirs.controls)
+        for ours, theirs in zip(kept, memory.plans, strict=True)
+    )
+    wrong = [] if same else [f"{run.memory(name)}: its plans are not those of the experiences"]
+    return Counter({"memories read": 1, "plans of memories compared with experiences": len(kept)}), wrong
+
+
+def _attempts(
+    data: str, settings: RunSettings, run: RunFolder, name: str, path: Path, sample: float
+) -> Findings:
+    rows = _records(read_attempts(path))
+    source = source_of(data, settings, name)
+    solved = [row for row in rows if row["solved"]]
+    wrong = [
+        f"{path}: a plan for {row['problem_id']} was never checked" for row in solved if not row["verified"]
+    ]
+    memories = {
+        name: load_memory(run.memory(name)) for name in {row["memory"] for row in rows if row["memory"]}
+    }
+    again = plans = 0
+    for place, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
+        if generator(settings.seed, "verify", identity).random() >= sample:
+            continue
+        problem = source.problem("test", int(path.stem) * CHUNK_PROBLEMS + place)
+        if problem.id != identity:
+            wrong.append(f"{path}: {identity} is not where it should be, {problem.id} is")
+            continue
+        for row in attempts:
+            memory = memories[row["memory"]] if row["memory"] else None
+            attempt = solve(problem, row["planner"], row["assist"], row["top_k"], memory, row["seed"])
+            check_attempt(problem, attempt, set())
+            again += 1
+            plans += attempt.solved
+            if not same_outcome(attempt, row):
+                wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} comes out otherwise")
+    return Counter(
+        {
+            "attempts read": len(rows),
+            "plans of attempts checked by FCL when they were made": len(solved),
+            "attempts made again": again,
+            "plans of these re-simulated and checked by FCL": plans,
+        }
+    ), wrong
+
+
+def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Rows with None where pandas has its NaN."""
+    return [
+        {
+            str(name): None if isinstance(value, float) and value != value else value
+            for name, value in row.items()
+        }
+        for row in frame.to_dict("records")
+    ]

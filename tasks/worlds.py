@@ -1,0 +1,147 @@
+"""Where a class's problems come from: a generator with a seed, or a folder of worlds read once a run."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from planners.world.alignment import to_canonical
+from planners.world.classes import ProblemClass, problem_class
+from planners.world.problem import Obstacles, Problem
+from storage.problems import read_problems, write_problems
+from storage.worlds import import_png_folder
+from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
+from tasks.settings import RunError, RunSettings, world_class
+
+Purpose = Literal["collect", "test"]
+PARTS: Final[dict[Purpose, str]] = {"collect": "train", "test": "test"}
+
+
+@dataclass(frozen=True)
+class Generated:
+    """A generated class: as many problems as one asks for, those to test with never collected from."""
+
+    problems: ProblemClass
+    seed: int
+
+    def count(self, purpose: Purpose, wanted: int) -> int:
+        """How many of the ``wanted`` problems there are: all."""
+        return wanted
+
+    def problem(self, purpose: Purpose, index: int) -> Problem:
+        """Problem ``index``; even seeds draw what is collected, odd ones what is tested with."""
+        return self.problems.draw(2 * self.seed + (purpose == "test"), index)
+
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """Fresh obstacles of the class."""
+        return self.problems.draw_obstacles(rng)
+
+
+@dataclass(frozen=True)
+class Worlds:
+    """A folder of worlds: its ``train`` part to collect from, its ``test`` part to test with."""
+
+    folder: Path  # where the run keeps them
+
+    def count(self, purpose: Purpose, wanted: int) -> int:
+        """How many of the ``wanted`` problems there are."""
+        return min(wanted, len(self._worlds(purpose)))
+
+    def problem(self, purpose: Purpose, index: int) -> Problem:
+        """World ``index`` of a part, in the order of the files."""
+        return self._worlds(purpose)[index]
+
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """The obstacles of one of the worlds to collect from."""
+        worlds = self._worlds("collect")
+        return worlds[int(rng.integers(len(worlds)))].obstacles
+
+    def _worlds(self, purpose: Purpose) -> tuple[Problem, ...]:
+        path = _part(self.folder, purpose)
+        if not path.exists():
+            raise RunError(f"{path} is not there; run collect with this folder of worlds first.")
+        return _problems(path, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=4)
+def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
+    return tuple(read_problems(path))
+
+
+def source_of(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
+    """The problems of a class of the run; a folder of worlds must have been read (``read_worlds``)."""
+    if class_name in settings.classes:
+        return Generated(problem_class(class_name, settings.difficulty), settings.seed)
+    return Worlds(run_folder(data, settings).path / "worlds" / class_name)
+
+
+def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
+    """What a class's problems depend on, for the keys of chunks."""
+    folders = [Path(folder) for folder in settings.worlds if world_class(folder) == class_name]
+    return [_digest(folders[0])] if folders else [settings.difficulty, settings.seed]
+
+
+def _part(folder: Path, purpose: Purpose) -> Path:
+    return folder / f"{PARTS[purpose]}.parquet"
+
+
+def world_chunks(data: str, settings: RunSettings) -> list[Chunk]:
+    """One chunk for each folder of worlds of the run."""
+    names = [world_class(folder) for folder in settings.worlds]
+    return [
+        chunk
+        for name in names
+        for chunk in chunks_of(data, settings, "worlds", name, 1, 1, source_key(settings, name))
+    ]
+
+
+def worlds_are_read(chunk: Chunk) -> bool:
+    """Whether the problems of a folder of worlds lie in the run's folder."""
+    return is_marked(chunk.run.path / "worlds" / chunk.class_name, chunk.key)
+
+
+def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
+    """Read a folder of worlds, bring its problems to the canonical frame, and list the worlds left out."""
+    origin = next(Path(f) for f in chunk.settings.worlds if world_class(f) == chunk.class_name)
+    folder = chunk.run.path / "worlds" / chunk.class_name
+    skipped: list[str] = []
+    for purpose, part in PARTS.items():
+        problems, left_out = import_png_folder(origin, part, strict=chunk.settings.strict)
+        write_problems(_part(folder, purpose), [to_canonical(problem)[0] for problem in problems])
+        skipped += [f"{file}: {reason}" for file, reason in left_out]
+    mark_done(folder, chunk.key)
+    return {"skipped": skipped}
+
+
+read_worlds = chunk_task(read_worlds_chunk)
+
+
+@functools.cache
+def _digest(folder: Path) -> str:
+    """A digest of a folder's pictures."""
+    digest = hashlib.sha256()
+    for file in sorted(
+        file for part in PARTS.values() for file in (folder / part).rglob("*") if file.is_file()
+    ):
+        digest.update(f"{file.relative_to(folder)}\0".encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def tell_skipped(results: Sequence[dict[str, Any]]) -> None:
+    """List on the error stream the worlds that were left out, with the reason of each."""
+    skipped = [line for result in results for line in result["skipped"]]
+    if skipped:
+        print(
+            f"{len(skipped)} worlds skipped (use --strict to stop instead):",
+            *skipped,
+            sep="\n  ",
+            file=sys.stderr,
+        )

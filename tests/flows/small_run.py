@@ -1,0 +1,40 @@
+"""A run of two classes, small enough for a test: with two workers, again, and with one worker elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from tasks.local_server import local_server
+from tasks.settings import for_preset
+
+SETTINGS = replace(
+    for_preset("smoke", classes=["random", "trap"], seed=3),
+    experiences=4,
+    problems_per_experience=10,
+    test_problems=6,
+    combined=True,
+)
+
+
+def main(first: Path, second: Path) -> None:
+    """Run in two folders; the first twice."""
+    with local_server(first) as server:
+        from flows.run import run
+        from tasks.engine import cluster
+
+        with cluster(2):
+            if server is not None:
+                server.wait()
+            run(SETTINGS, str(first))
+            (first / "first").touch()
+            run(SETTINGS, str(first))
+        with cluster(1):
+            run(SETTINGS, str(second))
+
+
+if __name__ == "__main__":
+    from storage.layout import open_data_folder
+
+    main(*(open_data_folder(place).path for place in sys.argv[1:3]))

@@ -1,0 +1,92 @@
+"""The command line: wrong use is told in one line on the error stream, with its exit code."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from flows.cli import app, call
+
+COMMANDS = (
+    "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
+    "solve",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["fly"], 2, 'Unknown command "fly"'),
+        (["run", "--preset", "huge"], 2, "Unknown preset 'huge'. Known: smoke, laptop, paper."),
+        (["run", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["run", "--seed", "x"], 2, "--seed"),
+        (["run", "--seed", "-3"], 2, "Seed -3 is negative"),
+        (["run", "--speed", "3"], 2, "--speed"),
+        (["run", "--data"], 2, "--data"),
+        (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
+        (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
+        (["train", "--objective", "luck"], 2, "Unknown objective 'luck'"),
+        (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
+        (["solve"], 2, "--problems"),
+        (["plan", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
+        (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),
+        (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
+        (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
+        (["plan", "p.json"], 1, "p.json does not exist"),
+        (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
+        (["verify", "nowhere"], 1, "nowhere is no data folder"),
+        (["verify", "nowhere", "--sample", "2"], 2, "Sample is 2.0"),
+        (["run", "--preset", "smoke", "--data", "/proc/nowhere"], 1, "/proc/nowhere cannot be used"),
+    ],
+)
+def test_wrong_use_is_one_line_and_an_exit_code(
+    arguments: list[str],
+    code: int,
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call(arguments) == code
+    printed = capsys.readouterr()
+    assert told in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_data_folder_of_another_version_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "motion-memory.json").write_text('{"layout": 99}')
+    assert call(["run", "--preset", "smoke", "--data", str(tmp_path)]) == 1
+    assert "has data layout 99" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call([command, "--help"]) == 0
+    assert command in capsys.readouterr().out
+
+
+def test_the_commands_are_those_of_the_contract() -> None:
+    assert set(COMMANDS) <= {name for name in app if not name.startswith("-")}
+
+
+def test_help_is_quick() -> None:
+    began = time.monotonic()
+    script = "import sys; from flows.cli import call; call(['--help']); print('prefect' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[2],
+    )
+    assert done.stdout.strip().endswith("False")
+    assert time.monotonic() - began < 3.0  # a third of a second on an idle machine

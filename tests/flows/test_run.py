@@ -1,0 +1,126 @@
+"""The main job, small: same rows however many workers, nothing done twice, all of it verified and tracked."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from storage.layout import DataFolder, RunFolder
+from storage.memories import load_memory
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunFolder, RunFolder]:
+    """Folders of the same run with two workers and with one."""
+    places = [tmp_path_factory.mktemp("two"), tmp_path_factory.mktemp("one")]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    environment["PYTHONPATH"] = str(ROOT)
+    script = [sys.executable, str(Path(__file__).with_name("small_run.py")), *map(str, places)]
+    done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=220)
+    assert done.returncode == 0, done.stderr[-2000:]
+    two, one = (DataFolder(place).runs() for place in places)
+    assert len(two) == len(one) == 1
+    return two[0], one[0]
+
+
+def _rows(path: Path) -> pd.DataFrame:
+    rows: pd.DataFrame = pq.read_table(path, partitioning=None).to_pandas()
+    return rows
+
+
+def _equal(one: object, other: object) -> bool:
+    return bool(np.array_equal(np.asarray(one), np.asarray(other))) or (one != one and other != other)
+
+
+def test_one_worker_and_two_give_identical_rows_but_for_times(runs: tuple[RunFolder, RunFolder]) -> None:
+    two, one = runs
+    files = sorted(path.relative_to(two.path) for path in two.path.rglob("*.parquet"))
+    assert files == sorted(path.relative_to(one.path) for path in one.path.rglob("*.parquet"))
+    assert len(files) > 12
+    for file in files:
+        ours, theirs = _rows(two.path / file), _rows(one.path / file)
+        assert list(ours.columns) == list(theirs.columns)
+        assert len(ours) == len(theirs)
+        for name in ours.columns:
+            if not name.endswith("_seconds"):
+                pairs = zip(ours[name], theirs[name], strict=True)
+                assert all(_equal(a, b) for a, b in pairs), f"{file}: {name}"
+
+
+def test_one_worker_and_two_give_identical_memories(runs: tuple[RunFolder, RunFolder]) -> None:
+    two, one = runs
+    for name in ("random", "trap", "combined"):
+        ours, theirs = (load_memory(run.memory(name)) for run in (two, one))
+        for tensor in ("centroids", "vectors", "biases"):
+            assert np.array_equal(getattr(ours, tensor), getattr(theirs, tensor))
+
+
+def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolder]) -> None:
+    rows = pd.concat([_rows(path) for path in sorted(runs[0].results.rglob("*.parquet"))])
+    asked = rows.groupby(["problem_class", "planner", "assist", "top_k"])["problem_id"].nunique()
+    assert (asked == 6).all()
+    assert len(asked) == 2 * (3 * 5 + 2)
+    counts = Counter(rows["memory"].fillna("none"))
+    assert counts == {"none": 36, "random": 84, "trap": 84, "combined": 144}
+    assert rows.loc[rows["solved"], "verified"].all()
+
+
+def test_collected_problems_are_never_tested_with(runs: tuple[RunFolder, RunFolder]) -> None:
+    collected = {identity for path in runs[0].shards("experiences", "trap") for identity in _rows(path)["id"]}
+    tested = set(_rows(runs[0].shard("results", "trap", 0))["problem_id"])
+    assert collected
+    assert tested
+    assert not collected & tested
+
+
+def test_the_same_command_again_does_nothing_again(runs: tuple[RunFolder, RunFolder]) -> None:
+    finished = (runs[0].path.parents[1] / "first").stat().st_mtime_ns
+    made = [*runs[0].path.rglob("*.parquet"), *(runs[0].path / "memories").rglob("*.*")]
+    assert all(path.stat().st_mtime_ns < finished for path in made)
+
+
+def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder]) -> None:
+    with sqlite3.connect(runs[0].path.parents[1] / "mlflow.db") as database:
+        tags = database.execute("SELECT run_uuid, key, value FROM tags").fetchall()
+        metrics = {name for (name,) in database.execute("SELECT DISTINCT key FROM metrics")}
+        inputs = database.execute("SELECT count(*) FROM datasets").fetchone()[0]
+    stages = {run: value for run, key, value in tags if key == "motion_memory.stage"}
+    parents = {run: value for run, key, value in tags if key == "mlflow.parentRunId"}
+    (parent,) = [run for run, stage in stages.items() if stage == "run"]
+    children = ["benchmark", "train combined", "train random", "train trap"]
+    assert sorted(stages.values()) == sorted([*children, "run"])
+    assert parents == {run: parent for run in stages if run != parent}
+    assert {"loss", "hit_1", "hit_5", "trap/gust/none-0/mean_ms"} <= metrics
+    assert inputs == 4
+
+
+def test_the_report_is_there(runs: tuple[RunFolder, RunFolder]) -> None:
+    drawn = {path.name for path in runs[0].figures.iterdir()}
+    assert {"planning-times.png", "retrieval.png", "problems-trap.png", "training-combined.png"} <= drawn
+    assert "follow" in runs[0].summary("md").read_text()
+
+
+def test_verify_finds_no_fault_and_then_the_one_that_is_planted(runs: tuple[RunFolder, RunFolder]) -> None:
+    folder = runs[1].path.parents[1]
+    asked = [sys.executable, "-m", "flows.cli", "verify", str(folder), "--sample", "1", "--workers", "1"]
+    done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "348 attempts made again" in done.stdout
+    damaged = runs[1].memory("trap") / "encoder.onnx"
+    damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
+    done = subprocess.run(
+        [*asked[:-3], "0", *asked[-2:]], capture_output=True, text=True, cwd=ROOT, timeout=200
+    )
+    assert done.returncode == 1
+    assert "encoder.onnx is damaged" in done.stderr

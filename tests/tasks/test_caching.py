@@ -1,0 +1,67 @@
+"""Chunks: they cover everything once, and their keys change with whatever their rows depend on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tasks import caching
+from tasks.caching import chunks_of, is_marked, key_of, mark_done
+from tasks.settings import for_preset
+
+SETTINGS = for_preset("smoke")
+
+
+@given(st.integers(0, 500), st.integers(1, 60))
+def test_chunks_cover_every_problem_once_and_in_order(count: int, size: int) -> None:
+    chunks = chunks_of("data", SETTINGS, "stage", "trap", count, size, [])
+    assert [i for chunk in chunks for i in range(chunk.first, chunk.last)] == list(range(count))
+    assert [chunk.index for chunk in chunks] == list(range(len(chunks)))
+    assert len({chunk.key for chunk in chunks}) == len(chunks)
+
+
+@given(st.integers(1, 500), st.integers(1, 60), st.integers(0, 500))
+def test_asking_for_more_keeps_the_full_chunks(count: int, size: int, more: int) -> None:
+    few = chunks_of("data", SETTINGS, "stage", "trap", count, size, [])
+    many = chunks_of("data", SETTINGS, "stage", "trap", count + more, size, [])
+    full = count // size
+    assert few[:full] == many[:full]
+
+
+@pytest.mark.parametrize(
+    "other", [("other", "trap", [1]), ("stage", "curves", [1]), ("stage", "trap", [2]), ("stage", "trap", [])]
+)
+def test_a_key_depends_on_stage_class_and_inputs(other: tuple[str, str, list[int]]) -> None:
+    stage, name, inputs = other
+    (one,) = chunks_of("data", SETTINGS, "stage", "trap", 1, 1, [1])
+    (changed,) = chunks_of("data", SETTINGS, stage, name, 1, 1, inputs)
+    assert one.key != changed.key
+
+
+def test_an_edited_source_file_changes_every_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package = tmp_path / "edited"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "module.py").write_text("ANSWER = 42\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(caching, "PACKAGES", ("edited",))
+    caching.sources_digest.cache_clear()
+    before = key_of("same")
+    (package / "module.py").write_text("ANSWER = 43\n")
+    caching.sources_digest.cache_clear()
+    after = key_of("same")
+    caching.sources_digest.cache_clear()
+    assert before != after
+
+
+def test_a_folder_is_done_only_with_its_own_key(tmp_path: Path) -> None:
+    place = tmp_path / "trap"
+    assert not is_marked(place, "key")
+    mark_done(place, "key")
+    assert not is_marked(place, "key")  # the folder itself is not there
+    place.mkdir()
+    assert is_marked(place, "key")
+    assert not is_marked(place, "another")

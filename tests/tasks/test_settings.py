@@ -1,0 +1,97 @@
+"""Settings: equal ones give equal names, and what cannot be done is refused in one line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tasks.settings import PRESETS, Assist, RunSettings, UsageError, for_preset
+
+SETTINGS = st.builds(
+    RunSettings,
+    preset=st.sampled_from(sorted(PRESETS)),
+    classes=st.lists(st.sampled_from(["curves", "random", "trap"]), unique=True).map(tuple),
+    worlds=st.lists(st.sampled_from(["/a/forest", "/b/gaps"]), unique=True).map(tuple),
+    difficulty=st.sampled_from(["easy", "standard", "hard"]),
+    seed=st.integers(0, 2**31),
+    objective=st.sampled_from(["labels", "triplet"]),
+    experiences=st.integers(1, 1000),
+    problems_per_experience=st.integers(1, 1000),
+    test_problems=st.integers(1, 10_000),
+    collector=st.just("rrt"),
+    planners=st.just(("rrt", "gust")),
+    assists=st.lists(st.builds(Assist, st.sampled_from(["closed", "open"]), st.integers(1, 9))).map(tuple),
+    epochs=st.integers(1, 60),
+    combined=st.booleans(),
+    strict=st.booleans(),
+)
+
+
+@given(SETTINGS)
+def test_settings_come_back_from_json(settings: RunSettings) -> None:
+    again = RunSettings.from_json(settings.to_json())
+    assert again == settings
+    assert again.run_name == settings.run_name
+
+
+@given(SETTINGS, SETTINGS)
+def test_runs_share_a_name_only_if_their_rows_are_the_same(one: RunSettings, other: RunSettings) -> None:
+    assert (one.run_name == other.run_name) == (replace(one, strict=False) == replace(other, strict=False))
+
+
+def test_neither_the_place_of_worlds_nor_strictness_is_part_of_the_name(tmp_path: Path) -> None:
+    names = set()
+    for place in ("here", "there"):
+        for part in ("train", "test"):
+            (tmp_path / place / "forest" / part).mkdir(parents=True)
+        for strict in (False, True):
+            worlds = [str(tmp_path / place / "forest")]
+            names.add(for_preset("smoke", worlds=worlds, strict=strict).run_name)
+    assert len(names) == 1
+
+
+def test_a_run_name_says_preset_objective_and_digest() -> None:
+    preset, objective, digest = for_preset("laptop", objective="triplet").run_name.split("-")
+    assert (preset, objective, len(digest)) == ("laptop", "triplet", 8)
+
+
+def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Path) -> None:
+    for part in ("train", "test"):
+        (tmp_path / "forest" / part).mkdir(parents=True)
+    worlds = [str(tmp_path / "forest")]
+    assert for_preset("smoke", worlds=worlds).class_names == ("forest",)
+    assert for_preset("smoke", worlds=worlds, classes=["trap"]).class_names == ("trap", "forest")
+    with pytest.raises(UsageError, match="Two classes would be called forest"):
+        for_preset("smoke", worlds=worlds * 2)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"preset": "huge"}, "Unknown preset 'huge'. Known: smoke, laptop, paper."),
+        ({"classes": ["maze"]}, "Unknown class 'maze'. Known: curves, random, trap."),
+        ({"classes": []}, "No class to work on. Name some of: curves, random, trap."),
+        ({"planners": ["prm"]}, "Unknown planner 'prm'. Known: rrt, gust, follow."),
+        ({"planners": []}, "No planner to measure. Name some of: rrt, gust, follow."),
+        ({"difficulty": "odd"}, "Unknown difficulty 'odd'. Known: easy, standard, hard."),
+        ({"objective": "luck"}, "Unknown objective 'luck'. Known: labels, triplet."),
+        ({"experiences": 0}, "0 experiences: give 1 or more."),
+        ({"test_problems": -5}, "-5 test problems: give 1 or more."),
+        ({"seed": -1}, "Seed -1 is negative. Give 0 or more."),
+        ({"worlds": ["/nowhere"]}, "/nowhere is no folder of worlds: it has no train in it."),
+    ],
+)
+def test_what_cannot_be_done_is_refused_in_one_line(wrong: dict[str, object], told: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        for_preset(**wrong)  # type: ignore[arg-type]
+    assert str(refused.value) == told
+
+
+def test_settings_of_another_version_say_so() -> None:
+    text = for_preset("smoke").to_json().replace('"seed"', '"sead"')
+    with pytest.raises(ValueError, match="another version: sead, seed"):
+        RunSettings.from_json(text)
