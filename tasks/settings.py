@@ -107,8 +107,8 @@ class _Preset(NamedTuple):
 
 PRESETS: Final = {
     "smoke": _Preset(6, 20, 20, 2, False),
-    "laptop": _Preset(100, 200, 1_000, 5, False),
-    "paper": _Preset(100, 1_000, 10_000, 5, True),
+    "laptop": _Preset(100, 200, 1_000, 10, False),
+    "paper": _Preset(100, 1_000, 10_000, 10, True),
 }
 
 

@@ -19,10 +19,13 @@ BATCH = 256  # grids embedded at once
 NO_PLAN_ODDS = 20.0  # recalling in vain costs microseconds, not recalling a free plan costs a search
 
 
-def centroids_of(encoder: Encoder, grids_packed: Grid, plan_index: Integers, plans: int) -> Floats32:
+def centroids_of(
+    encoder: Encoder, grids_packed: Grid, plan_index: Integers, plans: int
+) -> tuple[Floats32, float]:
     """Mean embedding ``[N + 1, D]`` of each plan's problems (bits uint8 ``[n, 512]``); row 0: of those of -1.
 
-    Row 0 without problems is infinitely far from everything; a plan without problems is a ValueError.
+    With it their scatter: the mean squared distance of a problem to its own row. Row 0 without problems
+    is infinitely far from everything; a plan without problems is a ValueError.
     """
     embeddings = np.concatenate(
         [
@@ -42,7 +45,9 @@ def centroids_of(encoder: Encoder, grids_packed: Grid, plan_index: Integers, pla
     np.add.at(sums, rows, embeddings)
     if counts[0] == 0:
         sums[0], counts[0] = np.inf, 1
-    return (sums / counts[:, np.newaxis]).astype(np.float32)
+    centroids = sums / counts[:, np.newaxis]
+    scatter = np.square(embeddings - centroids[rows]).sum(1).mean()
+    return centroids.astype(np.float32), float(scatter)
 
 
 def nearest_readout(centroids: Floats32) -> tuple[Floats32, Floats32]:
@@ -51,9 +56,7 @@ def nearest_readout(centroids: Floats32) -> tuple[Floats32, Floats32]:
     ``|e - c|^2 = |e|^2 - 2 (c . e - |c|^2 / 2)``. An infinitely far row never wins.
     """
     vectors = np.where(np.isfinite(centroids), centroids, np.float32(0.0))
-    biases = np.where(
-        np.isfinite(centroids).all(1), -0.5 * np.square(vectors).sum(1), np.float32(-np.inf)
-    )
+    biases = np.where(np.isfinite(centroids).all(1), -0.5 * np.square(vectors).sum(1), np.float32(-np.inf))
     return vectors, biases.astype(np.float32)
 
 
@@ -68,9 +71,12 @@ def build_memory(
 ) -> Memory:
     """Memory of N ``plans`` from the problems of training: bits uint8 ``[n, 512]``, plan indices ``[n]``."""
     encoder = Encoder(to_onnx(trained.weights))
-    centroids = centroids_of(encoder, grids_packed, plan_index, len(plans))
+    centroids, scatter = centroids_of(encoder, grids_packed, plan_index, len(plans))
     if trained.vectors is None or trained.biases is None:
+        # Recall unless c_0 is clearly nearer, by twice the scatter in squared distance: with no margin 21 %
+        # of the solvable problems of class random were given up, with it 3 % (one seed).
         vectors, biases = nearest_readout(centroids)
+        biases[0] -= np.float32(scatter)
     else:  # logits: recall unless the odds that no plan is free are that many times those of the best plan
         vectors, biases = trained.vectors, trained.biases.copy()
         biases[0] -= np.float32(np.log(NO_PLAN_ODDS))

@@ -179,9 +179,7 @@ def _with_blocking(obstacles: Obstacles, extra: Obstacles, sweeps: PlanSweeps, f
     """``obstacles`` and those of ``extra`` that block a plan which is ``free`` (updated in place)."""
     vertices = np.empty((obstacles.vertices.shape[0] + extra.vertices.shape[0], 2))
     piece_starts = np.zeros(obstacles.piece_starts.shape[0] + extra.piece_starts.shape[0], np.int32)
-    obstacle_starts = np.zeros(
-        obstacles.obstacle_starts.shape[0] + extra.obstacle_starts.shape[0], np.int32
-    )
+    obstacle_starts = np.zeros(obstacles.obstacle_starts.shape[0] + extra.obstacle_starts.shape[0], np.int32)
     result = Obstacles(vertices, piece_starts, obstacle_starts)
     count = 0
     for o in range(obstacles.obstacle_starts.shape[0] - 1):

@@ -99,10 +99,7 @@ def train(
     if settings.objective == "labels":
         rng = generator(settings.seed, "readout")
         objective = Labels(free_rows.shape[1], settings.architecture.dimensions, rng, device)
-    orders = [
-        training[objective.epoch(plan_index[training], generator(settings.seed, "epoch", i))]
-        for i in range(settings.epochs)
-    ]
+    orders = [generator(settings.seed, "epoch", i).permutation(training) for i in range(settings.epochs)]
     sample = orders[0][_first_of_each(plan_index[orders[0]], CENTROID_SAMPLE)]
     history: list[Epoch] = []
     with _deterministic(settings.threads):
@@ -114,9 +111,7 @@ def train(
         trained = [*parameters.values(), *objective.parameters]
         for parameter in trained:
             parameter.requires_grad_(True)
-        optimiser = torch.optim.AdamW(
-            trained, lr=settings.learning_rate, weight_decay=settings.weight_decay
-        )
+        optimiser = torch.optim.AdamW(trained, lr=settings.learning_rate, weight_decay=settings.weight_decay)
         steps = sum(-(-len(each) // settings.batch) for each in orders)
         schedule = torch.optim.lr_scheduler.OneCycleLR(
             optimiser, settings.learning_rate, total_steps=steps, pct_start=WARM_UP
