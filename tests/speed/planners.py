@@ -49,7 +49,7 @@ def measure(runs: dict[str, Run], problems: list[Problem]) -> dict[str, list[tup
 
 
 def cells(rows: list[tuple[Outcome, float]]) -> list[str]:
-    """Solved share, median, mean and 90 % ms, roadmap median ms, checks a problem, million checks a second."""
+    """Solved share; median, mean and 90 % ms; roadmap median ms; checks a problem; million checks a second."""
     seconds = np.array([second for _, second in rows])
     checks = np.array([outcome.collision_checks for outcome, _ in rows])
     return [
