@@ -53,7 +53,7 @@ class FollowSettings(NamedTuple):
     median time.
     """
 
-    gust: GustSettings = GustSettings(roadmap=RoadmapSettings(clearance_exponent=1.0))
+    gust: GustSettings = GustSettings(roadmap=RoadmapSettings(batch=60, clearance_exponent=1.0))
     spacing_m: float = 5.0  # R: between waypoints, and the radius of the tube around the lead
     passing_m: float = 3.0  # a waypoint is passed within this distance
     near_radius_m: float = 2.0  # targets: around the next waypoint, one radius or the other
