@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Final
+from types import FrameType
+from typing import Final
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError
+
+from flows.options import Options, worker_count
 
 FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
+GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to tell the server and to take workers along
 
 app = App(
     name="motion-memory",
@@ -22,52 +27,6 @@ app = App(
     version_flags=[],
     suppress_keyboard_interrupt=False,
 )
-
-
-def _default_data() -> Path:
-    return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Options:
-    """What a run is and where it happens.
-
-    Parameters
-    ----------
-    preset
-        Size of the run: smoke (seconds), laptop (minutes) or paper (hours).
-    classes
-        Generated problem classes; all of them by default, none beside --worlds.
-    worlds
-        A folder of worlds with parts train and test: one more class. Can be given several times.
-    difficulty
-        Of the generated classes: easy, standard or hard.
-    seed
-        Everything random follows from it.
-    objective
-        What the encoder is trained for: labels or triplet.
-    data
-        Data folder; default $MOTION_MEMORY_DATA or ./data.
-    workers
-        Worker processes; default one a core.
-    scheduler
-        Address of a Dask scheduler to use instead, like tcp://host:8786.
-    strict
-        Stop at a bad world instead of skipping it.
-
-    """
-
-    preset: str = "laptop"
-    classes: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
-    worlds: Annotated[list[Path] | None, Parameter(negative=())] = None
-    difficulty: str = "standard"
-    seed: int = 1
-    objective: str = "labels"
-    data: Path | None = None
-    workers: int | None = None
-    scheduler: str | None = None
-    strict: Annotated[bool, Parameter(negative=())] = False
 
 
 NO_OPTIONS: Final = Options()
@@ -131,7 +90,7 @@ def verify_folder(folder: Path, *, sample: float = 0.02, workers: int | None = N
     """
     from tasks.session import verify
 
-    verify(folder, sample, _workers(workers))
+    verify(folder, sample, worker_count(workers))
 
 
 @app.command
@@ -229,18 +188,10 @@ def _do(stage: str, options: Options) -> None:
         f"flows.{stage}",
         stage,
         settings,
-        options.data or _default_data(),
-        _workers(options.workers),
+        options.folder,
+        worker_count(options.workers),
         options.scheduler,
     )
-
-
-def _workers(asked: int | None) -> int:
-    from tasks.settings import UsageError
-
-    if asked is not None and asked < 1:
-        raise UsageError(f"{asked} workers: give 1 or more.")
-    return asked or os.cpu_count() or 1
 
 
 def call(arguments: Sequence[str] | None = None) -> int:
@@ -254,7 +205,6 @@ def call(arguments: Sequence[str] | None = None) -> int:
             result_action="return_none",
         )
     except KeyboardInterrupt:
-        print("Interrupted; the same command goes on where it stopped.", file=sys.stderr)
         return INTERRUPTED
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else FAILURE
@@ -279,11 +229,21 @@ def _one_line(error: Exception) -> str:
 
 def main() -> None:
     """Entry point of the console script."""
+    signal.signal(signal.SIGINT, _interrupt)
     code = call()
     sys.stdout.flush()
     sys.stderr.flush()
     if code:
         os._exit(code)  # what still runs in threads is not waited for
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    """End in order, but soon: what hangs is left, and dies with this process."""
+    last = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
+    last.daemon = True
+    last.start()
+    print("Interrupted; the same command goes on where it stopped.", file=sys.stderr)
+    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":

@@ -52,9 +52,8 @@ def _workers_for(
     with ExitStack() as stack:
         if name in ("run", "train", "build_memory", "report"):
             tracker(str(folder.path))
-        if name != "report":
-            address = stack.enter_context(cluster(workers, scheduler))
-            stack.enter_context(warm_up(address) if scheduler is None else nullcontext())
+        address = stack.enter_context(cluster(workers, scheduler))
+        stack.enter_context(warm_up(address) if scheduler is None and name != "report" else nullcontext())
         if server is not None:
             print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
             server.wait()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -18,17 +20,26 @@ from storage.layout import DataFolder, RunFolder
 from storage.memories import load_memory
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.timeout(600)  # three runs, on a machine that may be busy
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunFolder, RunFolder]:
-    """Folders of the same run with two workers and with one."""
-    places = [tmp_path_factory.mktemp("two"), tmp_path_factory.mktemp("one")]
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    environment["PYTHONPATH"] = str(ROOT)
-    script = [sys.executable, str(Path(__file__).with_name("small_run.py")), *map(str, places)]
-    done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=220)
-    assert done.returncode == 0, done.stderr[-2000:]
+def runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> tuple[RunFolder, RunFolder]:
+    """Folders of the same run with two workers and with one; made once for all processes of the tests."""
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared if worker_id == "master" else shared.parent
+    places = [shared / "two-workers", shared / "one-worker"]
+    with (shared / "small-run.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (shared / "small-run.done").exists():
+            environment = {
+                name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")
+            }
+            environment["PYTHONPATH"] = str(ROOT)
+            script = [sys.executable, str(Path(__file__).with_name("small_run.py")), *map(str, places)]
+            done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=500)
+            assert done.returncode == 0, done.stderr[-2000:]
+            (shared / "small-run.done").touch()
     two, one = (DataFolder(place).runs() for place in places)
     assert len(two) == len(one) == 1
     return two[0], one[0]
@@ -111,13 +122,17 @@ def test_the_report_is_there(runs: tuple[RunFolder, RunFolder]) -> None:
     assert "follow" in runs[0].summary("md").read_text()
 
 
-def test_verify_finds_no_fault_and_then_the_one_that_is_planted(runs: tuple[RunFolder, RunFolder]) -> None:
-    folder = runs[1].path.parents[1]
+def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
+    runs: tuple[RunFolder, RunFolder], tmp_path: Path
+) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(runs[1].path.parents[1], folder)
+    (run,) = DataFolder(folder).runs()
     asked = [sys.executable, "-m", "flows.cli", "verify", str(folder), "--sample", "1", "--workers", "1"]
     done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
     assert (done.returncode, done.stderr) == (0, "")
     assert "348 attempts made again" in done.stdout
-    damaged = runs[1].memory("trap") / "encoder.onnx"
+    damaged = run.memory("trap") / "encoder.onnx"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
     done = subprocess.run(
         [*asked[:-3], "0", *asked[-2:]], capture_output=True, text=True, cwd=ROOT, timeout=200

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import subprocess
@@ -15,15 +16,30 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What ``odd_chunks.py`` prints; a process of its own, since Prefect reads its settings when imported."""
-    data = tmp_path_factory.mktemp("odd")
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    environment["PYTHONPATH"] = str(ROOT)
-    script = [sys.executable, str(Path(__file__).with_name("odd_chunks.py")), str(data)]
-    done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=200)
-    assert done.returncode == 0, done.stderr
-    result: dict[str, Any] = json.loads(done.stdout)
+def found(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> dict[str, Any]:
+    """What ``odd_chunks.py`` prints; a process of its own, since Prefect reads its settings when imported.
+
+    Made once for all processes of the tests.
+    """
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared if worker_id == "master" else shared.parent
+    with (shared / "odd-chunks.json").open("a+") as printed:
+        fcntl.flock(printed, fcntl.LOCK_EX)
+        printed.seek(0)
+        text = printed.read()
+        if not text:
+            data = shared / "odd-chunks"
+            data.mkdir()
+            environment = {
+                name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")
+            }
+            environment["PYTHONPATH"] = str(ROOT)
+            script = [sys.executable, str(Path(__file__).with_name("odd_chunks.py")), str(data)]
+            done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=200)
+            assert done.returncode == 0, done.stderr
+            text = done.stdout
+            printed.write(text)
+    result: dict[str, Any] = json.loads(text)
     return result
 
 

@@ -1,0 +1,73 @@
+"""Draw: the training of each memory, and some problems of each class with what was recalled and found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pandas as pd
+
+from dashboards.charts import training_curves
+from dashboards.pictures import Example, gallery
+from dashboards.style import save
+from planners.solve import solve
+from storage.encoders import load_encoder
+from storage.memories import load_memory
+from storage.results import read_attempts
+from tasks.benchmark import benchmark_chunks
+from tasks.caching import Chunk, chunk_task, chunks_of
+from tasks.settings import RunSettings
+from tasks.train import memory_names
+from tasks.worlds import source_of
+
+SHOWN_PLANNER: Final = "gust"
+SHOWN_TOP_K: Final = 5
+SHOWN_SOURCES: Final = ("recalled", "searched")
+SHOWN_EACH: Final = 2
+
+
+def draw_chunk(chunk: Chunk) -> dict[str, Any]:
+    """Draw the figures of one memory."""
+    run, name = chunk.run, chunk.class_name
+    history = load_encoder(run.model(name)).history
+    epochs = pd.DataFrame(epoch._asdict() for epoch in history)
+    drawn = save(training_curves(epochs), run.figures, f"training-{name}")
+    if name in chunk.settings.class_names:
+        drawn += save(gallery(list(_examples(chunk))), run.figures, f"problems-{name}")
+    return {"figures": [path.name for path in drawn]}
+
+
+draw_figures = chunk_task(draw_chunk)
+
+
+def is_drawn(chunk: Chunk) -> bool:
+    """Whether the figures of a memory are there."""
+    return (chunk.run.figures / f"training-{chunk.class_name}.svg").exists()
+
+
+def figure_chunks(data: str, settings: RunSettings) -> list[Chunk]:
+    """One chunk for each memory."""
+    rows = [chunk.key for chunk in benchmark_chunks(data, settings)]
+    return [
+        chunk
+        for name in memory_names(settings)
+        for chunk in chunks_of(data, settings, "draw", name, 1, 1, rows)
+    ]
+
+
+def _examples(chunk: Chunk) -> Iterator[Example]:
+    """Some problems, solved again, which gives the same plans."""
+    settings, name = chunk.settings, chunk.class_name
+    planner = SHOWN_PLANNER if SHOWN_PLANNER in settings.planners else settings.planners[0]
+    rows = read_attempts(chunk.run.results / name)
+    rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
+    rows = rows[(rows["assist"] == "open") & (rows["top_k"] == SHOWN_TOP_K)]
+    places = {identity: index for index, identity in enumerate(rows["problem_id"])}
+    source = source_of(chunk.data, settings, name)
+    memory = load_memory(chunk.run.memory(name))
+    for kind in SHOWN_SOURCES:
+        for identity in rows[rows["source"] == kind]["problem_id"].head(SHOWN_EACH):
+            problem = source.problem("test", places[identity])
+            attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed)
+            caption = f"{identity}: {kind}, {1000.0 * attempt.planning_seconds:.1f} ms"
+            yield Example(problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption)
