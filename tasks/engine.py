@@ -23,8 +23,7 @@ from tasks.settings import RunError
 
 KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
 CONNECT_SECONDS: Final = 5
-CLOSE_SECONDS: Final = 5
-KILLED_CLOSE_SECONDS: Final = 0.3
+CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
 LINE_SECONDS: Final = 5.0  # between lines of progress where there is no terminal
 
@@ -95,11 +94,9 @@ def _local(workers: int) -> Iterator[str]:
         )
         try:
             yield local.scheduler_address
-        except BaseException:
-            _kill(local)  # nobody waits for work that nobody wants
-            _close(local, KILLED_CLOSE_SECONDS)
-            raise
-        _close(local, CLOSE_SECONDS)
+        finally:
+            _kill(local)  # what was wanted of them is written; leaving politely takes seconds
+            _close(local)
 
 
 def _kill(local: Any) -> None:
@@ -109,9 +106,9 @@ def _kill(local: Any) -> None:
             nanny.process.process.kill()
 
 
-def _close(local: Any, seconds: float) -> None:
+def _close(local: Any) -> None:
     with suppress(TimeoutError):  # what is left then dies with this process
-        local.close(timeout=seconds)
+        local.close(timeout=CLOSE_SECONDS)
 
 
 def fan_out(

@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Final
+
+import numpy as np
 
 from planners.memory.experience import Experience
 from planners.memory.hallucination import METHODS, hallucinate, no_plan
 from planners.memory.labels import free_plans
+from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.classes import CLASSES, problem_class
 from planners.world.collision import scene_of
+from planners.world.dynamics import simulate
 from planners.world.occupancy import occupancy_of
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    CAR,
+    GOAL_RADIUS,
+    Plan,
+    Problem,
+    obstacles_of,
+    start_state,
+)
 from planners.world.randomness import generator
 from tasks.engine import Client
 from tasks.settings import COLLECTOR
+
+EMPTY: Final = Problem(
+    "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
+)
 
 
 @contextmanager
@@ -29,30 +48,29 @@ def warm_up(scheduler: str) -> Iterator[None]:
 
 
 def _compile_collecting() -> None:
-    """What collect needs."""
-    for name in CLASSES:
-        solve(problem_class(name).draw(0, 0), COLLECTOR)
+    """The collecting planner."""
+    solve(EMPTY, COLLECTOR)
 
 
 def _compile_hallucination() -> None:
-    """What hallucinate needs, and the planner without a roadmap."""
-    origin = problem_class(CLASSES[0], "easy")
-    for index in itertools.count():
-        problem = origin.draw(0, index)
-        attempt = solve(problem, "rrt")
-        if attempt.plan is not None:
-            experience = Experience(problem, attempt.plan)
-            break
-    for method in METHODS:
-        made = hallucinate(method, experience, origin.draw_obstacles, generator(0), 0)
-        free_plans(experience.sweep, scene_of(made))
-        occupancy_of(made)
-    no_plan(experience.sweep, origin.draw_obstacles, generator(0), origin.name, 0)
+    """Drawing problems, and what hallucinate makes of them."""
+    controls = np.tile([CAR.max_acceleration, 0.0], (140, 1))
+    plan = Plan(simulate(start_state(EMPTY), controls, CAR), controls)
+    end = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
+    experience = Experience(replace(EMPTY, goal=end), plan)
+    for name in CLASSES:
+        draw = problem_class(name).draw_obstacles
+        for method in METHODS:
+            made = hallucinate(method, experience, draw, generator(0), 0)
+            free_plans(experience.sweep, scene_of(made))
+            occupancy_of(made)
+        no_plan(experience.sweep, draw, generator(0), name, 0)
 
 
 def _compile_rest() -> None:
     """What only the benchmark needs."""
-    solve(problem_class(CLASSES[0]).draw(0, 0), "gust")
+    for planner in PLANNERS:
+        solve(EMPTY, planner)
 
 
 # In the order of need: of two workers each compiles one of the first two, and whoever is free the last.

@@ -86,7 +86,8 @@ def step_margin(speed: float, steering: float, car: Vehicle) -> float:
 def simulate(start: Floats, controls: Floats, car: Vehicle) -> Floats:
     """States ``[T, 5]`` that ``controls [T-1, 2]`` drive through from ``start [5]``."""
     states = np.empty((controls.shape[0] + 1, 5))
-    states[0] = start
+    for k in range(5):  # one by one: assigning a row compiles for two seconds
+        states[0, k] = start[k]
     for i in range(controls.shape[0]):
         s = states[i]
         x, y, heading, speed, steering = step(
