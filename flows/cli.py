@@ -233,8 +233,7 @@ def main() -> None:
     code = call()
     sys.stdout.flush()
     sys.stderr.flush()
-    if code:
-        os._exit(code)  # what still runs in threads is not waited for
+    os._exit(code)  # threads of Prefect and Dask would wait for servers that are gone
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
