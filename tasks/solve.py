@@ -9,7 +9,7 @@ from typing import Final
 from dashboards.pictures import picture
 from planners.memory.recall import Memory
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, Attempt, solve
+from planners.solve import ASSISTS, Attempt, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from storage.errors import StorageError
@@ -66,7 +66,8 @@ class Assistant:
         memory = self.memory_of(problem.class_name)
         attempt = solve(canonical, self.planner, self.assist, self.top_k, memory, self.seed)
         check_attempt(canonical, attempt, set())
-        recalled = [from_canonical(memory.plans[i], alignment) for i in attempt.recalled] if memory else []
+        stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
+        recalled = [from_canonical(plan, alignment) for plan in stored]
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
 
 
@@ -99,6 +100,9 @@ def plan_one(
     if plan is None:
         raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
     print(f"{told}, {plan.length_m:.1f} m, {plan.duration_s:.1f} s")
+    for what, place in (("plan", out), ("picture", drawing)):
+        if place is not None:
+            print(f"{what:8} {place}")
 
 
 def solve_many(

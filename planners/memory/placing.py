@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from planners.world.collision import box_meets_piece
+from planners.world.collision import box_meets_piece, edge_normals
 from planners.world.jit import jit
 from planners.world.problem import Floats, Obstacles
 
@@ -82,18 +82,12 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
     for p in range(first_piece, last_piece):
         vertices = obstacles.vertices[obstacles.piece_starts[p] : obstacles.piece_starts[p + 1]]
         count = vertices.shape[0]
+        edge_normals(vertices, 0, count, normals, offsets)
         x_min = math.inf
         y_min = math.inf
         x_max = -math.inf
         y_max = -math.inf
         for i in range(count):
-            j = i + 1 if i + 1 < count else 0
-            ex = vertices[j, 0] - vertices[i, 0]
-            ey = vertices[j, 1] - vertices[i, 1]
-            length = math.hypot(ex, ey)
-            normals[i, 0] = ey / length
-            normals[i, 1] = -ex / length
-            offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
             x_min = min(x_min, vertices[i, 0])
             x_max = max(x_max, vertices[i, 0])
             y_min = min(y_min, vertices[i, 1])

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planners.search.clearance import clearance, strip_is_free
 from planners.search.neighbours import (
     Buckets,
     Indices,
@@ -23,7 +24,7 @@ from planners.search.neighbours import (
 )
 from planners.search.outcome import Guide
 from planners.search.sampling import guided
-from planners.world.collision import REACH_M, Scene, box_is_free
+from planners.world.collision import Scene, box_is_free
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats
 from planners.world.vehicle import Vehicle
@@ -92,59 +93,6 @@ def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
         np.empty(neighbours, np.int64),
         np.empty(neighbours),
     )
-
-
-@jit
-def clearance(x: float, y: float, limit: float, scene: Scene) -> float:
-    """Distance in metres from a point to the nearest obstacle or bound, at most ``limit``."""
-    bounds = scene.bounds
-    best = min(limit, x - bounds[0], bounds[2] - x, y - bounds[1], bounds[3] - y)
-    vertices = scene.vertices
-    starts = scene.piece_starts
-    for p in range(starts.shape[0] - 1):
-        outside = -math.inf  # the largest edge distance is a lower bound of the distance to the piece
-        edge = starts[p]
-        for i in range(starts[p], starts[p + 1]):
-            gap = scene.normals[i, 0] * x + scene.normals[i, 1] * y - scene.offsets[i]
-            if gap > outside:
-                outside = gap
-                edge = i
-                if outside >= best:
-                    break
-        if outside >= best:
-            continue
-        if outside <= 0.0:
-            return 0.0
-        # beyond an end of that edge a corner is nearer still: measure to the edge itself
-        other = edge + 1 if edge + 1 < starts[p + 1] else starts[p]
-        ex = vertices[other, 0] - vertices[edge, 0]
-        ey = vertices[other, 1] - vertices[edge, 1]
-        dx = x - vertices[edge, 0]
-        dy = y - vertices[edge, 1]
-        share = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-        best = min(best, math.hypot(dx - share * ex, dy - share * ey))
-    return float(max(best, 0.0))
-
-
-@jit
-def strip_is_free(
-    ax: float, ay: float, bx: float, by: float, half_width: float, roadmap: Roadmap, scene: Scene
-) -> bool:
-    """Whether a strip from a to b is free, as boxes short enough for the scene's cells."""
-    length = math.hypot(bx - ax, by - ay)
-    if length == 0.0:
-        return True
-    cos = (bx - ax) / length
-    sin = (by - ay) / length
-    longest = 1.9 * math.sqrt(REACH_M * REACH_M - half_width * half_width)
-    pieces = math.ceil(length / longest)
-    half = 0.5 * length / pieces
-    for i in range(pieces):
-        along = (2 * i + 1) * half
-        roadmap.counts[CHECKS] += 1
-        if not box_is_free(ax + along * cos, ay + along * sin, cos, sin, half, half_width, scene):
-            return False
-    return True
 
 
 @jit
@@ -243,15 +191,15 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, 
             cost += roadmap.distances[node]
             if cost < roadmap.distances[other] and roadmap.edge_state[edge // 2] != BLOCKED:
                 if roadmap.edge_state[edge // 2] == UNKNOWN:
-                    free = strip_is_free(
+                    free, checks = strip_is_free(
                         nodes[node, 0],
                         nodes[node, 1],
                         nodes[other, 0],
                         nodes[other, 1],
                         0.5 * car.width,
-                        roadmap,
                         scene,
                     )
+                    roadmap.counts[CHECKS] += checks
                     roadmap.edge_state[edge // 2] = FREE if free else BLOCKED
                 if roadmap.edge_state[edge // 2] == FREE:
                     roadmap.distances[other] = cost

@@ -72,6 +72,19 @@ def box_meets_piece(
     return not (low_u > half_length or high_u < -half_length or low_w > half_width or high_w < -half_width)
 
 
+@inlined
+def edge_normals(vertices: Floats, first: int, last: int, normals: Floats, offsets: Floats) -> None:
+    """Fill in outward unit normals and offsets (as in ``Scene``) of the piece ``vertices[first : last]``."""
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        ex = vertices[j, 0] - vertices[i, 0]
+        ey = vertices[j, 1] - vertices[i, 1]
+        length = math.hypot(ex, ey)
+        normals[i, 0] = ey / length
+        normals[i, 1] = -ex / length
+        offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
+
+
 @jit
 def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
     """Edge normals and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
@@ -82,14 +95,7 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
     for p in range(pieces):
         first = piece_starts[p]
         last = piece_starts[p + 1]
-        for i in range(first, last):
-            j = i + 1 if i + 1 < last else first
-            ex = vertices[j, 0] - vertices[i, 0]
-            ey = vertices[j, 1] - vertices[i, 1]
-            length = math.hypot(ex, ey)
-            normals[i, 0] = ey / length
-            normals[i, 1] = -ex / length
-            offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
+        edge_normals(vertices, first, last, normals, offsets)
     columns = math.ceil((bounds[2] - bounds[0]) / CELL_M) + 1
     rows = math.ceil((bounds[3] - bounds[1]) / CELL_M) + 1
     half = 0.5 * CELL_M + REACH_M
