@@ -66,8 +66,9 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
     source = source_of(chunk.data, settings, name)
     memory = load_memory(chunk.run.memory(name))
     for kind in SHOWN_SOURCES:
-        for identity in rows[rows["source"] == kind]["problem_id"].head(SHOWN_EACH):
+        shown = rows[rows["source"] == kind].head(SHOWN_EACH)
+        for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
             problem = source.problem("test", places[identity])
             attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed)
-            caption = f"{identity}: {kind}, {1000.0 * attempt.planning_seconds:.1f} ms"
+            caption = f"{identity}: {kind}, {1000.0 * seconds:.1f} ms"
             yield Example(problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption)
