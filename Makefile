@@ -5,14 +5,13 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TORCH := torch==2.13.0
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
-export PYTHONWARNINGS ?= default
 
 .PHONY: run smoke test test-slow check speed format clean
 
 run: $(READY)  ## the main job: every stage on the three classes, under 10 minutes on 2 cores
 	$(BIN)/motion-memory run --preset laptop
 
-smoke: $(READY)  ## the same, tiny: under a minute
+smoke: $(READY)  ## the same, tiny: about a minute
 	$(BIN)/motion-memory run --preset smoke
 
 test: $(READY)  ## the test suite, in parallel

@@ -40,11 +40,11 @@ _CURVES_STANDARD: Final = Curves(
     small=Scatter(sites=16, presence=0.85, jitter_m=1.25, radius_min_m=0.8, radius_max_m=1.8, strays=0),
 )
 _CURVES: Final = {
-    # 0.994; 1.10, 1.28 ms; 9.4 x
+    # 1.000; 0.96, 1.08 ms; 9.4 x
     "easy": _CURVES_STANDARD._replace(curves=3, outer_m=24.0, gap_m=6.0, presence=0.8),
-    # 0.880; 1.27, 1.64 ms; 31.2 x
+    # 0.942; 1.23, 1.56 ms; 31.2 x
     "standard": _CURVES_STANDARD,
-    # 0.450; 2.01, 3.13 ms; 59.0 x
+    # 0.482; 2.53, 3.97 ms; 59.0 x
     "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=29.0, gap_m=4.25),
 }
 
@@ -52,11 +52,11 @@ _RANDOM_STANDARD: Final = Random(
     Scatter(sites=36, presence=0.97, jitter_m=0.5, radius_min_m=2.9, radius_max_m=4.2, strays=0)
 )
 _RANDOM: Final = {
-    # 1.000; 0.98, 1.05 ms; 4.8 x
+    # 1.000; 0.98, 1.04 ms; 4.8 x
     "easy": Random(_RANDOM_STANDARD.shapes._replace(radius_min_m=1.8, radius_max_m=2.8)),
-    # 0.948; 1.15, 1.32 ms; 24.6 x
+    # 0.948; 1.05, 1.24 ms; 24.6 x
     "standard": _RANDOM_STANDARD,
-    # 0.678; 1.25, 1.64 ms; 32.7 x
+    # 0.696; 1.45, 1.80 ms; 32.7 x
     "hard": Random(_RANDOM_STANDARD.shapes._replace(sites=38, jitter_m=0.8, strays=2)),
 }
 
@@ -71,11 +71,11 @@ _TRAP_STANDARD: Final = Trap(
     small=Scatter(sites=26, presence=0.85, jitter_m=2.0, radius_min_m=1.0, radius_max_m=2.5, strays=1),
 )
 _TRAP: Final = {
-    # 0.986; 0.97, 1.03 ms; 9.3 x
+    # 0.986; 1.21, 1.25 ms; 9.3 x
     "easy": _TRAP_STANDARD._replace(width_m=18.0, flank_m=12.0, gap_m=9.0, depth_m=8.0),
-    # 0.952; 1.03, 1.16 ms; 26.4 x
+    # 0.938; 1.34, 1.45 ms; 26.4 x
     "standard": _TRAP_STANDARD,
-    # 0.762; 1.25, 5.73 ms; 46.5 x
+    # 0.758; 1.20, 5.32 ms; 46.5 x
     "hard": _TRAP_STANDARD._replace(width_m=26.0, flank_m=18.0, gap_m=6.0, depth_m=14.0),
 }
 
