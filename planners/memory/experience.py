@@ -12,7 +12,7 @@ from planners.world.vehicle import CAR, Vehicle
 
 @dataclass(frozen=True, eq=False)
 class Experience:
-    """One solved problem: the pair ``(S_i, P_i)`` of method.md, in the canonical frame."""
+    """One solved problem: the pair ``(S_i, P_i)`` of docs/method.md, in the canonical frame."""
 
     problem: Problem
     plan: Plan
