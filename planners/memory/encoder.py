@@ -1,6 +1,6 @@
 """The encoder: occupancy grid to embedding, and its runtime, which needs no torch.
 
-Convolutions with PReLU, then fully connected layers, no normalisation, as published (algorithms.md). In place
+Convolutions with PReLU, then fully connected layers, no normalisation, as published. In place
 of max-pooling the first convolution takes patches of 4x4 cells with stride 4: where exactly an obstacle lies
 decides whether a plan is free, and pooling loses it. On fresh problems of class random the first plan was
 free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of training).
