@@ -16,19 +16,13 @@ from planners.world.problem import (
     CANONICAL_START,
     CAR,
     GOAL_RADIUS,
-    Floats,
     Obstacles,
     Plan,
     Problem,
     obstacles_of,
 )
 from planners.world.randomness import generator
-
-
-def box(x: float, y: float, angle: float, half_length: float, half_width: float) -> Floats:
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [half_length, half_width]
-    cos, sin = math.cos(angle), math.sin(angle)
-    return corners @ np.array([[cos, sin], [-sin, cos]]) + [x, y]
+from tests.worlds import box
 
 
 def boxes(rng: np.random.Generator, count: int = 12) -> Obstacles:
