@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 
-from planners.memory.labels import PlanSweeps, sweep_plans, swept_boxes
+from planners.memory.labels import PlanSweeps, sweep_plans
+from planners.world.bodies import swept_boxes
 from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
@@ -16,14 +17,14 @@ class Experience:
 
     problem: Problem
     plan: Plan
-    car: Vehicle = CAR
+    vehicle: Vehicle = CAR
 
     @functools.cached_property
     def boxes(self) -> Floats:
-        """The plan's swept boxes ``[T, 6]`` in driving order, columns as in ``PlanSweeps``."""
-        return swept_boxes(self.plan.states, self.car)
+        """The plan's swept boxes ``[T * B, 6]`` in driving order, columns as in ``PlanSweeps``."""
+        return swept_boxes(self.plan.states, self.vehicle)
 
     @functools.cached_property
     def sweep(self) -> PlanSweeps:
         """The plan, ready to be checked against many problems."""
-        return sweep_plans([self.plan], self.car)
+        return sweep_plans([self.plan], self.vehicle)

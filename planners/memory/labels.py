@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planners.world.bodies import body_count, swept_boxes
 from planners.world.collision import Scene, box_is_free
-from planners.world.dynamics import step_margin
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers, Plan
 from planners.world.vehicle import CAR, Vehicle
@@ -53,30 +53,18 @@ def coarse_to_fine(count: int) -> Integers:
     return order
 
 
-@jit
-def swept_boxes(states: Floats, car: Vehicle) -> Floats:
-    """Boxes ``[T, 6]`` (as in ``PlanSweeps``) that ``collision.state_is_free`` tests, in driving order."""
-    ahead = 0.5 * (car.front - car.rear)
-    boxes = np.empty((states.shape[0], 6))
-    for i in range(states.shape[0]):
-        margin = step_margin(states[i, 3], states[i, 4], car)
-        cos = math.cos(states[i, 2])
-        sin = math.sin(states[i, 2])
-        boxes[i, 0] = states[i, 0] + ahead * cos
-        boxes[i, 1] = states[i, 1] + ahead * sin
-        boxes[i, 2] = cos
-        boxes[i, 3] = sin
-        boxes[i, 4] = 0.5 * (car.front + car.rear) + margin
-        boxes[i, 5] = 0.5 * car.width + margin
-    return boxes
-
-
-def sweep_plans(plans: Sequence[Plan], car: Vehicle = CAR) -> PlanSweeps:
+def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
     """Pack the swept boxes of ``plans``."""
-    boxes = [swept_boxes(plan.states, car)[coarse_to_fine(len(plan.states))] for plan in plans]
+    each = body_count(vehicle)
+    boxes = [
+        swept_boxes(plan.states, vehicle)
+        .reshape(-1, each, 6)[coarse_to_fine(len(plan.states))]
+        .reshape(-1, 6)
+        for plan in plans
+    ]
     return PlanSweeps(
         np.concatenate(boxes) if boxes else np.empty((0, 6)),
-        np.cumsum([0] + [len(plan.states) for plan in plans], dtype=np.int32),
+        np.cumsum([0] + [each * len(plan.states) for plan in plans], dtype=np.int32),
         np.array([plan.states[0, :3] for plan in plans]).reshape(-1, 3),
         np.array([plan.states[-1, :2] for plan in plans]).reshape(-1, 2),
     )

@@ -20,16 +20,18 @@ from planners.search.tree import (
     plant,
 )
 from planners.world.collision import Scene, box_is_free, state_is_free
+from planners.world.dynamics import load
 from planners.world.jit import jit
-from planners.world.problem import Floats, Problem, start_state
-from planners.world.vehicle import Vehicle
+from planners.world.problem import Floats, Plan, Problem, start_state
+from planners.world.vehicle import Vehicle, state_size
 
+NO_CONTROLS = np.empty((0, 2))
 SLICE = 256  # expansions between two looks at the clock: some milliseconds
 
 
 @jit
-def _is_blocked(state: Floats, goal: Floats, car: Vehicle, scene: Scene) -> int:
-    if not state_is_free(state[0], state[1], state[2], state[3], state[4], car, scene):
+def _is_blocked(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> int:
+    if not state_is_free(load(root, 0, vehicle), vehicle, scene):
         return 1
     return 0 if box_is_free(goal[0], goal[1], 1.0, 0.0, 0.0, 0.0, scene) else 2
 
@@ -38,21 +40,25 @@ def attempt(
     problem: Problem,
     scene: Scene,
     limits: Limits,
-    car: Vehicle,
+    vehicle: Vehicle,
+    prefix: Plan | None,
     prepare: Callable[[Tree, Floats], None],
     grow: Callable[[Tree, Floats, int], None],
 ) -> Outcome:
     """Plant a tree, ``prepare(tree, goal)`` once (roadmaps), then ``grow(tree, goal, until)`` until solved.
 
+    The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()
-    tree = allocate_tree(limits.nodes)
-    root = start_state(problem)
+    tree = allocate_tree(limits.nodes, state_size(vehicle))
     goal = np.array([*problem.goal, problem.goal_radius])
-    plant(tree, root, scene.bounds)
+    if prefix is None:
+        prefix = Plan(start_state(problem, vehicle)[np.newaxis], NO_CONTROLS, vehicle.dt)
+    first = np.ascontiguousarray(prefix.states)
+    plant(tree, first, np.ascontiguousarray(prefix.controls), scene.bounds, limits.bound_s)
     counts = tree.counts
-    blocked = _is_blocked(root, goal, car, scene)
+    blocked = _is_blocked(first, goal, vehicle, scene)
     roadmap_seconds = 0.0
     if blocked:
         status = Status.START_BLOCKED if blocked == 1 else Status.GOAL_BLOCKED
@@ -71,7 +77,7 @@ def attempt(
             if perf_counter() - began > limits.seconds:
                 status = Status.TIME_SPENT
                 break
-    plan = plan_to_goal(tree, car.dt) if status is Status.SOLVED else None
+    plan = plan_to_goal(tree, vehicle.dt) if status is Status.SOLVED else None
     return Outcome(
         status=status,
         plan=plan,

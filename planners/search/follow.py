@@ -38,7 +38,7 @@ from planners.search.sampling import in_disc
 from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import jit
-from planners.world.problem import Floats, Problem
+from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 LONGEST_LEAD = 256  # waypoints
@@ -128,7 +128,7 @@ def _grow(
     lead: Lead,
     settings: FollowSettings,
     exploring: GustSettings,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
@@ -139,7 +139,7 @@ def _grow(
         known = groups.size[0]
         if marks[SINCE_GROUP] >= settings.group_patience:
             last = min(counts[EXPANSIONS] + settings.explorations, until)
-            grow_gust(tree, goal, last, roadmap, groups, exploring, car, scene, rng)
+            grow_gust(tree, goal, last, roadmap, groups, exploring, vehicle, scene, rng)
             if counts[GOAL_VERTEX] >= 0:
                 return
             marks[SINCE_GROUP] = 0
@@ -158,7 +158,7 @@ def _grow(
         lead.weights[waypoint] += math.log(settings.selection_penalty)
         radius = settings.near_radius_m if rng.random() < 0.5 else settings.far_radius_m
         x, y = in_disc(lead.points[waypoint, 0], lead.points[waypoint, 1], radius, rng)
-        vertex = choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, car, rng)
+        vertex = choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, vehicle, rng)
         first = counts[SIZE]
         marks[SINCE_FOLLOW] += 1
         marks[SINCE_GROUP] += 1
@@ -172,7 +172,7 @@ def _grow(
             settings.spacing_m,
             settings.passing_m,
             gust.extension,
-            car,
+            vehicle,
             scene,
             rng,
         )
@@ -192,7 +192,8 @@ def follow(
     guide: Guide | None = None,
     scene: Scene | None = None,
     limits: Limits | None = None,
-    car: Vehicle = CAR,
+    vehicle: Vehicle = CAR,
+    prefix: Plan | None = None,
 ) -> Outcome:
     """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
     ready = scene_of(problem) if scene is None else scene
@@ -205,14 +206,16 @@ def follow(
 
     def prepare(tree: Tree, goal: Floats) -> None:
         root = tree.states[0]
-        build_roadmap(roadmap, root, goal, guiding, on_roadmap, car, ready, rng)
+        build_roadmap(roadmap, root, goal, guiding, on_roadmap, vehicle, ready, rng)
         tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
         clear_groups(groups)
-        join_groups(tree, 0, 1, roadmap, groups, settings.gust.distance_exponent, rng)
+        size = int(tree.counts[SIZE])
+        join_groups(tree, 0, size, roadmap, groups, settings.gust.distance_exponent, rng)
         lead.marks[:] = 0
-        _new_lead(tree, node_of(roadmap, root[0], root[1]), roadmap, groups, lead, settings, rng)
+        last = tree.states[size - 1]
+        _new_lead(tree, node_of(roadmap, last[0], last[1]), roadmap, groups, lead, settings, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, car, ready, rng)
+        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), car, prepare, grow)
+    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow)

@@ -35,7 +35,7 @@ from planners.search.tree import (
 )
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import inlined, jit
-from planners.world.problem import Floats, Problem
+from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
@@ -133,7 +133,7 @@ def choose_member(
     count: int,
     x: float,
     y: float,
-    car: Vehicle,
+    vehicle: Vehicle,
     rng: np.random.Generator,
 ) -> int:
     """A vertex, the likelier the sooner it was reached and the sooner it could reach (x, y).
@@ -148,8 +148,8 @@ def choose_member(
         if tree.spent[vertex]:
             continue
         distance = math.hypot(tree.states[vertex, 0] - x, tree.states[vertex, 1] - y)
-        speed = max(0.01 * car.max_speed, tree.states[vertex, 3])
-        weight = 1.0 / (tree.depths[vertex] * car.dt + distance / speed + 1e-9)
+        speed = max(0.01 * vehicle.max_speed, tree.states[vertex, 3])
+        weight = 1.0 / (tree.depths[vertex] * vehicle.dt + distance / speed + 1e-9)
         total += weight
         if rng.random() * total < weight:  # each stays with its share, without a second pass
             chosen = vertex
@@ -164,7 +164,7 @@ def grow_gust(
     roadmap: Roadmap,
     groups: Groups,
     settings: GustSettings,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
@@ -181,9 +181,9 @@ def grow_gust(
             x, y = in_disc(point[0], point[1], settings.guide_radius_m, rng)
         else:
             x, y = in_bounds(scene.bounds, rng)
-        vertex = choose_member(tree, groups.members[node], groups.counts[node], x, y, car, rng)
+        vertex = choose_member(tree, groups.members[node], groups.counts[node], x, y, vehicle, rng)
         first = counts[SIZE]
-        added = extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, car, scene, rng)
+        added = extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return
         join_groups(tree, first, added, roadmap, groups, settings.distance_exponent, rng)
@@ -196,7 +196,8 @@ def gust(
     guide: Guide | None = None,
     scene: Scene | None = None,
     limits: Limits | None = None,
-    car: Vehicle = CAR,
+    vehicle: Vehicle = CAR,
+    prefix: Plan | None = None,
 ) -> Outcome:
     """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
     ready = scene_of(problem) if scene is None else scene
@@ -205,12 +206,12 @@ def gust(
     groups = allocate_groups(settings.roadmap.most_nodes)
 
     def prepare(tree: Tree, goal: Floats) -> None:
-        build_roadmap(roadmap, tree.states[0], goal, guiding, settings.roadmap, car, ready, rng)
+        build_roadmap(roadmap, tree.states[0], goal, guiding, settings.roadmap, vehicle, ready, rng)
         tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
         clear_groups(groups)
-        join_groups(tree, 0, 1, roadmap, groups, settings.distance_exponent, rng)
+        join_groups(tree, 0, int(tree.counts[SIZE]), roadmap, groups, settings.distance_exponent, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        grow_gust(tree, goal, until, roadmap, groups, settings, car, ready, rng)
+        grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), car, prepare, grow)
+    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
@@ -41,6 +42,7 @@ class Limits:
     expansions: int = 20_000
     nodes: int = 400_000  # tree vertices
     seconds: float = 30.0
+    bound_s: float = math.inf  # only plans that take less time than this count as solutions
 
 
 @dataclass(frozen=True, eq=False)

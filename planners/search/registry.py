@@ -12,7 +12,8 @@ from planners.search.gust import GustSettings, gust
 from planners.search.outcome import Guide, Limits, Outcome
 from planners.search.rrt import RrtSettings, rrt
 from planners.world.collision import Scene
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
+from planners.world.vehicle import CAR, Vehicle
 
 Planner = Callable[..., Outcome]
 
@@ -30,6 +31,13 @@ def plan(
     guide: Guide | None = None,
     scene: Scene | None = None,
     limits: Limits | None = None,
+    vehicle: Vehicle = CAR,
+    prefix: Plan | None = None,
 ) -> Outcome:
-    """Solve ``problem`` with the planner called ``name``, with its default settings."""
-    return PLANNERS[name](problem, rng=rng, guide=guide, scene=scene, limits=limits)
+    """Solve ``problem`` with the planner called ``name``, with its default settings.
+
+    ``prefix``: a free drive from the problem's start, which the search goes on from.
+    """
+    return PLANNERS[name](
+        problem, rng=rng, guide=guide, scene=scene, limits=limits, vehicle=vehicle, prefix=prefix
+    )

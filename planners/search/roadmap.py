@@ -165,7 +165,7 @@ def pop(roadmap: Roadmap) -> int:
 
 
 @jit
-def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, scene: Scene) -> None:
+def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehicle, scene: Scene) -> None:
     """Dijkstra's search from the goal: d(q) and the next node for every node that reaches it."""
     count = roadmap.counts[NODES]
     for node in range(count):
@@ -196,7 +196,7 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, car: Vehicle, 
                         nodes[node, 1],
                         nodes[other, 0],
                         nodes[other, 1],
-                        0.5 * car.width,
+                        0.5 * vehicle.width,
                         scene,
                     )
                     roadmap.counts[CHECKS] += checks
@@ -219,13 +219,13 @@ def grow_roadmap(
     goal: Floats,
     guide: Guide,
     settings: RoadmapSettings,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
     """Add ``batch`` draws, then search from the goal again; the guide places the nodes, if there is one."""
-    half_length = 0.5 * settings.body_length_scale * (car.front + car.rear)
-    half_width = 0.5 * settings.body_width_scale * car.width
+    half_length = 0.5 * settings.body_length_scale * (vehicle.front + vehicle.rear)
+    half_width = 0.5 * settings.body_width_scale * vehicle.width
     near = settings.guide_radius_m
     for _ in range(batch):
         if roadmap.counts[NODES] == roadmap.nodes.shape[0]:
@@ -237,7 +237,7 @@ def grow_roadmap(
         sin = math.sin(heading)
         if box_is_free(x, y, cos, sin, half_length, half_width, scene):
             add_node(roadmap, x, y, settings, scene)
-    search_from_goal(roadmap, settings, car, scene)
+    search_from_goal(roadmap, settings, vehicle, scene)
 
 
 @jit
@@ -247,7 +247,7 @@ def build_roadmap(
     goal: Floats,
     guide: Guide,
     settings: RoadmapSettings,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> bool:
@@ -258,12 +258,12 @@ def build_roadmap(
     add_node(roadmap, goal[0], goal[1], settings, scene)
     add_node(roadmap, start[0], start[1], settings, scene)
     if guide.probabilities.shape[0] > 0:
-        grow_roadmap(roadmap, settings.batch, goal, guide, settings, car, scene, rng)
+        grow_roadmap(roadmap, settings.batch, goal, guide, settings, vehicle, scene, rng)
     else:
-        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, car, scene, rng)
+        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, vehicle, scene, rng)
     draws = settings.batch
     while roadmap.distances[START] == math.inf and draws < settings.most_nodes:
-        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, car, scene, rng)
+        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, vehicle, scene, rng)
         draws += settings.batch
     return bool(roadmap.distances[START] < math.inf)
 

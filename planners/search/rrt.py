@@ -13,7 +13,7 @@ from planners.search.sampling import guided
 from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, SIZE, Extension, Tree, extend
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import jit
-from planners.world.problem import Floats, Problem
+from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 
@@ -32,7 +32,7 @@ def _grow(
     until: int,
     guide: Guide,
     settings: RrtSettings,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
@@ -41,7 +41,7 @@ def _grow(
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         x, y = guided(guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng)
         vertex = nearest(tree.buckets, x, y)
-        extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, car, scene, rng)
+        extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return
 
@@ -53,7 +53,8 @@ def rrt(
     guide: Guide | None = None,
     scene: Scene | None = None,
     limits: Limits | None = None,
-    car: Vehicle = CAR,
+    vehicle: Vehicle = CAR,
+    prefix: Plan | None = None,
 ) -> Outcome:
     """Plan from the problem's start to its goal disc; a guide draws the targets near its plans."""
     ready = scene_of(problem) if scene is None else scene
@@ -62,7 +63,8 @@ def rrt(
         problem,
         ready,
         limits or Limits(),
-        car,
+        vehicle,
+        prefix,
         lambda tree, goal: None,
-        lambda tree, goal, until: _grow(tree, goal, until, guiding, settings, car, ready, rng),
+        lambda tree, goal, until: _grow(tree, goal, until, guiding, settings, vehicle, ready, rng),
     )

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import functools
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from planners.search.neighbours import Buckets, Indices, allocate_buckets, clear_buckets, put, remove
 from planners.world.collision import Scene, state_is_free
-from planners.world.dynamics import admissible, step
+from planners.world.dynamics import admissible, control_limits, load, step, store, turn_error
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Plan
+from planners.world.trigonometry import length
 from planners.world.vehicle import Vehicle
 
 # places in Tree.counts
@@ -22,13 +22,14 @@ SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX = range(4)
 class Tree(NamedTuple):
     """Vertices in the order in which they were reached; buffers are kept from problem to problem."""
 
-    states: Floats  # [C, 5]
+    states: Floats  # [C, S]
     controls: Floats  # [C, 2] that led here from the parent
     parents: Indices  # [C]
     depths: Indices  # [C] steps from the root
     waypoints: Indices  # [C] next waypoint of the lead path (Follow)
     spent: Indices  # [C] 1 where an extension collided in its first step: no control leads on from there
     counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
+    bound: Floats  # [1] seconds: no vertex is added from which the goal cannot be reached sooner
     buckets: Buckets
 
 
@@ -51,9 +52,9 @@ BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
 @functools.lru_cache(maxsize=1)
-def allocate_tree(capacity: int) -> Tree:
+def allocate_tree(capacity: int, state_size: int) -> Tree:
     """Buffers for ``capacity`` vertices, one set a process."""
-    states = np.empty((capacity, 5))
+    states = np.empty((capacity, state_size))
     return Tree(
         states,
         np.empty((capacity, 2)),
@@ -62,26 +63,29 @@ def allocate_tree(capacity: int) -> Tree:
         np.empty(capacity, np.int64),
         np.empty(capacity, np.int64),
         np.zeros(4, np.int64),
+        np.zeros(1),
         allocate_buckets(states),
     )
 
 
 @jit
-def plant(tree: Tree, root: Floats, bounds: Floats) -> None:
-    """Begin a new tree at the state ``root [5]``."""
-    for i in range(5):  # one by one: assigning a row compiles for two seconds
-        tree.states[0, i] = root[i]
-    tree.controls[0, 0] = 0.0
-    tree.controls[0, 1] = 0.0
-    tree.parents[0] = -1
-    tree.depths[0] = 0
-    tree.waypoints[0] = 0
-    tree.spent[0] = 0
-    tree.counts.fill(0)
-    tree.counts[SIZE] = 1
-    tree.counts[GOAL_VERTEX] = -1
+def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
+    """Begin a new tree with a drive: ``states [n, S]`` from the root on and the ``controls [n - 1, 2]``."""
     clear_buckets(tree.buckets, bounds, BUCKET_M)
-    put(tree.buckets, 0)
+    for i in range(states.shape[0]):
+        for k in range(states.shape[1]):  # one by one: assigning a row compiles for two seconds
+            tree.states[i, k] = states[i, k]
+        tree.controls[i, 0] = controls[i - 1, 0] if i > 0 else 0.0
+        tree.controls[i, 1] = controls[i - 1, 1] if i > 0 else 0.0
+        tree.parents[i] = i - 1
+        tree.depths[i] = i
+        tree.waypoints[i] = 0
+        tree.spent[i] = 0
+        put(tree.buckets, i)
+    tree.counts.fill(0)
+    tree.counts[SIZE] = states.shape[0]
+    tree.counts[GOAL_VERTEX] = -1
+    tree.bound[0] = bound_s
 
 
 @inlined
@@ -99,7 +103,7 @@ def segment_distance(x: float, y: float, ax: float, ay: float, bx: float, by: fl
     share = 0.0
     if squared > 0.0:
         share = min(max(((x - ax) * dx + (y - ay) * dy) / squared, 0.0), 1.0)
-    return math.hypot(x - ax - share * dx, y - ay - share * dy)
+    return length(x - ax - share * dx, y - ay - share * dy)
 
 
 @jit
@@ -113,7 +117,7 @@ def extend(
     tube_m: float,
     passing_m: float,
     settings: Extension,
-    car: Vehicle,
+    vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> int:
@@ -125,19 +129,18 @@ def extend(
     states = tree.states
     counts = tree.counts
     counts[EXPANSIONS] += 1
-    x = states[vertex, 0]
-    y = states[vertex, 1]
-    heading = states[vertex, 2]
-    speed = states[vertex, 3]
-    steering = states[vertex, 4]
+    state = load(states, vertex, vehicle)
+    limit_1, limit_2 = control_limits(vehicle)
     waypoint = tree.waypoints[vertex]
     steered = rng.random() < settings.steer_probability
     spread = settings.most_steps - settings.least_steps + 1
-    steps = int(math.hypot(target_x - x, target_y - y) / settings.metres_a_step)
+    steps = int(length(target_x - state[0], target_y - state[1]) / settings.metres_a_step)
     steps += settings.least_steps + int(rng.random() * spread)
-    desired_speed = (settings.slowest_share + (1.0 - settings.slowest_share) * rng.random()) * car.max_speed
-    acceleration = (2.0 * rng.random() - 1.0) * car.max_acceleration
-    steering_rate = (2.0 * rng.random() - 1.0) * car.max_steering_rate
+    desired_speed = (
+        settings.slowest_share + (1.0 - settings.slowest_share) * rng.random()
+    ) * vehicle.max_speed
+    control_1 = (2.0 * rng.random() - 1.0) * limit_1
+    control_2 = (2.0 * rng.random() - 1.0) * limit_2
     turn_sum = 0.0
     speed_sum = 0.0
     last_turn = 0.0
@@ -148,36 +151,41 @@ def extend(
         if counts[SIZE] == states.shape[0]:
             break
         if steered:
-            turn = math.atan2(target_y - y, target_x - x) - heading - steering
-            turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
-            lack = desired_speed - speed
+            turn = turn_error(state, target_x, target_y, vehicle)
+            lack = desired_speed - state[3]
             if i == 0:
                 last_turn = turn
                 last_speed = lack
-            turn_sum += turn * car.dt
-            speed_sum += lack * car.dt
-            steering_rate = clamp(
+            turn_sum += turn * vehicle.dt
+            speed_sum += lack * vehicle.dt
+            control_2 = clamp(
                 settings.proportional * turn
                 + settings.integral * turn_sum
-                + settings.derivative * (turn - last_turn) / car.dt,
-                car.max_steering_rate,
+                + settings.derivative * (turn - last_turn) / vehicle.dt,
+                limit_2,
             )
-            acceleration = clamp(
+            control_1 = clamp(
                 settings.proportional * lack
                 + settings.integral * speed_sum
-                + settings.derivative * (lack - last_speed) / car.dt,
-                car.max_acceleration,
+                + settings.derivative * (lack - last_speed) / vehicle.dt,
+                limit_1,
             )
             last_turn = turn
             last_speed = lack
-        drive, turn_rate = admissible(speed, steering, acceleration, steering_rate, car)
-        x, y, heading, speed, steering = step(x, y, heading, speed, steering, drive, turn_rate, car)
+        driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
+        state = step(state, driven_1, driven_2, vehicle)
+        x = state[0]
+        y = state[1]
+        to_goal = length(x - goal[0], y - goal[1]) - goal[2]
+        depth = tree.depths[parent] + 1
+        if depth * vehicle.dt + max(to_goal, 0.0) / vehicle.max_speed >= tree.bound[0]:
+            break
         counts[CHECKS] += 1
-        if not state_is_free(x, y, heading, speed, steering, car, scene):
+        if not state_is_free(state, vehicle, scene):
             break
         if lead.shape[0] > 0:
             while waypoint < lead.shape[0] - 1 and (
-                math.hypot(lead[waypoint, 0] - x, lead[waypoint, 1] - y) < passing_m
+                length(lead[waypoint, 0] - x, lead[waypoint, 1] - y) < passing_m
             ):
                 waypoint += 1
             before = max(waypoint - 1, 0)
@@ -188,23 +196,19 @@ def extend(
                 break
         new = counts[SIZE]
         counts[SIZE] += 1
-        states[new, 0] = x
-        states[new, 1] = y
-        states[new, 2] = heading
-        states[new, 3] = speed
-        states[new, 4] = steering
-        tree.controls[new, 0] = drive
-        tree.controls[new, 1] = turn_rate
+        store(states, new, state)
+        tree.controls[new, 0] = driven_1
+        tree.controls[new, 1] = driven_2
         tree.parents[new] = parent
-        tree.depths[new] = tree.depths[parent] + 1
+        tree.depths[new] = depth
         tree.waypoints[new] = waypoint
         tree.spent[new] = 0
         put(tree.buckets, new)
         parent = new
-        if math.hypot(x - goal[0], y - goal[1]) <= goal[2]:
+        if to_goal <= 0.0:
             counts[GOAL_VERTEX] = new
             break
-        if math.hypot(x - target_x, y - target_y) < settings.arrival_m:
+        if length(x - target_x, y - target_y) < settings.arrival_m:
             break
     added = int(counts[SIZE] - first)
     if added == 0 and vertex > 0:  # one step is too short for the controls to make a difference

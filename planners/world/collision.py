@@ -1,4 +1,4 @@
-"""Exact collision of the car's footprint with convex obstacles: a cell look-up, then separating axes.
+"""Exact collision of a vehicle's footprint with convex obstacles: a cell look-up, then separating axes.
 
 Each piece is listed in every cell of a grid in which a footprint's centre could lie when it touches the
 piece, so one check reads one cell, however many obstacles there are.
@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.dynamics import step_margin
+from planners.world.dynamics import State, is_folded, load, swept_bodies
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers, Problem
 from planners.world.vehicle import Vehicle
 
 CELL_M = 1.0  # measured: smaller cells cost more to fill than they save in checks
-REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept car, a roadmap node's body
+REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept body, a roadmap node's
 
 
 class Scene(NamedTuple):
@@ -202,30 +202,20 @@ def box_is_free(
 
 
 @inlined
-def state_is_free(
-    x: float, y: float, heading: float, speed: float, steering: float, car: Vehicle, scene: Scene
-) -> bool:
-    """Whether the car's footprint, inflated for the steps into and out of this state, is free."""
-    margin = step_margin(speed, steering, car)
-    cos = math.cos(heading)
-    sin = math.sin(heading)
-    ahead = 0.5 * (car.front - car.rear)
-    return box_is_free(
-        x + ahead * cos,
-        y + ahead * sin,
-        cos,
-        sin,
-        0.5 * (car.front + car.rear) + margin,
-        0.5 * car.width + margin,
-        scene,
-    )
+def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether the vehicle's bodies, inflated for the steps into and out of this state, are free."""
+    if is_folded(state, vehicle):
+        return False
+    for box in swept_bodies(state, vehicle):
+        if not box_is_free(box[0], box[1], box[2], box[3], box[4], box[5], scene):
+            return False
+    return True
 
 
 @jit
-def count_free_prefix(states: Floats, car: Vehicle, scene: Scene) -> int:
-    """How many of ``states [T, 5]`` are free before the first that is not; T when all are."""
+def count_free_prefix(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
+    """How many of ``states [T, S]`` are free before the first that is not; T when all are."""
     for i in range(states.shape[0]):
-        s = states[i]
-        if not state_is_free(s[0], s[1], s[2], s[3], s[4], car, scene):
+        if not state_is_free(load(states, i, vehicle), vehicle, scene):
             return i
     return states.shape[0]

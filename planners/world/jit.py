@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+from numba.core import types
+from numba.extending import overload
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -45,3 +48,35 @@ def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a small kernel into each of its callers; passing many arrays costs more than its work."""
     compiled: Callable[_P, _R] = numba.njit(forceinline=True, **_FLAGS)(function)
     return compiled
+
+
+_implementations: dict[Callable[..., Any], dict[type, Callable[..., Any]]] = {}
+
+
+def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Declare a kernel that each kind of vehicle implements; which one is meant is settled when compiling."""
+    known: dict[type, Callable[..., _R]] = {}
+
+    @functools.wraps(function)
+    def interpreted(*arguments: Any) -> _R:
+        return next(known[type(value)] for value in arguments if type(value) in known)(*arguments)
+
+    def compiled(*arguments: types.Type) -> Callable[..., _R] | None:
+        kinds = (getattr(argument, "instance_class", None) for argument in arguments)
+        return next((known[kind] for kind in kinds if kind in known), None)
+
+    options: Any = {name: _FLAGS[name] for name in ("nogil", "error_model")} | {"forceinline": True}
+    overload(interpreted, jit_options=options, strict=False)(compiled)
+    _implementations[interpreted] = known
+    declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]
+    return declared
+
+
+def implements(declared: Callable[..., _R], *kinds: type) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Take the decorated function as what ``declared`` does for these kinds of vehicle."""
+
+    def take(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        _implementations[declared].update(dict.fromkeys(kinds, function))
+        return function
+
+    return take

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicle import CAR, Vehicle, state_size
 
 Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Integers = np.ndarray[tuple[int, ...], np.dtype[np.int32]]
@@ -49,8 +49,8 @@ class Problem:
 class Plan:
     """States and the controls between them at a fixed time step (docs/method.md: ``P``)."""
 
-    states: Floats  # [T, 5] x m, y m, heading rad, speed m/s, steering rad
-    controls: Floats  # [T - 1, 2] acceleration m/s^2, steering rate rad/s
+    states: Floats  # [T, S] x m, y m, heading rad, speed m/s, then what else the vehicle's state holds
+    controls: Floats  # [T - 1, 2] for a car acceleration m/s^2, steering rate rad/s
     dt: float = CAR.dt  # seconds
 
     @property
@@ -82,9 +82,11 @@ def counter_clockwise(polygon: Floats) -> Floats:
     return polygon if area >= 0.0 else polygon[::-1]
 
 
-def start_state(problem: Problem) -> Floats:
-    """The state ``[5]`` at rest, wheels straight, at the problem's start."""
-    return np.array([*problem.start, 0.0, 0.0])
+def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
+    """The state ``[S]`` at the problem's start: at rest, wheels straight, trailers straight behind."""
+    state = np.zeros(state_size(vehicle))
+    state[:3] = problem.start
+    return state
 
 
 __all__ = [

@@ -12,6 +12,7 @@ from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.search.tree import SIZE, allocate_tree
 from planners.world.randomness import generator
+from planners.world.vehicle import CAR, state_size
 from tests.worlds import box, problem_of
 
 FOLDER = Path(__file__).parent / "golden"
@@ -22,7 +23,7 @@ def tree_of(name):
     """What four extensions among two boxes add: each vertex as parent, x, y, heading, speed, steering."""
     problem = problem_of([box(8, 8, 0.4, 2, 1), box(20, 12, 1.0, 3, 1)], "golden")
     plan(name, problem, generator(0, "golden"), limits=LIMITS)
-    tree = allocate_tree(LIMITS.nodes)
+    tree = allocate_tree(LIMITS.nodes, state_size(CAR))
     return [
         [int(tree.parents[i]), *(round(float(value), 6) for value in tree.states[i])]
         for i in range(tree.counts[SIZE])

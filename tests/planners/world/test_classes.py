@@ -9,10 +9,11 @@ import shapely
 from hypothesis import given, settings
 
 from planners.world.classes import CLASSES, DIFFICULTIES, ProblemClass, problem_class
-from planners.world.collision import scene_of, state_is_free
+from planners.world.collision import scene_of
 from planners.world.problem import BOUNDS, CAR, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.shapes import GOAL_ROOM, START_ROOM
+from tests.planners.world.kernels import state_is_free
 from tests.planners.world.strategies import seeds
 
 ALL = [problem_class(name, difficulty) for name in CLASSES for difficulty in DIFFICULTIES]
@@ -60,7 +61,7 @@ def test_start_and_goal_have_room(drawn: ProblemClass, seed: int) -> None:
     for x, y, room in (START_ROOM, GOAL_ROOM):
         place = shapely.Point(x, y)
         assert all(place.distance(polygon) > room for polygon in polygons(problem))
-    assert state_is_free(*start_state(problem), CAR, scene_of(problem))
+    assert state_is_free(tuple(start_state(problem)), CAR, scene_of(problem))
 
 
 @each_class

@@ -10,6 +10,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planners.world import collision
 from planners.world.authority import prism
 from planners.world.collision import (
     REACH_M,
@@ -19,12 +20,11 @@ from planners.world.collision import (
     build_scene,
     count_free_prefix,
     scene_of,
-    state_is_free,
 )
-from planners.world.dynamics import step
 from planners.world.jit import jit
 from planners.world.problem import BOUNDS, Floats, obstacles_of
 from planners.world.vehicle import CAR
+from tests.planners.world.kernels import state_is_free, step
 from tests.planners.world.strategies import angles, box_corners, clutter, convex_polygon, problem_with, seeds
 from tests.planners.world.test_dynamics import exact_motion, random_motion
 
@@ -156,14 +156,14 @@ def test_what_a_step_sweeps_between_two_free_states_is_free(seed: int) -> None:
     rng = np.random.default_rng(seed)
     state, controls = random_motion(rng)
     state[:2] = 25.0
-    end = step(*state, *controls, CAR)
+    end = step(tuple(state), *controls, CAR)
     x, y, heading = exact_motion(state, controls, rng.uniform(0.0, CAR.dt, 1))[0, :3]
     corner = box_corners(
         x + AHEAD * math.cos(heading), y + AHEAD * math.sin(heading), heading, HALF_LENGTH, HALF_WIDTH
     )[rng.integers(4)]
     splinter = box_corners(*corner, rng.uniform(-math.pi, math.pi), 5e-4, 5e-4)
     scene = scene_of(problem_with(obstacles_of([[splinter]])))
-    assert not (state_is_free(*state, CAR, scene) and state_is_free(*end, CAR, scene))
+    assert not (state_is_free(tuple(state), CAR, scene) and state_is_free(end, CAR, scene))
 
 
 @given(st.floats(2.5, 50.0), angles, st.floats(-0.5, 0.5))
@@ -193,5 +193,5 @@ def test_kernels_equal_their_python_functions(seed: int) -> None:
         assert np.allclose(compiled, interpreted, rtol=0.0, atol=1e-12)
     for _ in range(20):
         state, _ = random_motion(rng)
-        by_python = state_is_free.py_func(*state, CAR, scene)  # type: ignore[attr-defined]
-        assert state_is_free(*state, CAR, scene) == by_python
+        interpreted = collision.state_is_free.py_func(tuple(state), CAR, scene)  # type: ignore[attr-defined]
+        assert state_is_free(tuple(state), CAR, scene) == interpreted

@@ -7,10 +7,13 @@ import pytest
 from hypothesis import given, settings
 from scipy.integrate import solve_ivp
 
-from planners.world.dynamics import admissible, simulate, step, step_margin
+from planners.world import dynamics
+from planners.world.bodies import footprints
+from planners.world.dynamics import simulate
 from planners.world.problem import Floats
 from planners.world.vehicle import CAR
-from tests.planners.world.strategies import box_corners, seeds
+from tests.planners.world.kernels import admissible, step, swept_bodies
+from tests.planners.world.strategies import seeds
 
 
 def random_motion(rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -53,24 +56,20 @@ def test_a_step_follows_the_differential_equations(seed: int) -> None:
     exact[3] = np.clip(exact[3], CAR.min_speed, CAR.max_speed)
     exact[4] = np.clip(exact[4], -CAR.max_steering, CAR.max_steering)
     assert (
-        np.abs(np.array(step(*state, *controls, CAR)) - exact).max() < 5e-5
+        np.abs(np.array(step(tuple(state), *controls, CAR)) - exact).max() < 5e-5
     )  # m, rad: what one RK4 step may err
 
 
 @settings(max_examples=300, deadline=None)
 @given(seeds)
-def test_the_step_margin_bounds_half_the_way_of_every_body_point(seed: int) -> None:
+def test_the_margin_bounds_half_the_way_of_every_body_point(seed: int) -> None:
     state, controls = random_motion(np.random.default_rng(seed))
-    controls = np.array(admissible(state[3], state[4], *controls, CAR))
-    end = step(*state, *controls, CAR)
+    controls = np.array(admissible(tuple(state), *controls, CAR))
+    end = step(tuple(state), *controls, CAR)
     motion = exact_motion(state, controls, np.linspace(0.0, CAR.dt, 21))
-    ahead, half_length = 0.5 * (CAR.front - CAR.rear), 0.5 * (CAR.front + CAR.rear)
-    corners = np.array([
-        box_corners(x + ahead * math.cos(a), y + ahead * math.sin(a), a, half_length, 0.5 * CAR.width)
-        for x, y, a in motion[:, :3]
-    ])  # fmt: skip
+    corners = footprints(motion)[:, 0]
     way = np.linalg.norm(np.diff(corners, axis=0), axis=2).sum(axis=0).max()
-    margin = min(step_margin(state[3], state[4], CAR), step_margin(end[3], end[4], CAR))
+    margin = min(box[5] for at in (tuple(state), end) for box in swept_bodies(at, CAR)) - 0.5 * CAR.width
     assert way <= 2.0 * margin + 1e-9
 
 
@@ -78,7 +77,7 @@ def test_the_step_margin_bounds_half_the_way_of_every_body_point(seed: int) -> N
 @given(seeds)
 def test_admissible_controls_lead_past_no_limit_and_are_otherwise_as_asked(seed: int) -> None:
     state, controls = random_motion(np.random.default_rng(seed))
-    acceleration, steering_rate = admissible(state[3], state[4], *controls, CAR)
+    acceleration, steering_rate = admissible(tuple(state), *controls, CAR)
     assert CAR.min_speed - 1e-12 <= state[3] + CAR.dt * acceleration <= CAR.max_speed + 1e-12
     assert abs(state[4] + CAR.dt * steering_rate) <= CAR.max_steering + 1e-12
     free = CAR.min_speed <= state[3] + CAR.dt * controls[0] <= CAR.max_speed
@@ -94,14 +93,14 @@ def test_simulating_is_stepping_again_and_again(seed: int) -> None:
     states = simulate(start, controls, CAR)
     assert states[0] == pytest.approx(start, abs=0.0)
     for before, control, after in zip(states[:-1], controls, states[1:], strict=True):
-        assert tuple(after) == step(*before, *control, CAR)
+        assert tuple(after) == step(tuple(before), *control, CAR)
 
 
 @settings(max_examples=50, deadline=None)
 @given(seeds)
 def test_kernels_equal_their_python_functions(seed: int) -> None:
     state, controls = random_motion(np.random.default_rng(seed))
-    by_python = step.py_func(*state, *controls, CAR)  # type: ignore[attr-defined]
-    assert step(*state, *controls, CAR) == pytest.approx(by_python, abs=1e-13)
-    margin = step_margin.py_func(state[3], state[4], CAR)  # type: ignore[attr-defined]
-    assert step_margin(state[3], state[4], CAR) == pytest.approx(margin, abs=1e-14)
+    now = tuple(state)
+    interpreted = dynamics.step(now, *controls, CAR)
+    assert step(now, *controls, CAR) == pytest.approx(interpreted, abs=1e-13)
+    assert swept_bodies(now, CAR)[0] == pytest.approx(dynamics.swept_bodies(now, CAR)[0], abs=1e-13)

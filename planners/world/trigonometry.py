@@ -1,0 +1,50 @@
+"""Sine, cosine and tangent as polynomials: faster than the C library's, and the same bits everywhere."""
+
+from __future__ import annotations
+
+import math
+
+from planners.world.jit import inlined
+
+
+@inlined
+def sincos(angle: float) -> tuple[float, float]:
+    """Sine and cosine to 2e-16 for angles (radians) up to some thousand turns.
+
+    The angle is brought to [-pi/4, pi/4] by subtracting quarter turns in three parts (Cody and Waite 1980);
+    the polynomials are fdlibm's.
+    """
+    turns = math.floor(angle * (2.0 / math.pi) + 0.5)
+    r = angle - turns * 1.57079632673412561417e00
+    r -= turns * 6.07710050630396597660e-11
+    r -= turns * 2.02226624879595063154e-21
+    z = r * r
+    sin = 2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)
+    sin = -1.66666666666666324348e-01 + z * (
+        8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * sin)
+    )
+    sin = r + r * z * sin
+    cos = -2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11)
+    cos = 4.16666666666666019037e-02 + z * (
+        -1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + z * cos)
+    )
+    cos = 1.0 - 0.5 * z + z * z * cos
+    quarter = int(turns) & 3
+    if quarter & 1:
+        sin, cos = cos, -sin
+    if quarter & 2:
+        sin, cos = -sin, -cos
+    return sin, cos
+
+
+@inlined
+def tan(angle: float) -> float:
+    """Tangent of an angle in radians."""
+    sin, cos = sincos(angle)
+    return sin / cos
+
+
+@inlined
+def length(x: float, y: float) -> float:
+    """Length of a vector; without the care for overflow that makes ``math.hypot`` seven times slower."""
+    return math.sqrt(x * x + y * y)

@@ -1,0 +1,1 @@
+"""What each vehicle does: one file a kind, the functions that all of them have in ``interface``."""

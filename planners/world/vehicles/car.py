@@ -1,0 +1,130 @@
+"""Second-order car: x' = v cos(theta), y' = v sin(theta), theta' = v tan(psi) / L, v' = a, psi' = omega."""
+
+from __future__ import annotations
+
+import math
+
+from planners.world.jit import implements, inlined
+from planners.world.problem import Floats
+from planners.world.trigonometry import sincos, tan
+from planners.world.vehicle import Car, CarWithTrailers
+from planners.world.vehicles.interface import (
+    Box,
+    State,
+    admissible,
+    box_at,
+    control_limits,
+    half_way,
+    is_folded,
+    load,
+    step,
+    swept_bodies,
+    turn_error,
+)
+
+CarLike = Car | CarWithTrailers
+
+
+@inlined
+def turn_rates(
+    speed: float, steering: float, acceleration: float, steering_rate: float, car: CarLike
+) -> tuple[float, float, float]:
+    """Turn rates (rad/s) at the beginning, the middle and the end of a step: known beforehand, as speed and
+    steering are linear in time.
+    """
+    h = car.dt
+    return (
+        speed * tan(steering) / car.wheelbase,
+        (speed + 0.5 * h * acceleration) * tan(steering + 0.5 * h * steering_rate) / car.wheelbase,
+        (speed + h * acceleration) * tan(steering + h * steering_rate) / car.wheelbase,
+    )
+
+
+@inlined
+def drive(
+    x: float,
+    y: float,
+    heading: float,
+    speed: float,
+    end_speed: float,
+    turns: tuple[float, float, float],
+    h: float,
+) -> tuple[float, float, float]:
+    """The pose after a Runge-Kutta step of ``h`` seconds at these turn rates (as ``turn_rates``)."""
+    half_speed = 0.5 * (speed + end_speed)
+    sin_1, cos_1 = sincos(heading)
+    sin_2, cos_2 = sincos(heading + 0.5 * h * turns[0])
+    sin_3, cos_3 = sincos(heading + 0.5 * h * turns[1])
+    sin_4, cos_4 = sincos(heading + h * turns[1])
+    return (
+        x + h / 6.0 * (speed * cos_1 + 2.0 * half_speed * (cos_2 + cos_3) + end_speed * cos_4),
+        y + h / 6.0 * (speed * sin_1 + 2.0 * half_speed * (sin_2 + sin_3) + end_speed * sin_4),
+        heading + h / 6.0 * (turns[0] + 4.0 * turns[1] + turns[2]),
+    )
+
+
+@implements(load, Car)
+def _load(states: Floats, i: int, vehicle: Car) -> State:
+    row = states[i]
+    return row[0], row[1], row[2], row[3], row[4]
+
+
+@implements(step, Car)
+def _step(state: State, first: float, second: float, vehicle: Car) -> State:
+    x, y, heading, speed, steering = state
+    end_speed = speed + vehicle.dt * first
+    end_steering = steering + vehicle.dt * second
+    turns = turn_rates(speed, steering, first, second, vehicle)
+    x, y, heading = drive(x, y, heading, speed, end_speed, turns, vehicle.dt)
+    return (
+        x,
+        y,
+        heading,
+        min(max(end_speed, vehicle.min_speed), vehicle.max_speed),
+        min(max(end_steering, -vehicle.max_steering), vehicle.max_steering),
+    )
+
+
+@implements(control_limits, Car, CarWithTrailers)
+def _control_limits(vehicle: CarLike) -> tuple[float, float]:
+    return vehicle.max_acceleration, vehicle.max_steering_rate
+
+
+@implements(admissible, Car, CarWithTrailers)
+def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
+    speed = state[3]
+    steering = state[4]
+    h = vehicle.dt
+    return (
+        min(max(first, (vehicle.min_speed - speed) / h), (vehicle.max_speed - speed) / h),
+        min(max(second, (-vehicle.max_steering - steering) / h), (vehicle.max_steering - steering) / h),
+    )
+
+
+@implements(turn_error, Car, CarWithTrailers)
+def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
+    """The angle between the way to (x, y) and the wheels."""
+    turn = math.atan2(y - state[1], x - state[0]) - state[2] - state[4]
+    return turn - 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+
+
+@implements(is_folded, Car)
+def _is_folded(state: State, vehicle: Car) -> bool:
+    return False
+
+
+@inlined
+def most_motion(speed: float, steering: float, car: CarLike) -> tuple[float, float]:
+    """The most speed (m/s) and turn rate (rad/s) at the rear axle in a step into or out of a state."""
+    fastest = min(abs(speed) + car.max_acceleration * car.dt, max(car.max_speed, -car.min_speed))
+    sharpest = min(abs(steering) + car.max_steering_rate * car.dt, car.max_steering)
+    return fastest, fastest * tan(sharpest) / car.wheelbase
+
+
+@implements(swept_bodies, Car)
+def _swept_bodies(state: State, vehicle: Car) -> tuple[Box, ...]:
+    speed, turn = most_motion(state[3], state[4], vehicle)
+    reach = max(vehicle.front, vehicle.rear)
+    margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
+    sin, cos = sincos(state[2])
+    return (box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin),)

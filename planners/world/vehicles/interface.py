@@ -1,0 +1,90 @@
+"""What a vehicle must be able to do, as kernels that each kind implements in a file of its own.
+
+A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s); two controls
+are constant during a step. A new vehicle is settings in ``vehicle``, a file here, and a line in ``dynamics``.
+"""
+
+from __future__ import annotations
+
+from planners.world.jit import by_vehicle, inlined
+from planners.world.problem import Floats
+from planners.world.trigonometry import length
+from planners.world.vehicle import Vehicle
+
+State = tuple[float, ...]
+Box = tuple[float, float, float, float, float, float]  # centre x, y, cos, sin, half length, half width
+
+
+@by_vehicle
+def load(states: Floats, i: int, vehicle: Vehicle) -> State:
+    """Row ``i`` of ``states [T, S]`` as a state."""
+    raise NotImplementedError
+
+
+@inlined
+def store(states: Floats, i: int, state: State) -> None:
+    """Write a state into row ``i`` of ``states [T, S]``."""
+    for k in range(len(state)):
+        states[i, k] = state[k]
+
+
+@by_vehicle
+def step(state: State, first: float, second: float, vehicle: Vehicle) -> State:
+    """Where a classical fourth-order Runge-Kutta step of ``vehicle.dt`` seconds leads with these controls."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def control_limits(vehicle: Vehicle) -> tuple[float, float]:
+    """The largest absolute value of each of the two controls."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
+    """The controls, reduced where a step with them would lead past a limit of the state.
+
+    So nothing is clamped in the middle of a plan, and the margins of ``swept_bodies`` hold.
+    """
+    raise NotImplementedError
+
+
+@by_vehicle
+def turn_error(state: State, x: float, y: float, vehicle: Vehicle) -> float:
+    """By how many radians to turn, left positive, to head for (x, y): a steering controller's error."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def is_folded(state: State, vehicle: Vehicle) -> bool:
+    """Whether parts of the vehicle have come too close to each other (jack-knifed)."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
+    """A box around each body, inflated by half the farthest way of its points in an admissible step.
+
+    So the boxes at both ends of a step cover the sweep between them: nothing is jumped.
+    """
+    raise NotImplementedError
+
+
+@inlined
+def half_way(dt: float, speed: float, turn: float, reach: float, half_width: float) -> float:
+    """Half of the farthest way, in metres, of a body's points in ``dt`` seconds.
+
+    ``speed`` and ``turn`` are the most (m/s, rad/s) at the body's reference point, from which it reaches
+    ``reach`` metres along and ``half_width`` across.
+    """
+    return 0.5 * dt * length(speed + half_width * turn, reach * turn)
+
+
+@inlined
+def box_at(
+    x: float, y: float, cos: float, sin: float, front: float, rear: float, width: float, margin: float
+) -> Box:
+    """The box of a body whose reference point is (x, y), ``margin`` larger on every side."""
+    ahead = 0.5 * (front - rear)
+    half_length = 0.5 * (front + rear) + margin
+    return x + ahead * cos, y + ahead * sin, cos, sin, half_length, 0.5 * width + margin

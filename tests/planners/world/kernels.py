@@ -1,0 +1,26 @@
+"""Kernels by vehicle as compiled functions: called from Python they would be interpreted."""
+
+from __future__ import annotations
+
+from planners.world import collision, dynamics
+from planners.world.jit import jit
+
+
+@jit
+def step(state, first, second, vehicle):
+    return dynamics.step(state, first, second, vehicle)
+
+
+@jit
+def admissible(state, first, second, vehicle):
+    return dynamics.admissible(state, first, second, vehicle)
+
+
+@jit
+def swept_bodies(state, vehicle):
+    return dynamics.swept_bodies(state, vehicle)
+
+
+@jit
+def state_is_free(state, vehicle, scene):
+    return collision.state_is_free(state, vehicle, scene)
