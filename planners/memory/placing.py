@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from planners.world.collision import box_meets_piece, edge_normals
+from planners.world.collision import box_meets_piece, make_edges
 from planners.world.jit import jit
 from planners.world.problem import Floats, Obstacles
 
@@ -76,13 +76,11 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
     last_piece = obstacles.obstacle_starts[o + 1]
     first = obstacles.piece_starts[first_piece]
     last = obstacles.piece_starts[last_piece]
-    normals = np.empty((last - first, 2))
-    offsets = np.empty(last - first)
-    starts = np.empty(2, np.int32)
+    edges = np.empty((last - first, 5))
     for p in range(first_piece, last_piece):
         vertices = obstacles.vertices[obstacles.piece_starts[p] : obstacles.piece_starts[p + 1]]
         count = vertices.shape[0]
-        edge_normals(vertices, 0, count, normals, offsets)
+        make_edges(vertices, 0, count, edges, 0)
         x_min = math.inf
         y_min = math.inf
         x_max = -math.inf
@@ -92,8 +90,6 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
             x_max = max(x_max, vertices[i, 0])
             y_min = min(y_min, vertices[i, 1])
             y_max = max(y_max, vertices[i, 1])
-        starts[0] = 0
-        starts[1] = count
         t = 0
         while t < boxes.shape[0]:
             x = boxes[t, 0]
@@ -103,9 +99,7 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
             gap = max(x_min - x, x - x_max, y_min - y, y - y_max) - math.hypot(half_length, half_width)
             if gap > 0.0:
                 t += 1 + int(gap / stride_m)
-            elif box_meets_piece(
-                x, y, boxes[t, 2], boxes[t, 3], half_length, half_width, 0, vertices, normals, offsets, starts
-            ):
+            elif box_meets_piece(x, y, boxes[t, 2], boxes[t, 3], half_length, half_width, 0, count, edges):
                 return True
             else:
                 t += 1

@@ -21,7 +21,7 @@ from planners.search.tree import (
 )
 from planners.world.collision import Scene, box_is_free, state_is_free
 from planners.world.dynamics import load
-from planners.world.jit import jit
+from planners.world.jit import lean
 from planners.world.problem import Floats, Plan, Problem, start_state
 from planners.world.vehicle import Vehicle, state_size
 
@@ -29,7 +29,7 @@ NO_CONTROLS = np.empty((0, 2))
 SLICE = 256  # expansions between two looks at the clock: some milliseconds
 
 
-@jit
+@lean
 def _is_blocked(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> int:
     if not state_is_free(load(root, 0, vehicle), vehicle, scene):
         return 1

@@ -37,7 +37,7 @@ from planners.search.roadmap import (
 from planners.search.sampling import in_disc
 from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
-from planners.world.jit import jit
+from planners.world.jit import lean
 from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
@@ -88,7 +88,7 @@ def allocate_lead() -> Lead:
     )
 
 
-@jit
+@lean
 def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: np.random.Generator) -> None:
     waypoint = tree.waypoints[vertex]
     if lead.counts[waypoint] == 0:
@@ -98,7 +98,7 @@ def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: n
     lead.counts[waypoint] += 1
 
 
-@jit
+@lean
 def _new_lead(
     tree: Tree,
     node: int,
@@ -118,7 +118,7 @@ def _new_lead(
     lead.marks[SINCE_FOLLOW] = 0
 
 
-@jit
+@lean
 def _grow(
     tree: Tree,
     goal: Floats,

@@ -34,7 +34,7 @@ from planners.search.tree import (
     extend,
 )
 from planners.world.collision import Scene, scene_of
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, lean
 from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
@@ -78,7 +78,7 @@ def allocate_groups(capacity: int) -> Groups:
     )
 
 
-@jit
+@lean
 def clear_groups(groups: Groups) -> None:
     """Forget all groups."""
     groups.counts.fill(0)
@@ -95,7 +95,7 @@ def keep(members: Indices, count: int, vertex: int, rng: np.random.Generator) ->
         members[place] = vertex
 
 
-@jit
+@lean
 def join_groups(
     tree: Tree,
     first: int,
@@ -126,7 +126,7 @@ def heaviest(groups: Groups) -> int:
     return int(best)
 
 
-@jit
+@lean
 def choose_member(
     tree: Tree,
     members: Indices,
@@ -156,7 +156,7 @@ def choose_member(
     return int(chosen)
 
 
-@jit
+@lean
 def grow_gust(
     tree: Tree,
     goal: Floats,
@@ -169,7 +169,7 @@ def grow_gust(
     rng: np.random.Generator,
 ) -> None:
     """Extend the heaviest group until solved or ``until`` expansions."""
-    no_lead = np.empty((0, 2))
+    no_lead = groups.way[:0]
     counts = tree.counts
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         node = heaviest(groups)

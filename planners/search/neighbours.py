@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, lean
 from planners.world.problem import Floats
 
 # one width of integer in all search buffers: another would compile each kernel twice
@@ -36,7 +36,7 @@ def allocate_buckets(points: Floats) -> Buckets:
     return Buckets(np.empty((cells, NEWEST), np.int64), np.zeros(cells, np.int64), np.zeros(3), points)
 
 
-@jit
+@lean
 def clear_buckets(buckets: Buckets, bounds: Floats, size_m: float) -> None:
     """Empty the buckets and lay them over ``bounds``, ``size_m`` wide or as wide as the bounds need."""
     buckets.counts.fill(0)
@@ -62,7 +62,7 @@ def put(buckets: Buckets, item: int) -> None:
     buckets.counts[cell] += 1
 
 
-@jit
+@lean
 def remove(buckets: Buckets, item: int) -> None:
     """Take point ``item`` out, if it is still among the newest of its bucket."""
     column = bucket_index(buckets.points[item, 0] - buckets.frame[0], buckets.frame[2])
@@ -76,7 +76,7 @@ def remove(buckets: Buckets, item: int) -> None:
             return
 
 
-@jit
+@lean
 def nearest(buckets: Buckets, x: float, y: float) -> int:
     """The nearest point among the newest of each bucket; -1 when there is none."""
     size = buckets.frame[2]
@@ -105,7 +105,7 @@ def nearest(buckets: Buckets, x: float, y: float) -> int:
     return best
 
 
-@jit
+@lean
 def nearest_k(buckets: Buckets, x: float, y: float, items: Indices, distances: Floats) -> int:
     """Fill ``items`` and ``distances`` (both ``[k]``, nearest first); returns how many there are."""
     size = buckets.frame[2]

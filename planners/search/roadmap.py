@@ -25,7 +25,7 @@ from planners.search.neighbours import (
 from planners.search.outcome import Guide
 from planners.search.sampling import guided
 from planners.world.collision import Scene, box_is_free
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, lean
 from planners.world.problem import Floats
 from planners.world.vehicle import Vehicle
 
@@ -95,7 +95,7 @@ def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
     )
 
 
-@jit
+@lean
 def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, scene: Scene) -> None:
     """Add a place and the edges to its nearest neighbours."""
     counts = roadmap.counts
@@ -164,7 +164,7 @@ def pop(roadmap: Roadmap) -> int:
     return int(top)
 
 
-@jit
+@lean
 def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehicle, scene: Scene) -> None:
     """Dijkstra's search from the goal: d(q) and the next node for every node that reaches it."""
     count = roadmap.counts[NODES]
@@ -212,7 +212,7 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehic
             edge = roadmap.edge_next[edge]
 
 
-@jit
+@lean
 def grow_roadmap(
     roadmap: Roadmap,
     batch: int,
@@ -240,7 +240,7 @@ def grow_roadmap(
     search_from_goal(roadmap, settings, vehicle, scene)
 
 
-@jit
+@lean
 def build_roadmap(
     roadmap: Roadmap,
     start: Floats,
@@ -268,13 +268,13 @@ def build_roadmap(
     return bool(roadmap.distances[START] < math.inf)
 
 
-@jit
+@lean
 def node_of(roadmap: Roadmap, x: float, y: float) -> int:
     """The nearest node that reaches the goal: the group of a vertex at (x, y)."""
     return nearest(roadmap.connected, x, y)
 
 
-@jit
+@lean
 def resample_way(roadmap: Roadmap, node: int, spacing_m: float, points: Floats) -> int:
     """Fill ``points [m, 2]`` with the way from ``node`` to the goal, one each ``spacing_m``; how many."""
     nodes = roadmap.nodes

@@ -10,9 +10,9 @@ from planners.search.attempt import attempt
 from planners.search.neighbours import nearest
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.sampling import guided
-from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, SIZE, Extension, Tree, extend
+from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, NO_LEAD, SIZE, Extension, Tree, extend
 from planners.world.collision import Scene, scene_of
-from planners.world.jit import jit
+from planners.world.jit import lean
 from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CAR, Vehicle
 
@@ -25,19 +25,19 @@ class RrtSettings(NamedTuple):
     extension: Extension = EXTENSION
 
 
-@jit
+@lean
 def _grow(
     tree: Tree,
     goal: Floats,
     until: int,
     guide: Guide,
+    no_lead: Floats,
     settings: RrtSettings,
     vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
     counts = tree.counts
-    no_lead = np.empty((0, 2))
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         x, y = guided(guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng)
         vertex = nearest(tree.buckets, x, y)
@@ -66,5 +66,5 @@ def rrt(
         vehicle,
         prefix,
         lambda tree, goal: None,
-        lambda tree, goal, until: _grow(tree, goal, until, guiding, settings, vehicle, ready, rng),
+        lambda tree, goal, until: _grow(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng),
     )

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from planners.search.outcome import Guide
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, lean
 from planners.world.problem import Floats
 
 
@@ -28,7 +28,7 @@ def in_bounds(bounds: Floats, rng: np.random.Generator) -> tuple[float, float]:
     )
 
 
-@jit
+@lean
 def guided(
     guide: Guide, goal: Floats, bounds: Floats, near_m: float, far_m: float, rng: np.random.Generator
 ) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.neighbours import Buckets, Indices, allocate_buckets, clear_buckets, put, remove
 from planners.world.collision import Scene, state_is_free
 from planners.world.dynamics import admissible, control_limits, load, step, store, turn_error
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, lean
 from planners.world.problem import Floats, Plan
 from planners.world.trigonometry import length
 from planners.world.vehicle import Vehicle
@@ -48,6 +48,7 @@ class Extension(NamedTuple):
 
 
 EXTENSION = Extension()
+NO_LEAD = np.empty((0, 2))
 BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
@@ -68,7 +69,7 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
     )
 
 
-@jit
+@lean
 def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
     """Begin a new tree with a drive: ``states [n, S]`` from the root on and the ``controls [n - 1, 2]``."""
     clear_buckets(tree.buckets, bounds, BUCKET_M)
@@ -106,7 +107,7 @@ def segment_distance(x: float, y: float, ax: float, ay: float, bx: float, by: fl
     return length(x - ax - share * dx, y - ay - share * dy)
 
 
-@jit
+@lean
 def extend(
     tree: Tree,
     vertex: int,

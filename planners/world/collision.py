@@ -14,23 +14,45 @@ import numpy as np
 from planners.world.dynamics import State, is_folded, load, swept_bodies
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers, Problem
+from planners.world.trigonometry import length
 from planners.world.vehicle import Vehicle
 
 CELL_M = 1.0  # measured: smaller cells cost more to fill than they save in checks
 REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept body, a roadmap node's
 
 
+NORMAL_X, NORMAL_Y, OFFSET, X, Y = range(5)  # columns of Scene.edges
+FIRST, LAST, FACING = range(3)  # columns of Scene.cell_pieces
+
+
 class Scene(NamedTuple):
     """A problem made ready for collision checks."""
 
     bounds: Floats  # [4] x_min, y_min, x_max, y_max in metres
-    vertices: Floats  # [V, 2] metres
-    normals: Floats  # [V, 2] outward unit normal of the edge that begins at each vertex
-    offsets: Floats  # [V] normal . vertex, metres
-    piece_starts: Integers  # [P + 1]
+    edges: Floats  # [V, 5] of each edge: outward unit normal, normal . vertex (m), vertex it begins at (m)
+    piece_starts: Integers  # [P + 1] piece p owns edges[piece_starts[p] : piece_starts[p + 1]]
     cell_starts: Integers  # [rows * columns + 1]
-    cell_pieces: Integers  # [K] pieces within reach of a cell, cell by cell
+    cell_pieces: Integers  # [K, 3] pieces within reach of a cell, cell by cell: edges FIRST to before LAST,
+    # and FACING, the one whose line is farthest from the cell's middle: most often it separates
     columns: int
+
+
+@inlined
+def edge_separates(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    edge: int,
+    edges: Floats,
+) -> bool:
+    """Whether a box (centre, direction, half extents) lies outside of an edge's line."""
+    nx = edges[edge, NORMAL_X]
+    ny = edges[edge, NORMAL_Y]
+    extent = half_length * abs(nx * cos + ny * sin) + half_width * abs(ny * cos - nx * sin)
+    return bool(nx * x + ny * y - edges[edge, OFFSET] > extent)
 
 
 @inlined
@@ -41,28 +63,21 @@ def box_meets_piece(
     sin: float,
     half_length: float,
     half_width: float,
-    piece: int,
-    vertices: Floats,
-    normals: Floats,
-    offsets: Floats,
-    piece_starts: Integers,
+    first: int,
+    last: int,
+    edges: Floats,
 ) -> bool:
-    """Whether a box (centre, direction, half extents) and a convex piece share a point (separating axes)."""
-    first = piece_starts[piece]
-    last = piece_starts[piece + 1]
+    """Whether a box and the convex piece of edges ``first`` to before ``last`` share a point (separating axes)."""
     for i in range(first, last):
-        nx = normals[i, 0]
-        ny = normals[i, 1]
-        extent = half_length * abs(nx * cos + ny * sin) + half_width * abs(ny * cos - nx * sin)
-        if nx * x + ny * y - offsets[i] > extent:
+        if edge_separates(x, y, cos, sin, half_length, half_width, i, edges):
             return False
     low_u = math.inf
     high_u = -math.inf
     low_w = math.inf
     high_w = -math.inf
     for i in range(first, last):
-        dx = vertices[i, 0] - x
-        dy = vertices[i, 1] - y
+        dx = edges[i, X] - x
+        dy = edges[i, Y] - y
         u = dx * cos + dy * sin
         w = dy * cos - dx * sin
         low_u = min(low_u, u)
@@ -73,34 +88,33 @@ def box_meets_piece(
 
 
 @inlined
-def edge_normals(vertices: Floats, first: int, last: int, normals: Floats, offsets: Floats) -> None:
-    """Fill in outward unit normals and offsets (as in ``Scene``) of the piece ``vertices[first : last]``."""
+def make_edges(vertices: Floats, first: int, last: int, edges: Floats, target: int) -> None:
+    """Fill in ``edges`` (as in ``Scene``) from ``target`` on for the piece ``vertices[first : last]``."""
     for i in range(first, last):
         j = i + 1 if i + 1 < last else first
         ex = vertices[j, 0] - vertices[i, 0]
         ey = vertices[j, 1] - vertices[i, 1]
-        length = math.hypot(ex, ey)
-        normals[i, 0] = ey / length
-        normals[i, 1] = -ex / length
-        offsets[i] = normals[i, 0] * vertices[i, 0] + normals[i, 1] * vertices[i, 1]
+        way = length(ex, ey)
+        edge = target + i - first
+        edges[edge, NORMAL_X] = ey / way
+        edges[edge, NORMAL_Y] = -ex / way
+        edges[edge, OFFSET] = edges[edge, NORMAL_X] * vertices[i, 0] + edges[edge, NORMAL_Y] * vertices[i, 1]
+        edges[edge, X] = vertices[i, 0]
+        edges[edge, Y] = vertices[i, 1]
 
 
 @jit
 def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
-    """Edge normals and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
-    count = vertices.shape[0]
+    """Edges and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
     pieces = piece_starts.shape[0] - 1
-    normals = np.empty((count, 2))
-    offsets = np.empty(count)
+    edges = np.empty((vertices.shape[0], 5))
     for p in range(pieces):
-        first = piece_starts[p]
-        last = piece_starts[p + 1]
-        edge_normals(vertices, first, last, normals, offsets)
+        make_edges(vertices, piece_starts[p], piece_starts[p + 1], edges, piece_starts[p])
     columns = math.ceil((bounds[2] - bounds[0]) / CELL_M) + 1
     rows = math.ceil((bounds[3] - bounds[1]) / CELL_M) + 1
     half = 0.5 * CELL_M + REACH_M
     listed_cells = np.empty(64 * pieces + 64, np.int32)
-    listed_pieces = np.empty(64 * pieces + 64, np.int32)
+    listed_pieces = np.empty((64 * pieces + 64, 3), np.int32)
     cell_starts = np.zeros(rows * columns + 1, np.int32)
     listed = 0
     for p in range(pieces):
@@ -124,33 +138,41 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
             for column in range(column_0, column_1 + 1):
                 centre_x = bounds[0] + (column + 0.5) * CELL_M
                 near = True
+                facing = first
+                widest = -math.inf
                 for i in range(first, last):
-                    nx = normals[i, 0]
-                    ny = normals[i, 1]
-                    gap = nx * centre_x + ny * centre_y - offsets[i]
+                    nx = edges[i, NORMAL_X]
+                    ny = edges[i, NORMAL_Y]
+                    gap = nx * centre_x + ny * centre_y - edges[i, OFFSET]
                     if gap > half * (abs(nx) + abs(ny)):
                         near = False
                         break
+                    if gap > widest:
+                        widest = gap
+                        facing = i
                 if near:
                     if listed == listed_cells.shape[0]:
                         listed_cells = np.concatenate((listed_cells, np.empty_like(listed_cells)))
                         listed_pieces = np.concatenate((listed_pieces, np.empty_like(listed_pieces)))
                     cell = row * columns + column
                     listed_cells[listed] = cell
-                    listed_pieces[listed] = p
+                    listed_pieces[listed, FIRST] = first
+                    listed_pieces[listed, LAST] = last
+                    listed_pieces[listed, FACING] = facing
                     cell_starts[cell + 1] += 1
                     listed += 1
     for cell in range(rows * columns):
         cell_starts[cell + 1] += cell_starts[cell]
-    cell_pieces = np.empty(listed, np.int32)
+    cell_pieces = np.empty((listed, 3), np.int32)
     for k in range(listed - 1, -1, -1):  # backwards, with starts moved up: each cell keeps its order
         cell = listed_cells[k]
         cell_starts[cell + 1] -= 1
-        cell_pieces[cell_starts[cell + 1]] = listed_pieces[k]
+        for column in range(3):
+            cell_pieces[cell_starts[cell + 1], column] = listed_pieces[k, column]
     for cell in range(rows * columns):
         cell_starts[cell] = cell_starts[cell + 1]
     cell_starts[rows * columns] = listed
-    return Scene(bounds, vertices, normals, offsets, piece_starts, cell_starts, cell_pieces, columns)
+    return Scene(bounds, edges, piece_starts, cell_starts, cell_pieces, columns)
 
 
 def scene_of(problem: Problem) -> Scene:
@@ -183,20 +205,12 @@ def box_is_free(
     column = int((x - bounds[0]) * (1.0 / CELL_M))
     row = int((y - bounds[1]) * (1.0 / CELL_M))
     cell = row * scene.columns + column
+    pieces = scene.cell_pieces
+    edges = scene.edges
     for k in range(scene.cell_starts[cell], scene.cell_starts[cell + 1]):
-        if box_meets_piece(
-            x,
-            y,
-            cos,
-            sin,
-            half_length,
-            half_width,
-            scene.cell_pieces[k],
-            scene.vertices,
-            scene.normals,
-            scene.offsets,
-            scene.piece_starts,
-        ):
+        if edge_separates(x, y, cos, sin, half_length, half_width, pieces[k, FACING], edges):
+            continue
+        if box_meets_piece(x, y, cos, sin, half_length, half_width, pieces[k, FIRST], pieces[k, LAST], edges):
             return False
     return True
 

@@ -36,6 +36,8 @@ _R = TypeVar("_R")
 
 # fastmath stays off: the same seed must give the same tree everywhere
 _FLAGS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_LEAN: dict[str, Any] = _FLAGS | {"_nrt": False}
+_INLINED: dict[str, Any] = _LEAN | {"forceinline": True}
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -44,9 +46,18 @@ def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return compiled
 
 
+def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Compile a kernel that allocates nothing, without counting references to arrays.
+
+    Numba otherwise counts each array of each tuple that is passed on, which takes longer than a collision check.
+    """
+    compiled: Callable[_P, _R] = numba.njit(**_LEAN)(function)
+    return compiled
+
+
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a small kernel into each of its callers; passing many arrays costs more than its work."""
-    compiled: Callable[_P, _R] = numba.njit(forceinline=True, **_FLAGS)(function)
+    """Compile a small ``lean`` kernel into each of its callers: calling it costs more than its work."""
+    compiled: Callable[_P, _R] = numba.njit(**_INLINED)(function)
     return compiled
 
 
@@ -65,7 +76,7 @@ def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
         kinds = (getattr(argument, "instance_class", None) for argument in arguments)
         return next((known[kind] for kind in kinds if kind in known), None)
 
-    options: Any = {name: _FLAGS[name] for name in ("nogil", "error_model")} | {"forceinline": True}
+    options: Any = {name: on for name, on in _INLINED.items() if name not in ("cache", "no_cfunc_wrapper")}
     overload(interpreted, jit_options=options, strict=False)(compiled)
     _implementations[interpreted] = known
     declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]

@@ -67,7 +67,7 @@ def kernel_answers(
     for i in range(poses.shape[0]):
         meets[i] = box_meets_piece(
             poses[i, 0], poses[i, 1], math.cos(poses[i, 2]), math.sin(poses[i, 2]), half_length, half_width,
-            pieces[i], scene.vertices, scene.normals, scene.offsets, scene.piece_starts,
+            scene.piece_starts[pieces[i]], scene.piece_starts[pieces[i] + 1], scene.edges,
         )  # fmt: skip
     return meets
 
@@ -188,7 +188,8 @@ def test_kernels_equal_their_python_functions(seed: int) -> None:
     rng = np.random.default_rng(seed)
     problem = problem_with(clutter(rng, 10))
     scene = scene_of(problem)
-    plain = build_scene.py_func(scene.vertices, scene.piece_starts, scene.bounds)  # type: ignore[attr-defined]
+    vertices = np.ascontiguousarray(scene.edges[:, 3:])
+    plain = build_scene.py_func(vertices, scene.piece_starts, scene.bounds)  # type: ignore[attr-defined]
     for compiled, interpreted in zip(scene, plain, strict=True):
         assert np.allclose(compiled, interpreted, rtol=0.0, atol=1e-12)
     for _ in range(20):
