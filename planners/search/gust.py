@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.search.attempt import attempt
-from planners.search.neighbours import Indices
+from planners.search.neighbours import Indices, nearest_for
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.roadmap import (
     CHECKS as ROADMAP_CHECKS,
@@ -19,7 +19,6 @@ from planners.search.roadmap import (
     RoadmapSettings,
     allocate_roadmap,
     build_roadmap,
-    node_of,
     resample_way,
 )
 from planners.search.sampling import in_bounds, in_disc
@@ -36,6 +35,7 @@ from planners.search.tree import (
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import inlined, lean
 from planners.world.problem import Floats, Plan, Problem
+from planners.world.trigonometry import length
 from planners.world.vehicle import CAR, Vehicle
 
 SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
@@ -106,8 +106,17 @@ def join_groups(
     rng: np.random.Generator,
 ) -> None:
     """Put vertices ``first ..`` into the groups of their nearest roadmap nodes."""
+    node = -1
+    far_m = 0.0  # how far from (here_x, here_y) the node is the nearest for certain
+    here_x = 0.0
+    here_y = 0.0
     for vertex in range(first, first + count):
-        node = node_of(roadmap, tree.states[vertex, 0], tree.states[vertex, 1])
+        x = tree.states[vertex, 0]
+        y = tree.states[vertex, 1]
+        if node < 0 or length(x - here_x, y - here_y) >= far_m:
+            here_x = x
+            here_y = y
+            node, far_m = nearest_for(roadmap.connected, x, y)
         if groups.counts[node] == 0:
             groups.active[groups.size[0]] = node
             groups.size[0] += 1
@@ -147,7 +156,7 @@ def choose_member(
         vertex = members[k]
         if tree.spent[vertex]:
             continue
-        distance = math.hypot(tree.states[vertex, 0] - x, tree.states[vertex, 1] - y)
+        distance = length(tree.states[vertex, 0] - x, tree.states[vertex, 1] - y)
         speed = max(0.01 * vehicle.max_speed, tree.states[vertex, 3])
         weight = 1.0 / (tree.depths[vertex] * vehicle.dt + distance / speed + 1e-9)
         total += weight

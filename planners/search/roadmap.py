@@ -29,7 +29,7 @@ from planners.world.jit import inlined, lean
 from planners.world.problem import Floats
 from planners.world.vehicle import Vehicle
 
-BUCKET_M = 4.0  # nodes lie some 6 m apart
+BUCKET_M = 8.0  # nodes lie some 6 m apart
 GOAL, START = 0, 1  # the first two nodes
 # places in Roadmap.counts
 NODES, CHECKS, EDGES, QUEUED = range(4)
@@ -88,8 +88,8 @@ def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
         np.empty(capacity, np.int64),
         np.empty(capacity, np.int64),
         np.zeros(4, np.int64),
-        allocate_buckets(nodes),
-        allocate_buckets(nodes),
+        allocate_buckets(),
+        allocate_buckets(),
         np.empty(neighbours, np.int64),
         np.empty(neighbours),
     )
@@ -119,7 +119,7 @@ def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, sc
         roadmap.edge_next[2 * edge + 1] = roadmap.heads[other]
         roadmap.heads[other] = 2 * edge + 1
         counts[EDGES] += 1
-    put(roadmap.sampled, new)
+    put(roadmap.sampled, new, x, y)
 
 
 @inlined
@@ -180,7 +180,7 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehic
     roadmap.counts[QUEUED] = 1
     while roadmap.counts[QUEUED] > 0:
         node = pop(roadmap)
-        put(roadmap.connected, node)
+        put(roadmap.connected, node, nodes[node, 0], nodes[node, 1])
         edge = roadmap.heads[node]
         while edge >= 0:
             other = roadmap.edge_to[edge]

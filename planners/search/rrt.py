@@ -10,7 +10,17 @@ from planners.search.attempt import attempt
 from planners.search.neighbours import nearest
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
 from planners.search.sampling import guided
-from planners.search.tree import EXPANSIONS, EXTENSION, GOAL_VERTEX, NO_LEAD, SIZE, Extension, Tree, extend
+from planners.search.tree import (
+    EXPANSIONS,
+    EXTENSION,
+    GOAL_VERTEX,
+    NO_LEAD,
+    SIZE,
+    Extension,
+    Tree,
+    extend,
+    prune,
+)
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import lean
 from planners.world.problem import Floats, Plan, Problem
@@ -22,6 +32,7 @@ class RrtSettings(NamedTuple):
 
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0
+    restart_after: int = 1000  # expansions of the first tree; each next one may grow twice as long
     extension: Extension = EXTENSION
 
 
@@ -59,6 +70,18 @@ def rrt(
     """Plan from the problem's start to its goal disc; a guide draws the targets near its plans."""
     ready = scene_of(problem) if scene is None else scene
     guiding = NO_GUIDE if guide is None else guide
+    planted = 1 if prefix is None else len(prefix.states)
+    patience, restart_at = settings.restart_after, settings.restart_after
+
+    def grow(tree: Tree, goal: Floats, until: int) -> None:
+        nonlocal patience, restart_at
+        if tree.counts[EXPANSIONS] >= restart_at:
+            patience *= 2
+            restart_at += patience
+            prune(tree, planted, ready.bounds)
+        until = min(until, restart_at)
+        _grow(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng)
+
     return attempt(
         problem,
         ready,
@@ -66,5 +89,5 @@ def rrt(
         vehicle,
         prefix,
         lambda tree, goal: None,
-        lambda tree, goal, until: _grow(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng),
+        grow,
     )

@@ -27,7 +27,7 @@ class Tree(NamedTuple):
     parents: Indices  # [C]
     depths: Indices  # [C] steps from the root
     waypoints: Indices  # [C] next waypoint of the lead path (Follow)
-    spent: Indices  # [C] 1 where an extension collided in its first step: no control leads on from there
+    spent: Indices  # [C] 1 where an extension soon collided: too near an obstacle to lead anywhere
     counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
     bound: Floats  # [1] seconds: no vertex is added from which the goal cannot be reached sooner
     buckets: Buckets
@@ -40,6 +40,7 @@ class Extension(NamedTuple):
     metres_a_step: float = 0.5  # floor(distance / this) steps ...
     least_steps: int = 20  # ... plus a uniform number of these
     most_steps: int = 40
+    least_added: int = 12  # a vertex from which fewer steps were free is not extended again
     arrival_m: float = 1.0  # a target is reached within this distance
     slowest_share: float = 0.95  # desired speed: U(this, 1) of the maximum
     proportional: float = 10.0
@@ -65,14 +66,13 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
         np.empty(capacity, np.int64),
         np.zeros(4, np.int64),
         np.zeros(1),
-        allocate_buckets(states),
+        allocate_buckets(),
     )
 
 
 @lean
 def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
     """Begin a new tree with a drive: ``states [n, S]`` from the root on and the ``controls [n - 1, 2]``."""
-    clear_buckets(tree.buckets, bounds, BUCKET_M)
     for i in range(states.shape[0]):
         for k in range(states.shape[1]):  # one by one: assigning a row compiles for two seconds
             tree.states[i, k] = states[i, k]
@@ -80,13 +80,21 @@ def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s:
         tree.controls[i, 1] = controls[i - 1, 1] if i > 0 else 0.0
         tree.parents[i] = i - 1
         tree.depths[i] = i
+    tree.counts.fill(0)
+    tree.bound[0] = bound_s
+    prune(tree, states.shape[0], bounds)
+
+
+@lean
+def prune(tree: Tree, size: int, bounds: Floats) -> None:
+    """Forget all but the first ``size`` vertices; what was counted stays counted."""
+    clear_buckets(tree.buckets, bounds, BUCKET_M)
+    for i in range(size):
         tree.waypoints[i] = 0
         tree.spent[i] = 0
-        put(tree.buckets, i)
-    tree.counts.fill(0)
-    tree.counts[SIZE] = states.shape[0]
+        put(tree.buckets, i, tree.states[i, 0], tree.states[i, 1])
+    tree.counts[SIZE] = size
     tree.counts[GOAL_VERTEX] = -1
-    tree.bound[0] = bound_s
 
 
 @inlined
@@ -148,6 +156,7 @@ def extend(
     last_speed = 0.0
     first = counts[SIZE]
     parent = vertex
+    arrived = False
     for i in range(steps):
         if counts[SIZE] == states.shape[0]:
             break
@@ -204,24 +213,36 @@ def extend(
         tree.depths[new] = depth
         tree.waypoints[new] = waypoint
         tree.spent[new] = 0
-        put(tree.buckets, new)
+        put(tree.buckets, new, x, y)
         parent = new
         if to_goal <= 0.0:
             counts[GOAL_VERTEX] = new
             break
-        if length(x - target_x, y - target_y) < settings.arrival_m:
+        arrived = length(x - target_x, y - target_y) < settings.arrival_m
+        if arrived:
             break
     added = int(counts[SIZE] - first)
-    if added == 0 and vertex > 0:  # one step is too short for the controls to make a difference
+    if added < settings.least_added and not arrived and vertex > 0:
         tree.spent[vertex] = 1
-        remove(tree.buckets, vertex)
+        remove(tree.buckets, vertex, states[vertex, 0], states[vertex, 1])
     return added
+
+
+@lean
+def _trace(tree: Tree, states: Floats, controls: Floats) -> None:
+    vertex = tree.counts[GOAL_VERTEX]
+    for i in range(states.shape[0] - 1, -1, -1):
+        for k in range(states.shape[1]):
+            states[i, k] = tree.states[vertex, k]
+        if i > 0:
+            controls[i - 1, 0] = tree.controls[vertex, 0]
+            controls[i - 1, 1] = tree.controls[vertex, 1]
+        vertex = tree.parents[vertex]
 
 
 def plan_to_goal(tree: Tree, dt: float) -> Plan:
     """The way from the root to the goal vertex."""
-    chain = [int(tree.counts[GOAL_VERTEX])]
-    while tree.parents[chain[-1]] >= 0:
-        chain.append(int(tree.parents[chain[-1]]))
-    chain.reverse()
-    return Plan(tree.states[chain], tree.controls[chain[1:]], dt)
+    steps = int(tree.depths[tree.counts[GOAL_VERTEX]])
+    plan = Plan(np.empty((steps + 1, tree.states.shape[1])), np.empty((steps, 2)), dt)
+    _trace(tree, plan.states, plan.controls)
+    return plan

@@ -17,7 +17,7 @@ from planners.world.problem import Floats, Integers, Problem
 from planners.world.trigonometry import length
 from planners.world.vehicle import Vehicle
 
-CELL_M = 1.0  # measured: smaller cells cost more to fill than they save in checks
+CELL_M = 2.0  # measured: smaller cells cost more to fill than they save in checks
 REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept body, a roadmap node's
 
 
@@ -67,7 +67,7 @@ def box_meets_piece(
     last: int,
     edges: Floats,
 ) -> bool:
-    """Whether a box and the convex piece of edges ``first`` to before ``last`` share a point (separating axes)."""
+    """Whether a box and the convex piece of edges ``first`` to before ``last`` meet (separating axes)."""
     for i in range(first, last):
         if edge_separates(x, y, cos, sin, half_length, half_width, i, edges):
             return False

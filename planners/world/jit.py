@@ -49,7 +49,7 @@ def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a kernel that allocates nothing, without counting references to arrays.
 
-    Numba otherwise counts each array of each tuple that is passed on, which takes longer than a collision check.
+    Numba otherwise counts each array of each tuple that is passed on, which costs more than a check.
     """
     compiled: Callable[_P, _R] = numba.njit(**_LEAN)(function)
     return compiled

@@ -8,27 +8,31 @@ from planners.world.jit import inlined
 
 
 @inlined
-def sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine to 2e-16 for angles (radians) up to some thousand turns.
-
-    The angle is brought to [-pi/4, pi/4] by subtracting quarter turns in three parts (Cody and Waite 1980);
-    the polynomials are fdlibm's.
-    """
-    turns = math.floor(angle * (2.0 / math.pi) + 0.5)
-    r = angle - turns * 1.57079632673412561417e00
-    r -= turns * 6.07710050630396597660e-11
-    r -= turns * 2.02226624879595063154e-21
+def _within_an_eighth(r: float) -> tuple[float, float]:
+    """Sine and cosine within an eighth of a turn, by fdlibm's polynomials."""
     z = r * r
     sin = 2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)
     sin = -1.66666666666666324348e-01 + z * (
         8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * sin)
     )
-    sin = r + r * z * sin
     cos = -2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11)
     cos = 4.16666666666666019037e-02 + z * (
         -1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + z * cos)
     )
-    cos = 1.0 - 0.5 * z + z * z * cos
+    return r + r * z * sin, 1.0 - 0.5 * z + z * z * cos
+
+
+@inlined
+def sincos(angle: float) -> tuple[float, float]:
+    """Sine and cosine to 2e-16 for angles (radians) up to some thousand turns.
+
+    Quarter turns are subtracted in three parts (Cody and Waite 1980) until an eighth is left at most.
+    """
+    turns = math.floor(angle * (2.0 / math.pi) + 0.5)
+    r = angle - turns * 1.57079632673412561417e00
+    r -= turns * 6.07710050630396597660e-11
+    r -= turns * 2.02226624879595063154e-21
+    sin, cos = _within_an_eighth(r)
     quarter = int(turns) & 3
     if quarter & 1:
         sin, cos = cos, -sin
@@ -38,9 +42,24 @@ def sincos(angle: float) -> tuple[float, float]:
 
 
 @inlined
+def sincos_small(angle: float) -> tuple[float, float]:
+    """The same, faster where the angle is most often within an eighth of a turn."""
+    if abs(angle) <= 0.25 * math.pi:
+        return _within_an_eighth(angle)
+    return sincos(angle)
+
+
+@inlined
+def turned_by(sin: float, cos: float, angle: float) -> tuple[float, float]:
+    """Sine and cosine of a direction that is turned on by a small ``angle`` (radians)."""
+    s, c = sincos_small(angle)
+    return sin * c + cos * s, cos * c - sin * s
+
+
+@inlined
 def tan(angle: float) -> float:
-    """Tangent of an angle in radians."""
-    sin, cos = sincos(angle)
+    """Tangent of a steering angle in radians."""
+    sin, cos = sincos_small(angle)
     return sin / cos
 
 

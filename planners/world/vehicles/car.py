@@ -6,7 +6,7 @@ import math
 
 from planners.world.jit import implements, inlined
 from planners.world.problem import Floats
-from planners.world.trigonometry import sincos, tan
+from planners.world.trigonometry import sincos, tan, turned_by
 from planners.world.vehicle import Car, CarWithTrailers
 from planners.world.vehicles.interface import (
     Box,
@@ -53,9 +53,9 @@ def drive(
     """The pose after a Runge-Kutta step of ``h`` seconds at these turn rates (as ``turn_rates``)."""
     half_speed = 0.5 * (speed + end_speed)
     sin_1, cos_1 = sincos(heading)
-    sin_2, cos_2 = sincos(heading + 0.5 * h * turns[0])
-    sin_3, cos_3 = sincos(heading + 0.5 * h * turns[1])
-    sin_4, cos_4 = sincos(heading + h * turns[1])
+    sin_2, cos_2 = turned_by(sin_1, cos_1, 0.5 * h * turns[0])
+    sin_3, cos_3 = turned_by(sin_1, cos_1, 0.5 * h * turns[1])
+    sin_4, cos_4 = turned_by(sin_1, cos_1, h * turns[1])
     return (
         x + h / 6.0 * (speed * cos_1 + 2.0 * half_speed * (cos_2 + cos_3) + end_speed * cos_4),
         y + h / 6.0 * (speed * sin_1 + 2.0 * half_speed * (sin_2 + sin_3) + end_speed * sin_4),

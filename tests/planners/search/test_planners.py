@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -53,7 +55,7 @@ def test_the_budget_of_expansions_is_spent_exactly_where_the_goal_is_walled_in(n
 
 @EVERY
 def test_a_full_tree_ends_the_search(name):
-    outcome = plan(name, walled_goal(), generator(0), limits=Limits(nodes=500))
+    outcome = plan(name, walled_goal(), generator(0), limits=Limits(nodes=500, seconds=math.inf))
     assert outcome.status is Status.BUDGET_SPENT
     assert outcome.nodes == 500
 
