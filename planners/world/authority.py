@@ -1,7 +1,7 @@
 """The independent judge of plans: own equations in NumPy, collision by FCL; shares no code with the planners.
 
-What it accepts is a plan: driven by its controls from the problem's start, inside the car's limits, to the
-goal, its swept footprint free and inside the bounds at every instant.
+What it accepts is a plan: driven by its controls from the problem's start, inside the vehicle's limits, to
+the goal, the swept footprint of each of its bodies free and inside the bounds at every instant.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ import math
 import fcl
 import numpy as np
 
+from planners.world.authority_equations import Body, bodies_of, limits_of, simulate_again
 from planners.world.problem import Floats, Integers, Plan, Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicle import CAR, Vehicle, state_size
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
 ROUNDING = 1e-9  # on limits, metres and so on
@@ -32,18 +33,20 @@ _MOTION = fcl.ContinuousCollisionRequest(
 def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     """What is wrong with ``plan`` as an answer to ``problem``: one line each, none when it is good."""
     states, controls = plan.states, plan.controls
-    if states.ndim != 2 or states.shape[1] != 5 or controls.shape != (len(states) - 1, 2):
-        return [f"Shapes: states {states.shape}, controls {controls.shape}; wanted (T, 5) and (T - 1, 2)."]
+    size = state_size(vehicle)
+    if states.ndim != 2 or states.shape[1] != size or controls.shape != (len(states) - 1, 2):
+        wanted = f"(T, {size}) and (T - 1, 2)"
+        return [f"Shapes: states {states.shape}, controls {controls.shape}; wanted {wanted}."]
     if not (np.isfinite(states).all() and np.isfinite(controls).all()):
         return ["Numbers: the plan holds NaN or infinity."]
     found = []
     if plan.dt != vehicle.dt:
-        found.append(f"Time step: {plan.dt} s; the car's is {vehicle.dt} s.")
-    offset = np.abs(states[0] - [*problem.start, 0.0, 0.0]).max()
+        found.append(f"Time step: {plan.dt} s; the vehicle's is {vehicle.dt} s.")
+    offset = np.abs(states[0] - [*problem.start, *[0.0] * (size - 3)]).max()
     if offset > TOLERANCE:
-        found.append(f"Start: state 0 is {offset:.3g} off the problem's start at rest.")
+        found.append(f"Start: state 0 is {offset:.3g} off the problem's start at rest, all straight.")
     beyond = _limit_faults(states, controls, vehicle)
-    if beyond:  # how far a step may bend is known of the car within its limits only
+    if beyond:  # how far a step may bend is known within the limits only
         return found + beyond
     error = np.abs(simulate_again(states[0], controls, vehicle) - states).max(axis=1)
     if error.max() > TOLERANCE:
@@ -52,79 +55,39 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     miss = math.dist(states[-1, :2], problem.goal)
     if miss > problem.goal_radius + ROUNDING:
         found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
-    return found + _sweep_faults(problem, states, controls, vehicle)
-
-
-def simulate_again(start: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
-    """States ``[T, 5]`` from ``start [5]`` under ``controls [T - 1, 2]``: RK4, speed and steering clamped.
-
-    Heading depends on speed and steering alone, and position on these three alone: sums do the rest.
-    """
-    states = np.tile(np.asarray(start, dtype=float), (len(controls) + 1, 1))
-    speed, steering = float(start[3]), float(start[4])
-    for i, (acceleration, steering_rate) in enumerate(controls.tolist()):
-        speed = min(max(speed + vehicle.dt * acceleration, vehicle.min_speed), vehicle.max_speed)
-        steering += vehicle.dt * steering_rate
-        steering = min(max(steering, -vehicle.max_steering), vehicle.max_steering)
-        states[i + 1, 3:] = speed, steering
-    states[1:, 2] = start[2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, 2])
-    states[1:, :2] = start[:2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, :2], axis=0)
-    return states
-
-
-def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
-    """What one Runge-Kutta step adds to each of ``states [T, 5]``."""
-
-    def slopes(at: Floats) -> Floats:
-        _, _, heading, speed, steering = at.T
-        turn = speed * np.tan(steering) / vehicle.wheelbase
-        return np.column_stack((speed * np.cos(heading), speed * np.sin(heading), turn, controls))
-
-    h = vehicle.dt
-    k1 = slopes(states)
-    k2 = slopes(states + 0.5 * h * k1)
-    k3 = slopes(states + 0.5 * h * k2)
-    k4 = slopes(states + h * k3)
-    return h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    for body in bodies_of(states, controls, vehicle):
+        found += _sweep_faults(problem, body)
+    return found
 
 
 def _limit_faults(states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
-    limits = (
-        ("Speed", states[:, 3], vehicle.min_speed, vehicle.max_speed, "m/s"),
-        ("Steering", states[:, 4], -vehicle.max_steering, vehicle.max_steering, "rad"),
-        ("Acceleration", controls[:, 0], -vehicle.max_acceleration, vehicle.max_acceleration, "m/s^2"),
-        ("Steering rate", controls[:, 1], -vehicle.max_steering_rate, vehicle.max_steering_rate, "rad/s"),
-    )
     return [
-        f"{name}: {values.min():.4g} to {values.max():.4g} {unit}; the car allows {low:.4g} to {high:.4g}."
-        for name, values, low, high, unit in limits
+        f"{name}: {values.min():.4g} to {values.max():.4g} {unit}; allowed are {low:.4g} to {high:.4g}."
+        for name, values, low, high, unit in limits_of(states, controls, vehicle)
         if len(values) and (values.min() < low - ROUNDING or values.max() > high + ROUNDING)
     ]
 
 
-def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
-    """The first step in which the footprint leaves the bounds or meets an obstacle.
+def _sweep_faults(problem: Problem, body: Body) -> list[str]:
+    """The first step in which a body leaves the bounds or meets an obstacle.
 
     A box around the footprints of a run of steps is tried first, and halved while it meets something; a
     single step is then judged by continuous collision.
     """
-    half_length = 0.5 * (vehicle.front + vehicle.rear)
-    half_width = 0.5 * vehicle.width
-    along = np.column_stack((np.cos(states[:, 2]), np.sin(states[:, 2])))
+    name, half_length, half_width, centres, along, bend = body
     across = np.column_stack((-along[:, 1], along[:, 0]))
-    centres = states[:, :2] + 0.5 * (vehicle.front - vehicle.rear) * along
     corners = np.stack(
         [centres + u * half_length * along + w * half_width * across for u in (-1, 1) for w in (-1, 1)],
         axis=1,
     )
-    bend = _bend(states, controls, vehicle)
     slack = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))[:, None, None]
     low, high = problem.bounds[:2], problem.bounds[2:]
     outside = ((corners - slack < low) | (corners + slack > high)).any(axis=(1, 2))
     if outside.any():
-        return [f"Bounds: the footprint leaves them at state {int(np.argmax(outside))}."]
+        return [f"Bounds: the {name}'s footprint leaves them at state {int(np.argmax(outside))}."]
     manager = _manager(problem)
-    runs = [(i, min(i + _RUN, len(states) - 1)) for i in range(0, max(len(states) - 1, 1), _RUN)][::-1]
+    steps = len(centres) - 1
+    runs = [(i, min(i + _RUN, steps)) for i in range(0, max(steps, 1), _RUN)][::-1]
     while runs:
         first, last = runs.pop()
         if last - first > 1:
@@ -133,34 +96,18 @@ def _sweep_faults(problem: Problem, states: Floats, controls: Floats, vehicle: V
                 runs += [(middle, last), (first, middle)]
             continue
         wider = bend[first] if last > first else 0.0
-        body = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
+        box = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
         begin = _pose(centres[first], along[first])
         end = _pose(centres[last], along[last])
         around = _box_around(corners[first : last + 1], wider)
         for other in _near(manager, around):
-            if _hits(fcl.CollisionObject(body, begin), end, other):
-                x, y = states[first, :2]
+            if _hits(fcl.CollisionObject(box, begin), end, other):
+                x, y = centres[first]
                 return [
-                    f"Collision: the footprint meets an obstacle between states {first} and {last},"
+                    f"Collision: the {name}'s footprint meets an obstacle between states {first} and {last},"
                     f" near ({x:.2f}, {y:.2f})."
                 ]
     return []
-
-
-def _bend(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
-    """Farthest way ``[T - 1]``, metres, of a body point from where straight lines or arcs would have it.
-
-    A motion differs from a straight one between the same places by an eighth of the squared time step times
-    its largest second derivative, so two motions differ by at most twice that.
-    """
-    acceleration, steering_rate = np.abs(controls).T
-    speed = np.abs(states[:-1, 3]) + vehicle.dt * acceleration
-    steering = np.abs(states[:-1, 4]) + vehicle.dt * steering_rate
-    turn = speed * np.tan(steering) / vehicle.wheelbase
-    twist = acceleration * np.tan(steering) + speed * steering_rate / np.cos(steering) ** 2
-    reach = math.hypot(max(vehicle.front, vehicle.rear), 0.5 * vehicle.width)
-    second: Floats = acceleration + speed * turn + reach * (turn**2 + twist / vehicle.wheelbase)
-    return 2.0 * vehicle.dt**2 / 8.0 * second
 
 
 @functools.cache
