@@ -12,6 +12,7 @@ from planners.world.occupancy import GRID
 from planners.world.vehicle import Vehicle
 from storage.errors import StorageError
 from storage.files import read_json, whole_folder
+from storage.vehicles import fields_of, refuse_another
 
 VERSION: Final = 1  # one more whenever an older program could no longer read an archive
 
@@ -26,7 +27,7 @@ def write_archive(
     content = {
         "kind": kind,
         "version": VERSION,
-        "vehicle": vehicle._asdict(),
+        "vehicle": fields_of(vehicle),
         "grid": GRID,
         **header,
         "files": {name: _checksum(data) for name, data in files.items()},
@@ -41,7 +42,7 @@ def write_archive(
 def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Header and files of an archive, after every checksum was compared.
 
-    StorageError: missing, damaged, of a newer version, for another robot or another grid.
+    StorageError: missing, damaged, of a newer version, for another vehicle or another grid.
     """
     if not (folder / f"{kind}.json").is_file():
         raise StorageError(f"{folder} holds no {kind} (no {kind}.json in it); check the path or build one.")
@@ -56,11 +57,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
     checksum = header.pop("sha256", None)
     if checksum != _header_checksum(header) or not isinstance(header.get("files"), dict):
         raise _damaged(folder / f"{kind}.json", kind)
-    if header.get("vehicle") != vehicle._asdict():
-        raise StorageError(
-            f"{folder} was made for vehicle {json.dumps(header.get('vehicle'))}, wanted was "
-            f"{json.dumps(vehicle._asdict())}; build it with this vehicle."
-        )
+    refuse_another(folder, header.get("vehicle"), vehicle)
     if header.get("grid") != GRID:
         raise StorageError(
             f"{folder} was made for grids of {header.get('grid')!r} cells a side, wanted was {GRID}; "

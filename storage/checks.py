@@ -18,7 +18,8 @@ WIDEST_BOUNDS_M: Final = 1_000.0  # the cell look-up of collision checks grows w
 def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     """What is wrong with a problem whose obstacles are well formed and what to do, or None.
 
-    In this order: numbers finite and near, bounds, goal radius, distance, start footprint, goal centre.
+    In this order: numbers finite and near, bounds, goal radius, distance, start footprint (trailers straight
+    behind), goal centre.
     """
     numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds)
     if not all(math.isfinite(number) for number in numbers):
@@ -43,7 +44,7 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
             f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
         )
     scene = scene_of(problem)
-    if count_free_prefix(start_state(problem)[np.newaxis], vehicle, scene) == 0:
+    if count_free_prefix(start_state(problem, vehicle)[np.newaxis], vehicle, scene) == 0:
         return f"start footprint at {_place(problem.start)} is not free or leaves the bounds; move the start"
     x, y = problem.goal
     if not box_is_free(x, y, 1.0, 0.0, 0.0, 0.0, scene):

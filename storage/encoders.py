@@ -37,7 +37,7 @@ def save_encoder(folder: Path, trained: TrainedEncoder, vehicle: Vehicle = CAR) 
 def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
     """The trained encoder in a folder.
 
-    StorageError: missing, damaged, of a newer version, for another robot or another grid.
+    StorageError: missing, damaged, of a newer version, for another vehicle or another grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:

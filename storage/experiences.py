@@ -5,20 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from planners.memory.experience import Experience
 from planners.world.problem import Plan
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicle import CAR, Vehicle, state_size
 from storage.columns import list_column, lists_of, problem_columns, problems_of
 from storage.errors import StorageError
 from storage.schemas import EXPERIENCES
 from storage.shards import metadata_of, read_table, write_table
+from storage.vehicles import fields_of, refuse_another
 
-_STATE = 5
 _CONTROL = 2
+_VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
 
 
 def write_experiences(
@@ -42,25 +44,23 @@ def write_experiences(
         "seed": list(seeds),
         "planning_seconds": list(planning_seconds),
     }
-    table = pa.table(columns, schema=_with_vehicle(vehicle))
+    table = pa.table(columns, schema=EXPERIENCES.with_metadata(_metadata(vehicle)))
     write_table(path, table, key)
 
 
 def read_experiences(path: Path, vehicle: Vehicle = CAR) -> list[Experience]:
     """The experiences of a file, in order.
 
-    StorageError: the file is missing, damaged, of another kind, or recorded for another robot.
+    StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
     """
     table = read_table(path, EXPERIENCES)
-    recorded = metadata_of(path).get(b"vehicle", b"").decode()
-    if recorded != _vehicle_text(vehicle):
-        raise StorageError(
-            f"{path} was recorded for vehicle {recorded}, wanted was {_vehicle_text(vehicle)}; "
-            "collect experiences with this vehicle."
-        )
+    refuse_another(path, _recorded(path), vehicle)
+    size = state_size(vehicle)
     return [
         Experience(
-            problem, Plan(states.reshape(-1, _STATE).copy(), controls.reshape(-1, _CONTROL).copy(), dt)
+            problem,
+            Plan(states.reshape(-1, size).copy(), controls.reshape(-1, _CONTROL).copy(), dt),
+            vehicle,
         )
         for problem, states, controls, dt in zip(
             problems_of(table),
@@ -77,14 +77,19 @@ def merge_experiences(shards: Sequence[Path], path: Path, count: int, key: str =
     tables = [read_table(shard, EXPERIENCES) for shard in shards]
     if not tables:
         raise StorageError(f"{path} has no shards to be made from; run collect.")
+    if any(_recorded(shard) != _recorded(shards[0]) for shard in shards):
+        raise StorageError(
+            f"{path} would hold plans of several vehicles; run collect with a new data folder."
+        )
     merged = pa.concat_tables(tables).slice(0, count)
     write_table(path, merged, key)
     return int(merged.num_rows)
 
 
-def _with_vehicle(vehicle: Vehicle) -> pa.Schema:
-    return EXPERIENCES.with_metadata({**EXPERIENCES.metadata, b"vehicle": _vehicle_text(vehicle).encode()})
+def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:
+    return {**EXPERIENCES.metadata, _VEHICLE: json.dumps(fields_of(vehicle)).encode()}
 
 
-def _vehicle_text(vehicle: Vehicle) -> str:
-    return json.dumps(vehicle._asdict())
+def _recorded(path: Path) -> Any:
+    """The vehicle's settings that a file was written with."""
+    return json.loads(metadata_of(path).get(_VEHICLE, b"null"))

@@ -14,7 +14,7 @@ from planners.memory.encoder import Encoder
 from planners.memory.labels import sweep_plans
 from planners.memory.recall import Memory
 from planners.world.problem import Plan
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicle import CAR, Vehicle, state_size
 from storage.archives import read_archive, write_archive
 from storage.columns import Array
 from storage.errors import StorageError
@@ -31,7 +31,7 @@ def save_memory(folder: Path, memory: Memory) -> None:
         "centroids": memory.centroids,
         "vectors": memory.vectors,
         "biases": memory.biases,
-        **_plan_tensors(memory.plans),
+        **_plan_tensors(memory.plans, state_size(memory.vehicle)),
     }
     files = {
         _TENSORS: save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}),
@@ -43,7 +43,7 @@ def save_memory(folder: Path, memory: Memory) -> None:
 def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     """The memory in a folder.
 
-    StorageError: missing, damaged, of a newer version, for another robot or another grid.
+    StorageError: missing, damaged, of a newer version, for another vehicle or another grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
@@ -65,10 +65,10 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         raise StorageError(f"{folder} is no whole memory ({error}); build it again.") from None
 
 
-def _plan_tensors(plans: Sequence[Plan]) -> dict[str, Array]:
+def _plan_tensors(plans: Sequence[Plan], size: int) -> dict[str, Array]:
     """All plans end to end; ``plan_starts [N + 1]`` says where each plan's states begin."""
     return {
-        "states": np.concatenate([np.empty((0, 5)), *(plan.states for plan in plans)]),
+        "states": np.concatenate([np.empty((0, size)), *(plan.states for plan in plans)]),
         "controls": np.concatenate([np.empty((0, 2)), *(plan.controls for plan in plans)]),
         "plan_starts": np.cumsum([0] + [len(plan.states) for plan in plans], dtype=np.int64),
         "dt": np.array([plan.dt for plan in plans]),

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from planners.world.problem import Plan
+from planners.world.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
 from storage.files import read_json, write_json
+from storage.vehicles import other_vehicle
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +25,7 @@ class PlanRecord:
     assist: str
     planning_seconds: float
     plan: Plan | None
+    vehicle: Vehicle = CAR
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
@@ -36,6 +39,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
             "source": record.source,
             "planner": record.planner,
             "assist": record.assist,
+            "vehicle": name_of(record.vehicle),
             "dt": None if plan is None else plan.dt,
             "states": [] if plan is None else plan.states.tolist(),
             "controls": [] if plan is None else plan.controls.tolist(),
@@ -46,10 +50,11 @@ def write_plan(path: Path, record: PlanRecord) -> None:
     )
 
 
-def read_plan(path: Path) -> PlanRecord:
-    """The plan of a file; a StorageError where a field is missing or of another shape."""
+def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
+    """The plan of a file; a StorageError where a field is missing or misshapen, or for another vehicle."""
     found = read_json(path)
     try:
+        made_for = str(found.get("vehicle", name_of(CAR)))  # files were once of the car alone
         states = np.array(found["states"], float)
         controls = np.array(found["controls"], float).reshape(-1, 2)
         plan = Plan(states, controls, float(found["dt"])) if len(states) else None
@@ -61,15 +66,20 @@ def read_plan(path: Path) -> PlanRecord:
             str(found["assist"]),
             float(found["planning_seconds"]),
             plan,
+            vehicle,
         )
     except KeyError as error:
         raise StorageError(f"{path} has no field {error}; is it a plan?") from None
-    except (TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError) as error:
         raise StorageError(f"{path} is no plan: {error}.") from None
-    if plan is not None and (states.ndim != 2 or states.shape[1] != 5 or len(states) != len(controls) + 1):
+    if made_for != name_of(vehicle):
+        raise other_vehicle(path, made_for, vehicle)
+    names = state_names(vehicle)
+    shapes = (len(controls) + 1, len(names))
+    if plan is not None and states.shape != shapes:
         raise StorageError(
-            f"{path} has states {list(states.shape)} and controls {list(controls.shape)}; wanted were [T, 5] "
-            "(x, y, heading, speed, steering) and [T - 1, 2]. Was it recorded for another robot?"
+            f"{path} has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
+            f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2]. Was it recorded for another vehicle?"
         )
     if plan is not None and not (np.isfinite(states).all() and np.isfinite(controls).all()):
         raise StorageError(

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from planners.world.problem import Floats, Obstacles, Problem, obstacles_of
+from planners.world.vehicle import CAR, Vehicle
 from storage.checks import problem_fault
 from storage.errors import StorageError
 from storage.files import parse_json, read_text, whole_file, write_json
@@ -25,13 +26,13 @@ _REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
 _OPTIONAL: Final = ("id", "class", "groups")
 
 
-def read_problems(path: Path) -> list[Problem]:
+def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
     """All problems of a file, checked (``iterate_problems``)."""
-    return list(iterate_problems(path))
+    return list(iterate_problems(path, vehicle))
 
 
-def iterate_problems(path: Path) -> Iterator[Problem]:
-    """The problems of a file one by one, each checked when its turn comes.
+def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
+    """The problems of a file one by one, each checked for a vehicle when its turn comes.
 
     StorageError: a problem is malformed, impossible or has another's id; the message names file, line, id
     and what to do.
@@ -42,9 +43,8 @@ def iterate_problems(path: Path) -> Iterator[Problem]:
         identity = fields.get("id") if isinstance(fields, Mapping) else None
         named = f"{place} (id {_short(identity)})" if isinstance(identity, str) and identity else place
         try:
-            problem = problem_of(
-                fields, default_id=path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
-            )
+            name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
+            problem = problem_of(fields, name, vehicle)
         except ValueError as error:
             raise StorageError(f"{named}: {error}.") from None
         if problem.id in seen:
@@ -72,7 +72,7 @@ def write_problems(path: Path, problems: Sequence[Problem]) -> None:
             write_table(path, table_of(rows, PROBLEMS, "problem"))
 
 
-def problem_of(fields: object, default_id: str) -> Problem:
+def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
     """The problem that a contract's object describes, checked; ValueError says what is wrong with it."""
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
@@ -90,7 +90,7 @@ def problem_of(fields: object, default_id: str) -> Problem:
         bounds=(bounds[0], bounds[1], bounds[2], bounds[3]),
         obstacles=_obstacles(fields["obstacles"], fields.get("groups")),
     )
-    fault = problem_fault(problem)
+    fault = problem_fault(problem, vehicle)
     if fault is not None:
         raise ValueError(fault)
     return problem

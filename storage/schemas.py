@@ -53,8 +53,8 @@ EXPERIENCES: Final = _schema(
     [
         *_PROBLEM,
         *_GEOMETRY,
-        ("states", pa.list_(pa.float64())),  # T x (x m, y m, heading rad, speed m/s, steering rad)
-        ("controls", pa.list_(pa.float64())),  # (T - 1) x (acceleration m/s^2, steering rate rad/s)
+        ("states", pa.list_(pa.float64())),  # T x S: ``vehicle.state_names`` of the metadata's vehicle
+        ("controls", pa.list_(pa.float64())),  # (T - 1) x 2: ``vehicle.control_names``
         ("dt", pa.float64()),  # s
         ("planner", pa.string()),
         ("seed", pa.int64()),

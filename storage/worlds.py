@@ -20,6 +20,7 @@ from planners.world.problem import (
     Problem,
     obstacles_of,
 )
+from planners.world.vehicle import CAR, Vehicle
 from storage.checks import problem_fault
 from storage.errors import StorageError
 from storage.layout import checked_name
@@ -43,12 +44,13 @@ _BROKEN: Final = (
 
 
 def import_png_folder(
-    folder: Path, part: str, strict: bool = False
+    folder: Path, part: str, strict: bool = False, vehicle: Vehicle = CAR
 ) -> tuple[list[Problem], list[tuple[Path, str]]]:
     """The problems that the pictures in ``folder/part`` show, by number, and the pictures skipped, with why.
 
     The class is the folder's name. Skipped is a picture that is broken, of the wrong size, or has its start
-    or goal blocked. StorageError: folder or part is missing, no picture is good, or ``strict`` and one bad.
+    or goal blocked for the vehicle. StorageError: folder or part is missing, no picture is good, or
+    ``strict`` and one bad.
     """
     folder = folder.absolute()
     class_name = checked_name(folder.name)
@@ -65,7 +67,7 @@ def import_png_folder(
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         for file in files:
             try:
-                problems.append(_problem(file, f"{class_name}-{part}-{file.stem}", class_name))
+                problems.append(_problem(file, f"{class_name}-{part}-{file.stem}", class_name, vehicle))
             except ValueError as error:
                 if strict:
                     raise StorageError(f"{file} {error}.") from None
@@ -99,7 +101,7 @@ def rectangles_of(occupied: Cells) -> Obstacles:
     return obstacles_of([list(corners[region == number]) for number in range(1, count + 1)])
 
 
-def _problem(file: Path, identity: str, class_name: str) -> Problem:
+def _problem(file: Path, identity: str, class_name: str, vehicle: Vehicle) -> Problem:
     """The problem that a picture shows; ValueError with the reason why it shows none."""
     low, high = _metres(np.array([0, PIXELS])).tolist()
     problem = Problem(
@@ -111,7 +113,7 @@ def _problem(file: Path, identity: str, class_name: str) -> Problem:
         (low, low, high, high),
         rectangles_of(_occupied(file)),
     )
-    fault = problem_fault(problem)
+    fault = problem_fault(problem, vehicle)
     if fault is not None:
         raise ValueError(f"cannot be planned in: {fault}")
     return problem
