@@ -101,6 +101,7 @@ def plan(
     assist: str = "none",
     top_k: int = 5,
     memory: Path | None = None,
+    vehicle: str = "car",
     seed: int = 1,
     out: Path | None = None,
     picture: Path | None = None,
@@ -118,7 +119,9 @@ def plan(
     top_k
         How many plans are recalled.
     memory
-        Folder of a run, or of one memory.
+        Folder of a run, or of one memory; built for the same vehicle.
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
     out
@@ -127,9 +130,10 @@ def plan(
         Where to draw it, .png, .svg or .pdf.
 
     """
-    from tasks.solve import plan_one
+    from tasks.solve import Assistant, plan_one
 
-    plan_one(problem, planner, assist, top_k, memory, seed, out, picture)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle)
+    plan_one(assistant, problem, out, picture)
 
 
 @app.command
@@ -140,6 +144,7 @@ def solve(
     assist: str = "none",
     top_k: int = 5,
     memory: Path | None = None,
+    vehicle: str = "car",
     seed: int = 1,
     out: Path,
     plans: Path | None = None,
@@ -157,7 +162,9 @@ def solve(
     top_k
         How many plans are recalled.
     memory
-        Folder of a run, or of one memory.
+        Folder of a run, or of one memory; built for the same vehicle.
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
     out
@@ -166,9 +173,10 @@ def solve(
         Folder for the plans, one .json a problem.
 
     """
-    from tasks.solve import solve_many
+    from tasks.solve import Assistant, solve_many
 
-    solve_many(problems, planner, assist, top_k, memory, seed, out, plans)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle)
+    solve_many(assistant, problems, out, plans)
 
 
 def _do(stage: str, options: Options) -> None:
@@ -183,6 +191,7 @@ def _do(stage: str, options: Options) -> None:
         seed=options.seed,
         objective=options.objective,
         strict=options.strict,
+        vehicle=options.vehicle,
     )
     run_stage(
         f"flows.{stage}",

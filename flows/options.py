@@ -25,6 +25,8 @@ class Options:
         A folder of worlds with parts train and test: one more class. Can be given several times.
     difficulty
         Of the generated classes: easy, standard or hard.
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
     objective
@@ -44,6 +46,7 @@ class Options:
     classes: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
     worlds: Annotated[list[Path] | None, Parameter(negative=())] = None
     difficulty: str = "standard"
+    vehicle: str = "car"
     seed: int = 1
     objective: str = "labels"
     data: Path | None = None

@@ -20,6 +20,7 @@ from planners.world.collision import Scene, scene_of
 from planners.world.occupancy import occupancy_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
+from planners.world.vehicle import CAR, Vehicle, name_of
 
 ASSISTS = ("none", "closed", "open", "random-closed", "random-open")
 
@@ -89,13 +90,15 @@ def solve(
     memory: Memory | None = None,
     seed: int = 0,
     limits: Limits | None = None,
+    vehicle: Vehicle = CAR,
 ) -> Attempt:
     """Solve a canonical ``problem``: stored plans first, as ``assist`` says, then the planner.
 
     ``closed``: the first of the ``top_k`` recalled plans that is free, else the planner as it is. ``open``:
     the same, but the planner samples near the recalled plans. ``random-`` picks plans at random instead.
 
-    Raises ValueError for an unknown planner or assist, or one that needs a memory and has none.
+    Raises ValueError for an unknown planner or assist, one that needs a memory and has none, and a memory of
+    another vehicle.
     """
     if planner not in PLANNERS:
         raise ValueError(f"unknown planner '{planner}': choose one of {', '.join(PLANNERS)}")
@@ -103,6 +106,11 @@ def solve(
         raise ValueError(f"unknown assist '{assist}': choose one of {', '.join(ASSISTS)}")
     if assist != "none" and (memory is None or top_k < 1):
         raise ValueError(f"assist '{assist}' needs a memory and a top k of at least 1; top k is {top_k}")
+    if memory is not None and memory.vehicle != vehicle:
+        raise ValueError(
+            f"memory of {memory.class_name} was built for vehicle {name_of(memory.vehicle)}, asked was "
+            f"{name_of(vehicle)}: build one for {name_of(vehicle)}"
+        )
     rng = generator(seed, "search", problem.id, planner)
     picking = generator(seed, "random-plans", problem.id)
 
@@ -138,7 +146,7 @@ def solve(
         if memory is not None and recalled and assist.endswith("open"):
             turned_plans = [turned(memory.plans[i], problem.start[2]) for i in recalled]
             guide = Guide(*guidance(turned_plans))
-        outcome = plan(planner, problem, rng, guide, scene, limits)
+        outcome = plan(planner, problem, rng, guide, scene, limits, vehicle)
     planning_seconds = perf_counter() - began
 
     answer = found if outcome is None else outcome.plan

@@ -110,8 +110,9 @@ ATTEMPTS: Final = _schema(
         ("host", pa.string()),
         ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
         ("verified", pa.bool_()),  # an independent check agreed; null where none was made
+        ("vehicle", pa.string()),  # its name
     ],
-    optional=("scene_seconds", "verified"),
+    optional=("scene_seconds", "verified", "vehicle"),
 )
 
 

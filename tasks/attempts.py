@@ -13,6 +13,7 @@ from typing import Any, Final
 from planners.solve import Attempt
 from planners.world.authority import faults
 from planners.world.problem import Problem
+from planners.world.vehicle import Vehicle, name_of
 from storage.schemas import ATTEMPTS
 from tasks.settings import RunError
 
@@ -24,32 +25,32 @@ class PlanFaultError(RunError):
     """A plan that was called solved is not: a bug, never data."""
 
 
-def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes]) -> None:
+def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes], vehicle: Vehicle) -> None:
     """Have the authority check an attempt's plan, once however many attempts gave the same (``checked``)."""
     if attempt.plan is None:
         return
     plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
     if plan in checked:
         return
-    wrong = faults(problem, attempt.plan)
+    wrong = faults(problem, attempt.plan, vehicle)
     if wrong:
         asked = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
         raise PlanFaultError(f"{problem.id} solved by {asked}: {wrong[0]}")
     checked.add(plan)
 
 
-def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None) -> dict[str, Any]:
+def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
     """The row of a checked attempt (``storage.schemas.ATTEMPTS``)."""
     row = {name: getattr(attempt, name) for name in _FIELDS}
     if not attempt.solved:
         row |= dict.fromkeys(_UNKNOWN_WHEN_UNSOLVED)
-    where = {"run_id": run_id, "commit": commit(), "host": platform.node()}
+    where = {"run_id": run_id, "commit": commit(), "host": platform.node(), "vehicle": name_of(vehicle)}
     return row | where | {"memory": memory, "verified": True if attempt.solved else None}
 
 
-def same_outcome(attempt: Attempt, row: dict[str, Any]) -> bool:
+def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> bool:
     """Whether an attempt made again came out as its row says, timings aside."""
-    again = attempt_row(attempt, row["memory"], row["run_id"])
+    again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
     counted = ("status", "solved", "collision_checks", "expansions", "nodes")
     lengths = (again["length_m"] or math.nan, row["length_m"])
     return (

@@ -15,6 +15,7 @@ from planners.world.collision import scene_of
 from planners.world.occupancy import occupancy_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.vehicle import vehicle_named
 from storage.memories import load_memory
 from storage.recalls import write_recalls
 from storage.results import write_attempts
@@ -58,21 +59,23 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     """Solve a range of unseen problems in every way, check the plans, write attempts and recalls."""
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
-    memories = {memory: load_memory(chunk.run.memory(memory)) for memory in memories_of(settings, name)}
+    vehicle = vehicle_named(settings.vehicle)
+    places = {memory: chunk.run.memory(memory) for memory in memories_of(settings, name)}
+    memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
     asked = configurations(settings, name)
     rows: list[dict[str, Any]] = []
     recalls: dict[str, list[dict[str, Any]]] = {memory: [] for memory in memories}
     for asked_first in asked:  # code and caches are warm before the first time counts
-        _attempt(source.problem("test", chunk.first), asked_first, memories, settings.seed)
+        _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
     with _no_garbage_collection():
         for index in range(chunk.first, chunk.last):
             problem = source.problem("test", index)
             order = generator(settings.seed, "order", problem.id).permutation(len(asked))
-            attempts = {int(i): _attempt(problem, asked[i], memories, settings.seed) for i in order}
+            attempts = {int(i): _attempt(problem, asked[i], memories, settings) for i in order}
             checked: set[bytes] = set()
             for i in range(len(asked)):
-                check_attempt(problem, attempts[i], checked)
-                rows.append(attempt_row(attempts[i], asked[i].memory, settings.run_name))
+                check_attempt(problem, attempts[i], checked, vehicle)
+                rows.append(attempt_row(attempts[i], asked[i].memory, settings.run_name, vehicle))
             for memory, recalled in recalls.items():
                 recalled.append(_recall(problem, memories[memory], memory))
             gc.collect()
@@ -114,9 +117,13 @@ def benchmark_chunks(data: str, settings: RunSettings) -> list[Chunk]:
     ]
 
 
-def _attempt(problem: Problem, asked: Configuration, memories: dict[str, Memory], seed: int) -> Attempt:
+def _attempt(
+    problem: Problem, asked: Configuration, memories: dict[str, Memory], settings: RunSettings
+) -> Attempt:
     memory = memories[asked.memory] if asked.memory else None
-    return solve(problem, asked.planner, asked.assist.name, asked.assist.top_k, memory, seed)
+    vehicle = vehicle_named(settings.vehicle)
+    assist, top_k = asked.assist
+    return solve(problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle)
 
 
 def _recall(problem: Problem, memory: Memory, name: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from planners.memory.centroids import build_memory
 from planners.memory.recall import Memory, rank
 from planners.world.occupancy import GRID
+from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
 from storage.experiences import read_experiences
 from storage.hallucinated import Labelled
@@ -26,13 +27,14 @@ HELD_OUT_PROBLEMS: Final = 2_000  # enough for a share within 2 %
 def build_chunk(chunk: Chunk) -> dict[str, Any]:
     """Build one memory and write its recall of the problems that training did not see."""
     name, run = chunk.class_name, chunk.run
-    trained = load_encoder(run.model(name))
+    vehicle = vehicle_named(chunk.settings.vehicle)
+    trained = load_encoder(run.model(name), vehicle)
     problems = problems_of_memory(chunk.data, chunk.settings, name)
     seen = np.delete(np.arange(len(problems.plan_index)), trained.validation)
-    plans = [experience.plan for experience in read_experiences(run.experiences(name))]
+    plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
     metadata = {"run": chunk.settings.run_name, "problems": len(seen)}
     memory = build_memory(
-        trained, problems.grids[seen], problems.plan_index[seen], plans, name, metadata=metadata
+        trained, problems.grids[seen], problems.plan_index[seen], plans, name, vehicle, metadata
     )
     save_memory(run.memory(name), memory)
     rows = _held_out(memory, name, problems, trained.validation.tolist())

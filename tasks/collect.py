@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from planners.memory.experience import Experience
 from planners.solve import solve
+from planners.world.vehicle import vehicle_named
 from storage.experiences import merge_experiences, write_experiences
 from storage.shards import metadata_of, shard_is_done
 from tasks.attempts import check_attempt
@@ -25,14 +26,15 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     """Solve a range of a class's problems; write those solved, each plan checked by the authority."""
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
     planner, seed = chunk.settings.collector, chunk.settings.seed
+    vehicle = vehicle_named(chunk.settings.vehicle)
     experiences, seconds = [], []
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
-        attempt = solve(problem, planner, seed=seed)
+        attempt = solve(problem, planner, seed=seed, vehicle=vehicle)
         if attempt.plan is None:
             continue
-        check_attempt(problem, attempt, set())
-        experiences.append(Experience(problem, attempt.plan))
+        check_attempt(problem, attempt, set(), vehicle)
+        experiences.append(Experience(problem, attempt.plan, vehicle))
         seconds.append(attempt.planning_seconds)
     write_experiences(
         chunk.run.shard("experiences", chunk.class_name, chunk.index),
@@ -41,6 +43,7 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
         seeds=[seed] * len(experiences),
         planning_seconds=seconds,
         key=chunk.key,
+        vehicle=vehicle,
     )
     return {"solved": len(experiences), "asked": chunk.last - chunk.first}
 

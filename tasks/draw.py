@@ -11,6 +11,7 @@ from dashboards.charts import training_curves
 from dashboards.pictures import Example, gallery
 from dashboards.style import save
 from planners.solve import solve
+from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
 from storage.memories import load_memory
 from storage.results import read_attempts
@@ -29,11 +30,15 @@ SHOWN_EACH: Final = 2
 def draw_chunk(chunk: Chunk) -> dict[str, Any]:
     """Draw the figures of one memory."""
     run, name = chunk.run, chunk.class_name
-    history = load_encoder(run.model(name)).history
+    history = load_encoder(run.model(name), vehicle_named(chunk.settings.vehicle)).history
     epochs = pd.DataFrame(epoch._asdict() for epoch in history)
     drawn = save(training_curves(epochs), run.figures, f"training-{name}")
     if name in chunk.settings.class_names:
-        drawn += save(gallery(list(_examples(chunk))), run.figures, f"problems-{name}")
+        drawn += save(
+            gallery(list(_examples(chunk)), vehicle_named(chunk.settings.vehicle)),
+            run.figures,
+            f"problems-{name}",
+        )
     return {"figures": [path.name for path in drawn]}
 
 
@@ -64,11 +69,12 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
     rows = rows[(rows["assist"] == "open") & (rows["top_k"] == SHOWN_TOP_K)]
     places = {identity: index for index, identity in enumerate(rows["problem_id"])}
     source = source_of(chunk.data, settings, name)
-    memory = load_memory(chunk.run.memory(name))
+    vehicle = vehicle_named(settings.vehicle)
+    memory = load_memory(chunk.run.memory(name), vehicle)
     for kind in SHOWN_SOURCES:
         shown = rows[rows["source"] == kind].head(SHOWN_EACH)
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
             problem = source.problem("test", places[identity])
-            attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed)
+            attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.1f} ms"
             yield Example(problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption)

@@ -13,6 +13,7 @@ from planners.world.collision import scene_of
 from planners.world.occupancy import occupancy_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.vehicle import vehicle_named
 from storage.experiences import read_experiences
 from storage.hallucinated import read_hallucinated_problems, read_labelled, write_hallucinated
 from storage.shards import shard_is_done
@@ -31,8 +32,9 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     """Make the problems of a range of experiences, and a share of problems that no stored plan solves."""
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
-    experiences = read_experiences(chunk.run.experiences(name))
-    sweeps = sweep_plans([experience.plan for experience in experiences])
+    vehicle = vehicle_named(settings.vehicle)
+    experiences = read_experiences(chunk.run.experiences(name), vehicle)
+    sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     problems, plan_index = [], []
     for i in range(chunk.first, chunk.last):
         problems.append(experiences[i].problem)
@@ -87,7 +89,9 @@ def relabel_chunk(chunk: Chunk) -> dict[str, Any]:
     place = run.shard("hallucinated", origin.class_name, origin.index)
     offset = settings.class_names.index(origin.class_name) * settings.experiences
     plan_index = [i + offset if i >= 0 else i for i in read_labelled([place]).plan_index.tolist()]
-    sweeps = sweep_plans([experience.plan for experience in read_experiences(run.experiences(COMBINED))])
+    vehicle = vehicle_named(settings.vehicle)
+    experiences = read_experiences(run.experiences(COMBINED), vehicle)
+    sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     _write(chunk, read_hallucinated_problems(place), plan_index, sweeps)
     return {"problems": len(plan_index)}
 

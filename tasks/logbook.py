@@ -30,7 +30,7 @@ def tracker(data: str) -> Tracker:
 @contextmanager
 def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
     """The parent run: settings as parameters, where and from which commit it was made."""
-    tags = {"commit": commit(), "host": platform.node()}
+    tags = {"commit": commit(), "host": platform.node(), "vehicle": settings.vehicle}
     with tracker(data).run(settings.run_name, "run", tags) as run_id:
         tracker(data).parameters(run_id, asdict(settings))
         yield run_id
@@ -45,7 +45,8 @@ def log_training(
         with _child(data, settings, f"train {chunk.class_name}") as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
-            asked = {"class": chunk.class_name, "objective": settings.objective, "seed": settings.seed}
+            names = ("objective", "seed", "vehicle")
+            asked = {"class": chunk.class_name} | {name: getattr(settings, name) for name in names}
             log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
             log.metrics(run_id, result["epochs"], step="epoch")
             place = run.path / "hallucinated" / chunk.class_name

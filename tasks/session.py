@@ -21,7 +21,7 @@ def run_stage(
     with (
         folder.lock(),
         local_server(folder.path) as server,
-        _workers_for(name, folder, workers, scheduler, server),
+        _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         flow = getattr(importlib.import_module(module), name)
         flow(settings, str(folder.path))
@@ -42,7 +42,12 @@ def verify(folder: Path, sample: float, workers: int) -> None:
 
 @contextmanager
 def _workers_for(
-    name: str, folder: DataFolder, workers: int, scheduler: str | None, server: LocalServer | None
+    name: str,
+    folder: DataFolder,
+    workers: int,
+    scheduler: str | None,
+    server: LocalServer | None,
+    vehicle: str,
 ) -> Iterator[None]:
     """Start workers and tracker, compile meanwhile, and wait for the server; all of it at the same time."""
     from tasks.engine import cluster  # Prefect and Dask, after the environment is set
@@ -53,7 +58,8 @@ def _workers_for(
         if name in ("run", "train", "build_memory", "report"):
             tracker(str(folder.path))
         address = stack.enter_context(cluster(workers, scheduler))
-        stack.enter_context(warm_up(address) if scheduler is None and name != "report" else nullcontext())
+        local = scheduler is None and name != "report"
+        stack.enter_context(warm_up(address, vehicle) if local else nullcontext())
         if server is not None:
             print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
             server.wait()

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, get_args
 
+from planners.world.vehicle import VEHICLES
+
 Objective = Literal["labels", "triplet"]
 
 
@@ -24,6 +26,7 @@ ASSISTS: Final = (Assist("closed", 1), Assist("closed", 5), Assist("open", 1), A
 ABLATION: Final = (Assist("random-open", 1), Assist("random-open", 5))  # the paper's: plans drawn blindly
 COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
 ABLATION_PLANNER: Final = "gust"
+DEFAULT_VEHICLE: Final = "car"
 COMBINED: Final = "combined"  # the memory that does not distinguish the classes
 
 
@@ -54,6 +57,7 @@ class RunSettings:
     epochs: int
     combined: bool  # also one memory for all classes together
     strict: bool = False  # a bad world stops the run instead of being skipped
+    vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicle``)
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -65,12 +69,18 @@ class RunSettings:
         """Eight hexadecimal digits that tell settings with different results apart."""
         asked = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
         del asked["strict"]
+        if self.vehicle == DEFAULT_VEHICLE:  # such runs were made, and named, before there was another
+            del asked["vehicle"]
         return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
 
     @property
     def run_name(self) -> str:
-        """Name of the run's folder and of its parent run in MLflow, like ``laptop-labels-3f2a91c0``."""
-        return f"{self.preset}-{self.objective}-{self.digest}"
+        """Name of the run's folder and of its parent run in MLflow, like ``laptop-labels-3f2a91c0``.
+
+        Of another vehicle than the car it says the name, like ``laptop-labels-car-1-trailer-81d5c2e7``.
+        """
+        driven = [] if self.vehicle == DEFAULT_VEHICLE else [self.vehicle]
+        return "-".join([self.preset, self.objective, *driven, self.digest])
 
     def to_json(self) -> str:
         """The settings as one JSON object; ``from_json`` gives them back."""
@@ -79,7 +89,7 @@ class RunSettings:
     @classmethod
     def from_json(cls, text: str) -> RunSettings:
         """The settings that ``to_json`` wrote; ValueError with one line when they are of another version."""
-        values: dict[str, Any] = json.loads(text)
+        values: dict[str, Any] = {"vehicle": DEFAULT_VEHICLE} | json.loads(text)
         known = {field.name for field in fields(cls)}
         if set(values) != known:
             odd = ", ".join(sorted(set(values) ^ known))
@@ -126,6 +136,7 @@ def for_preset(
     test_problems: int | None = None,
     epochs: int | None = None,
     strict: bool = False,
+    vehicle: str = DEFAULT_VEHICLE,
 ) -> RunSettings:
     """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
 
@@ -134,14 +145,15 @@ def for_preset(
     from planners.search.registry import PLANNERS  # imported late: Numba costs half a second
     from planners.world.classes import CLASSES, DIFFICULTIES
 
-    _check_known("preset", [preset], PRESETS)
+    check_known("preset", [preset], PRESETS)
     base = PRESETS[preset]
     asked = tuple(CLASSES) if classes is None and not worlds else tuple(dict.fromkeys(classes or ()))
     named = tuple(PLANNERS) if planners is None else tuple(dict.fromkeys(planners))
-    _check_known("class", asked, CLASSES)
-    _check_known("planner", named, PLANNERS)
-    _check_known("difficulty", [difficulty], DIFFICULTIES)
-    _check_known("objective", [objective], get_args(Objective))
+    check_known("class", asked, CLASSES)
+    check_known("planner", named, PLANNERS)
+    check_known("difficulty", [difficulty], DIFFICULTIES)
+    check_known("objective", [objective], get_args(Objective))
+    check_known("vehicle", [vehicle], VEHICLES)
     if not asked and not worlds:
         raise UsageError(f"No class to work on. Name some of: {', '.join(CLASSES)}.")
     if not named:
@@ -170,6 +182,7 @@ def for_preset(
         epochs=_count("epochs", epochs, base.epochs),
         combined=base.combined,
         strict=strict,
+        vehicle=vehicle,
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))
@@ -178,7 +191,8 @@ def for_preset(
     return settings
 
 
-def _check_known(kind: str, asked: Sequence[str], known: Sequence[str] | dict[str, Any]) -> None:
+def check_known(kind: str, asked: Sequence[str], known: Sequence[str] | dict[str, Any]) -> None:
+    """UsageError with the known names where one that was asked for is not among them."""
     for name in asked:
         if name not in known:
             raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")

@@ -12,6 +12,7 @@ from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, Attempt, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
+from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.errors import StorageError
 from storage.files import whole_file
 from storage.memories import load_memory
@@ -19,19 +20,27 @@ from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
 from storage.results import write_attempts
 from tasks.attempts import attempt_row, check_attempt
-from tasks.settings import COMBINED, RunError, UsageError
+from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known
 
 PICTURES: Final = (".png", ".svg", ".pdf")
 
 
 class Assistant:
-    """A way to solve: planner, assist, seed, and the memory of each class that turns up."""
+    """A way to solve: vehicle, planner, assist, seed, and the memory of each class that turns up."""
 
-    def __init__(self, planner: str, assist: str, top_k: int, memory: Path | None, seed: int) -> None:
-        """UsageError with one line for an unknown planner or assist, a top k below 1, a missing memory."""
-        for kind, name, known in (("planner", planner, tuple(PLANNERS)), ("assist", assist, ASSISTS)):
-            if name not in known:
-                raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+    def __init__(
+        self,
+        planner: str,
+        assist: str,
+        top_k: int,
+        memory: Path | None,
+        seed: int,
+        vehicle: str = DEFAULT_VEHICLE,
+    ) -> None:
+        """UsageError with one line for an unknown name, a top k below 1, a missing memory."""
+        check_known("planner", [planner], tuple(PLANNERS))
+        check_known("assist", [assist], ASSISTS)
+        check_known("vehicle", [vehicle], VEHICLES)
         if top_k < 1:
             raise UsageError(f"Top k is {top_k}: give 1 or more.")
         if seed < 0:
@@ -39,6 +48,7 @@ class Assistant:
         if assist != "none" and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: the folder of a run, or of one memory.")
         self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
+        self.vehicle = vehicle_named(vehicle)
         self._place = memory if assist != "none" else None
         self._memories: dict[Path, Memory] = {}
 
@@ -57,45 +67,38 @@ class Assistant:
             )
         folder = found[0] if found else self._place
         if folder not in self._memories:
-            self._memories[folder] = load_memory(folder)
+            self._memories[folder] = load_memory(folder, self.vehicle)
         return self._memories[folder]
 
     def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
         """The attempt, its plan and the recalled plans, these in the frame of the problem."""
         canonical, alignment = to_canonical(problem)
         memory = self.memory_of(problem.class_name)
-        attempt = solve(canonical, self.planner, self.assist, self.top_k, memory, self.seed)
-        check_attempt(canonical, attempt, set())
+        attempt = solve(
+            canonical, self.planner, self.assist, self.top_k, memory, self.seed, vehicle=self.vehicle
+        )
+        check_attempt(canonical, attempt, set(), self.vehicle)
         stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
         recalled = [from_canonical(plan, alignment) for plan in stored]
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
 
 
-def plan_one(
-    problem: Path,
-    planner: str,
-    assist: str,
-    top_k: int,
-    memory: Path | None,
-    seed: int,
-    out: Path | None,
-    drawing: Path | None,
-) -> None:
+def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None) -> None:
     """Plan for the one problem of a file; RunError when it has another number, or no plan was found."""
-    assistant = Assistant(planner, assist, top_k, memory, seed)
     if drawing is not None and drawing.suffix not in PICTURES:
         raise UsageError(f"{drawing} is no picture's name. Known: {', '.join(PICTURES)}.")
-    problems = read_problems(problem)
+    problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
     assistant(problems[0])  # code is warm before the time counts
     attempt, plan, recalled = assistant(problems[0])
     if out is not None:
-        write_plan(out, _record(problems[0], attempt, plan))
+        write_plan(out, _record(problems[0], attempt, plan, assistant.vehicle))
     told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         with whole_file(drawing) as temporary:
-            figure = picture(problems[0], plan, f"{planner}, {assist}: {told}", recalled)
+            caption = f"{assistant.planner}, {assistant.assist}: {told}"
+            figure = picture(problems[0], plan, caption, recalled, assistant.vehicle)
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     if plan is None:
         raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
@@ -105,21 +108,11 @@ def plan_one(
             print(f"{what:8} {place}")
 
 
-def solve_many(
-    problems: Path,
-    planner: str,
-    assist: str,
-    top_k: int,
-    memory: Path | None,
-    seed: int,
-    out: Path,
-    plans: Path | None,
-) -> None:
+def solve_many(assistant: Assistant, problems: Path, out: Path, plans: Path | None) -> None:
     """Solve every problem of a file; one attempt row each, and if asked its plan."""
-    assistant = Assistant(planner, assist, top_k, memory, seed)
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    asked = read_problems(problems)
+    asked = read_problems(problems, assistant.vehicle)
     if not asked:
         raise StorageError(f"{problems} holds no problems; nothing to solve.")
     assistant(asked[0])  # code is warm before the first time counts
@@ -127,15 +120,16 @@ def solve_many(
     for problem in asked:
         attempt, plan, _ = assistant(problem)
         found = assistant.memory_of(problem.class_name)
-        rows.append(attempt_row(attempt, found.class_name if found else None, None))
+        rows.append(attempt_row(attempt, found.class_name if found else None, None, assistant.vehicle))
         if plans is not None:
-            write_plan(plans / f"{_file_name(problem.id, asked)}.json", _record(problem, attempt, plan))
+            record = _record(problem, attempt, plan, assistant.vehicle)
+            write_plan(plans / f"{_file_name(problem.id, asked)}.json", record)
     write_attempts(out, rows)
     solved = sum(row["solved"] for row in rows)
     print(f"{solved} of {len(rows)} solved, rows in {out}")
 
 
-def _record(problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
+def _record(problem: Problem, attempt: Attempt, plan: Plan | None, vehicle: Vehicle) -> PlanRecord:
     return PlanRecord(
         problem.id,
         attempt.status,
@@ -144,6 +138,7 @@ def _record(problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord
         attempt.assist,
         attempt.planning_seconds,
         plan,
+        vehicle,
     )
 
 

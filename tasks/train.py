@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from planners.memory.training import Epoch, TrainingSettings, train
+from planners.world.vehicle import vehicle_named
 from storage.encoders import save_encoder
 from storage.hallucinated import Labelled, read_labelled
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
@@ -37,7 +38,7 @@ def train_chunk(chunk: Chunk) -> dict[str, Any]:
     )
     labels = np.unpackbits(problems.labels, axis=1, count=problems.plans).astype(bool)
     trained = train(problems.grids, problems.plan_index, labels, settings, on_epoch)
-    save_encoder(chunk.run.model(chunk.class_name), trained)
+    save_encoder(chunk.run.model(chunk.class_name), trained, vehicle_named(chunk.settings.vehicle))
     mark_done(chunk.run.model(chunk.class_name), chunk.key)
     return {
         "problems": len(problems.plan_index),

@@ -22,6 +22,7 @@ from planners.world.authority import faults
 from planners.world.collision import scene_of
 from planners.world.occupancy import occupancy_of
 from planners.world.randomness import generator
+from planners.world.vehicle import Vehicle, vehicle_named
 from storage.encoders import load_encoder
 from storage.errors import StorageError
 from storage.experiences import read_experiences
@@ -79,35 +80,37 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
         settings = RunSettings.from_json(read_text(run.settings))
     except ValueError as error:
         raise RunError(f"{run.settings}: {error}") from None
+    vehicle = vehicle_named(settings.vehicle)
     for name in memory_names(settings):
         if run.experiences(name).exists():
-            yield partial(_experiences, run.experiences(name))
+            yield partial(_experiences, run.experiences(name), vehicle)
         for path in run.shards("hallucinated", name):
-            yield partial(_hallucinated, run, name, path)
+            yield partial(_hallucinated, run, name, path, vehicle)
         for path in run.shards("recalls", name):
             yield partial(_recalls, path)
         if run.model(name).exists():
-            yield partial(_encoder, run, name)
+            yield partial(_encoder, run, name, vehicle)
         if run.memory(name).exists():
-            yield partial(_memory, run, name)
+            yield partial(_memory, run, name, vehicle)
         for path in run.shards("results", name):
             yield partial(_attempts, data, settings, run, name, path, sample)
 
 
-def _experiences(path: Path) -> Findings:
-    experiences = read_experiences(path)
+def _experiences(path: Path, vehicle: Vehicle) -> Findings:
+    experiences = read_experiences(path, vehicle)
     wrong = [
         f"{path}: plan of {experience.problem.id}: {fault}"
         for experience in experiences
-        for fault in faults(experience.problem, experience.plan)
+        for fault in faults(experience.problem, experience.plan, vehicle)
     ]
     return Counter({"plans of experiences re-simulated and checked by FCL": len(experiences)}), wrong
 
 
-def _hallucinated(run: RunFolder, name: str, path: Path) -> Findings:
+def _hallucinated(run: RunFolder, name: str, path: Path, vehicle: Vehicle) -> Findings:
     problems, labelled = read_hallucinated_problems(path), read_labelled([path])
     free = np.unpackbits(labelled.labels, axis=1, count=labelled.plans).astype(bool)
-    sweeps = sweep_plans([experience.plan for experience in read_experiences(run.experiences(name))])
+    experiences = read_experiences(run.experiences(name), vehicle)
+    sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     made_for = labelled.plan_index
     rows = np.arange(len(made_for))
     solved = np.where(made_for >= 0, free[rows, np.maximum(made_for, 0)], ~free.any(axis=1))
@@ -132,14 +135,14 @@ def _recalls(path: Path) -> Findings:
     return Counter({"recalls read": len(rows)}), wrong
 
 
-def _encoder(run: RunFolder, name: str) -> Findings:
-    load_encoder(run.model(name))
+def _encoder(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
+    load_encoder(run.model(name), vehicle)
     return Counter({"encoders read": 1}), []
 
 
-def _memory(run: RunFolder, name: str) -> Findings:
-    memory = load_memory(run.memory(name))
-    kept = [experience.plan for experience in read_experiences(run.experiences(name))]
+def _memory(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
+    memory = load_memory(run.memory(name), vehicle)
+    kept = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
     same = len(kept) == len(memory.plans) and all(
         np.array_equal(ours.states, theirs.states) and np.array_equal(ours.controls, theirs.controls)
         for ours, theirs in zip(kept, memory.plans, strict=True)
@@ -152,13 +155,14 @@ def _attempts(
     data: str, settings: RunSettings, run: RunFolder, name: str, path: Path, sample: float
 ) -> Findings:
     rows = _records(read_attempts(path))
-    source = source_of(data, settings, name)
+    source, vehicle = source_of(data, settings, name), vehicle_named(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
     wrong = [
         f"{path}: a plan for {row['problem_id']} was never checked" for row in solved if not row["verified"]
     ]
     memories = {
-        name: load_memory(run.memory(name)) for name in {row["memory"] for row in rows if row["memory"]}
+        name: load_memory(run.memory(name), vehicle)
+        for name in {row["memory"] for row in rows if row["memory"]}
     }
     again = plans = 0
     for place, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
@@ -170,11 +174,13 @@ def _attempts(
             continue
         for row in attempts:
             memory = memories[row["memory"]] if row["memory"] else None
-            attempt = solve(problem, row["planner"], row["assist"], row["top_k"], memory, row["seed"])
-            check_attempt(problem, attempt, set())
+            attempt = solve(
+                problem, row["planner"], row["assist"], row["top_k"], memory, row["seed"], vehicle=vehicle
+            )
+            check_attempt(problem, attempt, set(), vehicle)
             again += 1
             plans += attempt.solved
-            if not same_outcome(attempt, row):
+            if not same_outcome(attempt, row, vehicle):
                 wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} comes out otherwise")
     return Counter(
         {

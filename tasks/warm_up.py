@@ -22,7 +22,6 @@ from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
     CANONICAL_START,
-    CAR,
     GOAL_RADIUS,
     Plan,
     Problem,
@@ -30,6 +29,7 @@ from planners.world.problem import (
     start_state,
 )
 from planners.world.randomness import generator
+from planners.world.vehicle import Vehicle, vehicle_named
 from tasks.engine import Client
 from tasks.settings import COLLECTOR
 
@@ -39,27 +39,27 @@ EMPTY: Final = Problem(
 
 
 @contextmanager
-def warm_up(scheduler: str) -> Iterator[None]:
-    """Have the workers behind ``scheduler`` compile, as long as the context lasts, beside other work."""
+def warm_up(scheduler: str, vehicle: str) -> Iterator[None]:
+    """Have the workers behind ``scheduler`` compile for a vehicle, beside other work, in this context."""
     with Client(scheduler, set_as_default=False) as client:
-        work = [client.submit(group, pure=False) for group in GROUPS]
+        work = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
         yield
         client.cancel(work)
 
 
-def _compile_collecting() -> None:
+def _compile_collecting(vehicle: Vehicle) -> None:
     """The collecting planner."""
-    solve(EMPTY, COLLECTOR)
+    solve(EMPTY, COLLECTOR, vehicle=vehicle)
 
 
-def _compile_hallucination() -> None:
+def _compile_hallucination(vehicle: Vehicle) -> None:
     """Drawing problems, and what hallucinate makes of them."""
-    controls = np.tile([CAR.max_acceleration, 0.0], (140, 1))
-    plan = Plan(simulate(start_state(EMPTY), controls, CAR), controls)
+    controls = np.tile([vehicle.max_acceleration, 0.0], (140, 1))
+    plan = Plan(simulate(start_state(EMPTY, vehicle), controls, vehicle), controls)
     end = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
-    experience = Experience(replace(EMPTY, goal=end), plan)
+    experience = Experience(replace(EMPTY, goal=end), plan, vehicle)
     for name in CLASSES:
-        draw = problem_class(name).draw_obstacles
+        draw = problem_class(name, vehicle=vehicle).draw_obstacles
         for method in METHODS:
             made = hallucinate(method, experience, draw, generator(0), 0)
             free_plans(experience.sweep, scene_of(made))
@@ -67,14 +67,14 @@ def _compile_hallucination() -> None:
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 
-def _compile_rest() -> None:
+def _compile_rest(vehicle: Vehicle) -> None:
     """What only the benchmark needs."""
     for planner in PLANNERS:
-        solve(EMPTY, planner)
+        solve(EMPTY, planner, vehicle=vehicle)
 
 
 # In the order of need: of two workers each compiles one of the first two, and whoever is free the last.
-GROUPS: Final[tuple[Callable[[], object], ...]] = (
+GROUPS: Final[tuple[Callable[[Vehicle], object], ...]] = (
     _compile_collecting,
     _compile_hallucination,
     _compile_rest,

@@ -15,6 +15,7 @@ import numpy as np
 from planners.world.alignment import to_canonical
 from planners.world.classes import ProblemClass, problem_class
 from planners.world.problem import Obstacles, Problem
+from planners.world.vehicle import Vehicle, vehicle_named
 from storage.problems import read_problems, write_problems
 from storage.worlds import import_png_folder
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
@@ -49,6 +50,7 @@ class Worlds:
     """A folder of worlds: its ``train`` part to collect from, its ``test`` part to test with."""
 
     folder: Path  # where the run keeps them
+    vehicle: Vehicle
 
     def count(self, purpose: Purpose, wanted: int) -> int:
         """How many of the ``wanted`` problems there are."""
@@ -67,25 +69,27 @@ class Worlds:
         path = _part(self.folder, purpose)
         if not path.exists():
             raise RunError(f"{path} is not there; run collect with this folder of worlds first.")
-        return _problems(path, path.stat().st_mtime_ns)
+        return _problems(path, path.stat().st_mtime_ns, self.vehicle)
 
 
 @functools.lru_cache(maxsize=4)
-def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
-    return tuple(read_problems(path))
+def _problems(path: Path, _changed: int, vehicle: Vehicle) -> tuple[Problem, ...]:
+    return tuple(read_problems(path, vehicle))
 
 
 def source_of(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
     """The problems of a class of the run; a folder of worlds must have been read (``read_worlds``)."""
+    vehicle = vehicle_named(settings.vehicle)
     if class_name in settings.classes:
-        return Generated(problem_class(class_name, settings.difficulty), settings.seed)
-    return Worlds(run_folder(data, settings).path / "worlds" / class_name)
+        return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
+    return Worlds(run_folder(data, settings).path / "worlds" / class_name, vehicle)
 
 
 def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
-    """What a class's problems depend on, for the keys of chunks."""
+    """What a class's problems depend on, for the keys of chunks; the vehicle too: it needs room to start."""
     folders = [Path(folder) for folder in settings.worlds if world_class(folder) == class_name]
-    return [_digest(folders[0])] if folders else [settings.difficulty, settings.seed]
+    drawn = [_digest(folders[0])] if folders else [settings.difficulty, settings.seed]
+    return [*drawn, settings.vehicle]
 
 
 def _part(folder: Path, purpose: Purpose) -> Path:
@@ -111,9 +115,10 @@ def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
     """Read a folder of worlds, bring its problems to the canonical frame, and list the worlds left out."""
     origin = next(Path(f) for f in chunk.settings.worlds if world_class(f) == chunk.class_name)
     folder = chunk.run.path / "worlds" / chunk.class_name
+    vehicle = vehicle_named(chunk.settings.vehicle)
     skipped: list[str] = []
     for purpose, part in PARTS.items():
-        problems, left_out = import_png_folder(origin, part, strict=chunk.settings.strict)
+        problems, left_out = import_png_folder(origin, part, chunk.settings.strict, vehicle)
         write_problems(_part(folder, purpose), [to_canonical(problem)[0] for problem in problems])
         skipped += [f"{file}: {reason}" for file, reason in left_out]
     mark_done(folder, chunk.key)

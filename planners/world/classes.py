@@ -15,10 +15,13 @@ from planners.world.problem import (
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
+    Floats,
     Obstacles,
     Problem,
 )
 from planners.world.randomness import generator
+from planners.world.shapes import TRAILER_ROOM_M, without_those_near
+from planners.world.vehicle import CAR, CarWithTrailers, Vehicle
 
 CLASSES: Final = ("curves", "random", "trap")
 DIFFICULTIES: Final = ("easy", "standard", "hard")
@@ -101,14 +104,39 @@ class ProblemClass:
         )
 
 
-def problem_class(name: str, difficulty: str = "standard") -> ProblemClass:
-    """The class of that name and difficulty; ValueError with the known ones where there is none."""
+def problem_class(name: str, difficulty: str = "standard", vehicle: Vehicle = CAR) -> ProblemClass:
+    """The class of that name and difficulty; ValueError with the known ones where there is none.
+
+    All vehicles get the same draws. Only what reaches into the room of a trailer, standing straight behind
+    the start, is left out for the vehicle that has it.
+    """
     if name not in CLASSES:
         raise ValueError(f"Unknown problem class {name!r}; choose one of {', '.join(CLASSES)}.")
     if difficulty not in DIFFICULTIES:
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
+    draw: Callable[[np.random.Generator], Obstacles]
     if name == "curves":
-        return ProblemClass(name, difficulty, partial(draw_curves, _CURVES[difficulty]))
-    if name == "random":
-        return ProblemClass(name, difficulty, partial(draw_random, _RANDOM[difficulty]))
-    return ProblemClass(name, difficulty, partial(draw_trap, _TRAP[difficulty]))
+        draw = partial(draw_curves, _CURVES[difficulty])
+    elif name == "random":
+        draw = partial(draw_random, _RANDOM[difficulty])
+    else:
+        draw = partial(draw_trap, _TRAP[difficulty])
+    if isinstance(vehicle, CarWithTrailers):
+        draw = partial(_draw_with_room, draw, _trailer_rooms(vehicle))
+    return ProblemClass(name, difficulty, draw)
+
+
+def _draw_with_room(
+    draw: Callable[[np.random.Generator], Obstacles], rooms: Floats, rng: np.random.Generator
+) -> Obstacles:
+    return without_those_near(draw(rng), rooms)
+
+
+def _trailer_rooms(vehicle: CarWithTrailers) -> Floats:
+    """Discs ``[n, 3]`` (x, y, radius in metres) around the bodies of the trailers at the canonical start."""
+    x, y, heading = CANONICAL_START
+    behind = np.cumsum(vehicle.hitch_lengths) - 0.5 * (vehicle.trailer_front - vehicle.trailer_rear)
+    rooms: Floats = np.column_stack(
+        (x - behind * np.cos(heading), y - behind * np.sin(heading), np.full(len(behind), TRAILER_ROOM_M))
+    )
+    return rooms

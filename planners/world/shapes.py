@@ -21,6 +21,9 @@ from planners.world.problem import (
 # the goal disc with room for the body ahead of the rear axle.
 START_ROOM = (0.57, 0.57, 3.0)  # x, y, radius in metres: around the footprint's centre
 GOAL_ROOM = (CANONICAL_GOAL[0], CANONICAL_GOAL[1], GOAL_RADIUS + 2.0)  # x, y, radius in metres
+TRAILER_ROOM_M = (
+    1.5  # radius around each trailer that stands behind the start: its half-diagonal and half a metre
+)
 
 TRIANGLE, BOX, POLYGON, CROSS, ELL, ZED = range(6)
 SHAPES = 6
@@ -189,6 +192,41 @@ def _distance(vertices: Floats, first: int, last: int, x: float, y: float) -> fl
         along = min(max((ex * dx + ey * dy) / (ex * ex + ey * ey), 0.0), 1.0)
         nearest = min(nearest, math.hypot(dx - along * ex, dy - along * ey))
     return 0.0 if inside else nearest
+
+
+@jit
+def without_those_near(obstacles: Obstacles, rooms: Floats) -> Obstacles:
+    """The obstacles that reach into none of the discs ``rooms [n, 3]`` (x, y, radius in metres)."""
+    vertices = np.empty_like(obstacles.vertices)
+    piece_starts = np.zeros_like(obstacles.piece_starts)
+    obstacle_starts = np.zeros_like(obstacles.obstacle_starts)
+    pieces = 0
+    kept = 0
+    for o in range(obstacles.obstacle_starts.shape[0] - 1):
+        begin = pieces
+        near = False
+        for p in range(obstacles.obstacle_starts[o], obstacles.obstacle_starts[o + 1]):
+            first = obstacles.piece_starts[p]
+            last = obstacles.piece_starts[p + 1]
+            for r in range(rooms.shape[0]):
+                distance = _distance(obstacles.vertices, first, last, rooms[r, 0], rooms[r, 1])
+                near = near or distance <= rooms[r, 2]
+            end = piece_starts[pieces]
+            for i in range(first, last):
+                vertices[end + i - first, 0] = obstacles.vertices[i, 0]
+                vertices[end + i - first, 1] = obstacles.vertices[i, 1]
+            pieces += 1
+            piece_starts[pieces] = end + last - first
+        if near:
+            pieces = begin
+        else:
+            kept += 1
+            obstacle_starts[kept] = pieces
+    return Obstacles(
+        vertices[: piece_starts[pieces]].copy(),
+        piece_starts[: pieces + 1].copy(),
+        obstacle_starts[: kept + 1].copy(),
+    )
 
 
 @jit
