@@ -1,24 +1,25 @@
-"""Problems and plans as pictures: obstacles, the car along its way, where a recalled plan collides."""
+"""Problems and plans as pictures: obstacles, the vehicle along its way, where a recalled plan collides."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, Polygon, Rectangle
+from matplotlib.patches import Circle, Patch, Rectangle
 
 from dashboards.style import GREEN, INK, NOTE_SIZE, ORANGE, SKY, VERMILLION, message_figure, new_figure
+from planners.world.bodies import footprints
 from planners.world.collision import count_free_prefix, scene_of
-from planners.world.problem import Floats, Plan, Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.problem import Floats, Plan, Problem, start_state
+from planners.world.vehicle import CAR, CarWithTrailers, Vehicle
 
-FOOTPRINT_SPACING_M: Final = 4.0  # two cars' lengths: the way stays readable at a gallery's size
+CLEAR_WAY_M: Final = 2.0  # between two footprints of a way: it stays readable at a gallery's size
 _OBSTACLE: Final = "#6B7280"
 
 
@@ -32,7 +33,7 @@ class Example(NamedTuple):
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
-    """Bounds, obstacles, the car at its start and the goal disc, in metres."""
+    """Bounds, obstacles, the vehicle at its start and the goal disc, in metres."""
     x_min, y_min, x_max, y_max = problem.bounds
     frame = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min, fill=False, edgecolor=INK, linewidth=1.2)
     axes.add_patch(frame)
@@ -47,8 +48,8 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     axes.add_patch(
         Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8, zorder=2)
     )
-    start = np.array([[*problem.start, 0.0, 0.0]])
-    axes.add_patch(Polygon(footprints(start, vehicle)[0], facecolor=INK, edgecolor=INK, zorder=6))
+    standing = start_state(problem, vehicle)[np.newaxis]
+    _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
     x, y, heading = problem.start
     tip = (x + 4.5 * math.cos(heading), y + 4.5 * math.sin(heading))
     axes.annotate("", tip, (x, y), arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}, zorder=6)
@@ -67,7 +68,7 @@ def draw_plan(
     first_collision: int | None = None,
     vehicle: Vehicle = CAR,
 ) -> None:
-    """The way of the rear axle with the car's footprint every few metres.
+    """The way of the reference point with the vehicle's footprints every few metres.
 
     With the number of the first state in collision, the way is dashed and ends in a cross at that state.
     """
@@ -76,22 +77,18 @@ def draw_plan(
     axes.plot(states[:, 0], states[:, 1], color=colour, linewidth=linewidth, linestyle=style, zorder=4)
     if first_collision is None:
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(states[:, :2], axis=0).T))])
-        count = 1 + int(way[-1] / FOOTPRINT_SPACING_M)
+        count = 1 + int(way[-1] / footprint_spacing_m(vehicle))
         shown = states[
             np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], count + 1)), len(states) - 1)
         ]
-        axes.add_collection(
-            PolyCollection(
-                list(footprints(shown, vehicle)), facecolor="none", edgecolor=colour, linewidth=0.8, zorder=3
-            )
-        )
+        _draw_bodies(axes, shown, vehicle, facecolor="none", edgecolor=colour, linewidth=0.8, zorder=3)
         return
     rest = plan.states[first_collision:]
     axes.plot(rest[:, 0], rest[:, 1], color=colour, linewidth=0.8, linestyle=":", alpha=0.8, zorder=3)
     axes.plot(*states[-1, :2], marker="X", color=colour, markersize=8, markeredgecolor="white", zorder=7)
 
 
-def gallery(examples: Sequence[Example]) -> Figure:
+def gallery(examples: Sequence[Example], vehicle: Vehicle = CAR) -> Figure:
     """Problems with the plans recalled for them, free or in collision, and the plan that was found."""
     title = "Recalled and found plans"
     if not examples:
@@ -103,9 +100,9 @@ def gallery(examples: Sequence[Example]) -> Figure:
     for axes in grid[len(examples) :]:
         axes.set_axis_off()
     for axes, example in zip(grid, examples, strict=False):
-        _draw_example(axes, example)
+        _draw_example(axes, example, vehicle)
     figure.legend(
-        handles=_legend(),
+        handles=_legend(vehicle),
         loc="outside lower left",
         ncols=5 if columns > 2 else 3,
         frameon=False,
@@ -114,35 +111,54 @@ def gallery(examples: Sequence[Example]) -> Figure:
     return figure
 
 
-def picture(problem: Problem, plan: Plan | None, caption: str, recalled: Sequence[Plan] = ()) -> Figure:
+def picture(
+    problem: Problem,
+    plan: Plan | None,
+    caption: str,
+    recalled: Sequence[Plan] = (),
+    vehicle: Vehicle = CAR,
+) -> Figure:
     """One problem with its plan and, where given, the plans recalled for it."""
     figure = new_figure(6.4, 7.2, problem.id or "Problem")
-    _draw_example(figure.add_subplot(), Example(problem, recalled, plan, caption))
-    handles = _legend()[: 5 if recalled else 3]
+    _draw_example(figure.add_subplot(), Example(problem, recalled, plan, caption), vehicle)
+    handles = _legend(vehicle)[: 5 if recalled else 3]
     figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
     return figure
 
 
-def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
-    """Corners ``[T, 4, 2]`` in metres of the car's body at ``states [T, 5]``, counter-clockwise."""
-    half = 0.5 * vehicle.width
-    body = np.array(
-        [[-vehicle.rear, -half], [vehicle.front, -half], [vehicle.front, half], [-vehicle.rear, half]]
-    )
-    cos, sin = np.cos(states[:, 2]), np.sin(states[:, 2])
-    turns = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)  # row vectors
-    return np.asarray(body @ turns + states[:, None, :2])
+def footprint_spacing_m(vehicle: Vehicle) -> float:
+    """Metres from one footprint of a way to the next."""
+    length = vehicle.front + vehicle.rear
+    if isinstance(vehicle, CarWithTrailers):
+        length = vehicle.front + sum(vehicle.hitch_lengths) + vehicle.trailer_rear
+    return float(math.ceil(length + CLEAR_WAY_M))
 
 
-def _draw_example(axes: Axes, example: Example) -> None:
-    draw_problem(axes, example.problem)
+def _draw_bodies(axes: Axes, states: Floats, vehicle: Vehicle, **style: Any) -> None:
+    """Every body at each of ``states [T, S]``, and the bars by which trailers are pulled."""
+    corners = footprints(states, vehicle)
+    axes.add_collection(PolyCollection(list(corners.reshape(-1, 4, 2)), **style))
+    if isinstance(vehicle, CarWithTrailers):
+        trailers = corners[:, 1:]
+        fronts = trailers[:, :, 1:3].mean(axis=2)
+        along = trailers[:, :, 1] - trailers[:, :, 0]
+        along /= np.linalg.norm(along, axis=2, keepdims=True)
+        bars = np.array(vehicle.hitch_lengths) - vehicle.trailer_front
+        hitches = fronts + bars[:, np.newaxis] * along
+        lines = np.stack([fronts, hitches], axis=2).reshape(-1, 2, 2)
+        style = {"color": style["edgecolor"], "linewidth": style["linewidth"], "zorder": style["zorder"]}
+        axes.add_collection(LineCollection(list(lines), **style))
+
+
+def _draw_example(axes: Axes, example: Example, vehicle: Vehicle) -> None:
+    draw_problem(axes, example.problem, vehicle)
     scene = scene_of(example.problem)
     if example.found is not None:
-        draw_plan(axes, example.found)
+        draw_plan(axes, example.found, vehicle=vehicle)
     for plan in example.recalled:
-        free = count_free_prefix(plan.states, CAR, scene)
+        free = count_free_prefix(plan.states, vehicle, scene)
         if free < len(plan.states):
-            draw_plan(axes, plan, VERMILLION, linewidth=1.3, first_collision=free)
+            draw_plan(axes, plan, VERMILLION, linewidth=1.3, first_collision=free, vehicle=vehicle)
         else:
             # Wide and below: a rim around the plan found where the recalled one is the answer.
             axes.plot(*plan.states[:, :2].T, color=SKY, linewidth=4.5, zorder=2.5)
@@ -151,12 +167,13 @@ def _draw_example(axes: Axes, example: Example) -> None:
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
 
 
-def _legend() -> list[Line2D | Patch]:
+def _legend(vehicle: Vehicle) -> list[Line2D | Patch]:
+    found = f"plan found, with the vehicle every {footprint_spacing_m(vehicle):.0f} m"
     return [
         Line2D([], [], color=INK, marker=">", linestyle="none", label="start"),
         Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
                label="goal"),
-        Line2D([], [], color=GREEN, linewidth=1.8, label="plan found, with the car every 4 m"),
+        Line2D([], [], color=GREEN, linewidth=1.8, label=found),
         Line2D([], [], color=SKY, linewidth=4.5, label="recalled, free"),
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
                markersize=8, label="recalled, collides at the cross"),

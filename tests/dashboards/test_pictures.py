@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from shapely import Polygon, affinity, box
 
-from dashboards.pictures import Example, draw_plan, footprints, gallery, picture
+from dashboards.pictures import Example, draw_plan, gallery, picture
 from dashboards.style import save
+from planners.world.bodies import footprints
 from planners.world.dynamics import simulate
 from planners.world.problem import (
     BOUNDS,
@@ -49,7 +50,7 @@ def texts(figure: Figure) -> list[str]:
 
 @given(x=st.floats(-50, 50), y=st.floats(-50, 50), heading=st.floats(-7.0, 7.0))
 def test_footprints_are_the_body_moved_and_turned(x: float, y: float, heading: float) -> None:
-    corners = footprints(np.array([[x, y, heading, 0.0, 0.0]]))[0]
+    corners = footprints(np.array([[x, y, heading, 0.0, 0.0]]))[0, 0]
     body = box(-CAR.rear, -0.5 * CAR.width, CAR.front, 0.5 * CAR.width)
     turned = affinity.rotate(body, heading, origin=(0.0, 0.0), use_radians=True)
     moved = affinity.translate(turned, x, y)

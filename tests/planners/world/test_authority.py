@@ -9,15 +9,15 @@ import shapely
 from hypothesis import given, settings
 
 from planners.search.registry import PLANNERS, plan
-from planners.world.authority import faults, simulate_again
+from planners.world.authority import faults
 from planners.world.classes import CLASSES, problem_class
 from planners.world.collision import count_free_prefix, scene_of
 from planners.world.dynamics import simulate
 from planners.world.problem import Floats, Plan, obstacles_of, start_state
 from planners.world.randomness import generator
 from planners.world.vehicle import CAR, Vehicle
+from tests.planners.world.motions import exact_motion
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
-from tests.planners.world.test_dynamics import exact_motion, random_motion
 
 EMPTY = problem_with(obstacles_of([]))
 
@@ -124,7 +124,7 @@ def test_what_is_hit_only_between_two_states_is_found(seed: int) -> None:
     wide = (-100.0, -100.0, 100.0, 100.0)
     bodies = shapely.union_all([shapely.Polygon(footprint(state)) for state in winding.states])
     for i in rng.permutation(len(winding.controls)):
-        between = exact_motion(winding.states[i], winding.controls[i], np.array([0.5 * CAR.dt]))[0]
+        between = exact_motion(winding.states[i], winding.controls[i], np.array([0.5 * CAR.dt]), CAR)[0]
         for corner in footprint(between):
             splinter = box_corners(*corner, rng.uniform(-math.pi, math.pi), 1e-4, 1e-4)
             if shapely.Polygon(splinter).disjoint(bodies):
@@ -143,15 +143,6 @@ def test_what_the_kernel_calls_free_the_authority_calls_free(seed: int) -> None:
     begun = Plan(winding.states[: max(free, 1)], winding.controls[: max(free - 1, 0)])
     if free:
         assert {"Collision", "Bounds"}.isdisjoint(kinds(faults(problem, begun)))
-
-
-@settings(max_examples=50)
-@given(seeds)
-def test_simulating_again_is_what_the_planners_simulate(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    start, _ = random_motion(rng)
-    controls = np.array([random_motion(rng)[1] for _ in range(300)])
-    assert np.abs(simulate_again(start, controls, CAR) - simulate(start, controls, CAR)).max() < 1e-10
 
 
 @pytest.mark.parametrize("planner", PLANNERS)

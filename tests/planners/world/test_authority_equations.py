@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 
 from planners.world.authority_equations import Body, bodies_of, simulate_again
+from planners.world.dynamics import simulate
 from planners.world.problem import Floats
 from planners.world.vehicle import VEHICLES, Vehicle, state_size
 from tests.planners.world.motions import exact_motion, gentle_controls, random_controls, random_state
@@ -26,6 +27,17 @@ def test_a_step_follows_the_differential_equations(vehicle: Vehicle, seed: int) 
     again = simulate_again(state, controls[np.newaxis], vehicle)
     assert again.shape == (2, state_size(vehicle))
     assert np.abs(again[1] - exact).max() < 5e-5  # m, rad: what one RK4 step may err
+
+
+@each_vehicle
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds)
+def test_simulating_again_is_what_the_planners_simulate(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    controls = gentle_controls(rng, 300, vehicle)
+    start = np.zeros(state_size(vehicle))
+    start[:3] = rng.uniform(-3.0, 3.0, 3)
+    assert np.abs(simulate_again(start, controls, vehicle) - simulate(start, controls, vehicle)).max() < 1e-9
 
 
 @each_vehicle

@@ -3,13 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
 
 from planners.world.authority import faults
 from planners.world.authority_equations import Body, bodies_of, simulate_again
+from planners.world.collision import count_free_prefix, scene_of
 from planners.world.problem import Floats, Plan, obstacles_of
 from planners.world.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, VEHICLES, Vehicle, state_size
 from tests.planners.world.motions import exact_motion, gentle_controls, turning_limits
-from tests.planners.world.strategies import box_corners, problem_with
+from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
 from tests.planners.world.test_authority import kinds
 
 EMPTY = problem_with(obstacles_of([]))
@@ -120,6 +122,19 @@ def test_what_any_body_hits_only_between_two_states_is_found(vehicle: Vehicle, s
                     met.add(name)
                     break
     assert "vehicle" in met
+
+
+@each_vehicle
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds)
+def test_what_the_kernel_calls_free_the_authority_calls_free(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = problem_with(clutter(rng, 12))
+    winding = driven(vehicle, gentle_controls(rng, 120, vehicle))
+    free = count_free_prefix(winding.states, vehicle, scene_of(problem))
+    begun = Plan(winding.states[: max(free, 1)], winding.controls[: max(free - 1, 0)])
+    if free:
+        assert {"Collision", "Bounds"}.isdisjoint(kinds(faults(problem, begun, vehicle)))
 
 
 def _corners(states: Floats, vehicle: Vehicle) -> list[tuple[str, Floats]]:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from planners.world import collision
 from planners.world.authority import prism
+from planners.world.bodies import footprints
 from planners.world.collision import (
     REACH_M,
     Scene,
@@ -23,13 +24,12 @@ from planners.world.collision import (
 )
 from planners.world.jit import jit
 from planners.world.problem import BOUNDS, Floats, obstacles_of
-from planners.world.vehicle import CAR
+from planners.world.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, VEHICLES, Vehicle, name_of, state_size
 from tests.planners.world.kernels import state_is_free, step
+from tests.planners.world.motions import exact_motion, random_controls, random_state
 from tests.planners.world.strategies import angles, box_corners, clutter, convex_polygon, problem_with, seeds
-from tests.planners.world.test_dynamics import exact_motion, random_motion
 
 CONTACT = 1e-9  # metres: nearer to touching than this, either answer is right
-AHEAD = 0.5 * (CAR.front - CAR.rear)
 HALF_LENGTH = 0.5 * (CAR.front + CAR.rear)
 HALF_WIDTH = 0.5 * CAR.width
 
@@ -149,21 +149,31 @@ def test_a_box_is_free_exactly_where_shapely_says_so(seed: int) -> None:
         assert free or not is_free(CONTACT)
 
 
-@settings(max_examples=200)
-@given(seeds)
-def test_what_a_step_sweeps_between_two_free_states_is_free(seed: int) -> None:
-    """A splinter 1 mm wide, planted anywhere that the body passes, is seen from one of the states."""
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+@settings(max_examples=100)
+@given(seed=seeds)
+def test_what_a_step_sweeps_between_two_free_states_is_free(vehicle: Vehicle, seed: int) -> None:
+    """A splinter 1 mm wide, planted anywhere that a body passes, is seen from one of the states."""
     rng = np.random.default_rng(seed)
-    state, controls = random_motion(rng)
+    state = random_state(rng, vehicle)
     state[:2] = 25.0
-    end = step(tuple(state), *controls, CAR)
-    x, y, heading = exact_motion(state, controls, rng.uniform(0.0, CAR.dt, 1))[0, :3]
-    corner = box_corners(
-        x + AHEAD * math.cos(heading), y + AHEAD * math.sin(heading), heading, HALF_LENGTH, HALF_WIDTH
-    )[rng.integers(4)]
+    controls = random_controls(rng, state, vehicle)
+    end = step(tuple(state), *controls, vehicle)
+    between = exact_motion(state, controls, rng.uniform(0.0, vehicle.dt, 1), vehicle)
+    corner = rng.choice(footprints(between, vehicle).reshape(-1, 2))
     splinter = box_corners(*corner, rng.uniform(-math.pi, math.pi), 5e-4, 5e-4)
     scene = scene_of(problem_with(obstacles_of([[splinter]])))
-    assert not (state_is_free(tuple(state), CAR, scene) and state_is_free(end, CAR, scene))
+    assert not (state_is_free(tuple(state), vehicle, scene) and state_is_free(end, vehicle, scene))
+
+
+@pytest.mark.parametrize("vehicle", [CAR_1_TRAILER, CAR_2_TRAILERS], ids=name_of)
+def test_a_jack_knifed_vehicle_is_not_free(vehicle: Vehicle) -> None:
+    scene = scene_of(problem_with(obstacles_of([])))
+    for hitch in range(5, state_size(vehicle)):
+        for angle in (-1.001, -0.999, 0.999, 1.001):
+            state = np.array([25.0, 25.0, *[0.0] * (state_size(vehicle) - 2)])
+            state[hitch] = angle
+            assert state_is_free(tuple(state), vehicle, scene) == (abs(angle) < 1.0)
 
 
 @given(st.floats(2.5, 50.0), angles, st.floats(-0.5, 0.5))
@@ -193,6 +203,6 @@ def test_kernels_equal_their_python_functions(seed: int) -> None:
     for compiled, interpreted in zip(scene, plain, strict=True):
         assert np.allclose(compiled, interpreted, rtol=0.0, atol=1e-12)
     for _ in range(20):
-        state, _ = random_motion(rng)
+        state = random_state(rng, CAR)
         interpreted = collision.state_is_free.py_func(tuple(state), CAR, scene)  # type: ignore[attr-defined]
         assert state_is_free(tuple(state), CAR, scene) == interpreted
