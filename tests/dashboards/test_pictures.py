@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from shapely import Polygon, affinity, box
 
-from dashboards.pictures import Example, draw_plan, gallery, picture
+from dashboards.pictures import Example, draw_plan, footprint_spacing_m, gallery, picture
 from dashboards.style import save
-from planners.world.bodies import footprints
+from planners.world.bodies import body_count, footprints
 from planners.world.dynamics import simulate
 from planners.world.problem import (
     BOUNDS,
@@ -25,7 +26,7 @@ from planners.world.problem import (
     obstacles_of,
     start_state,
 )
-from planners.world.vehicle import CAR
+from planners.world.vehicle import CAR, VEHICLES, Vehicle
 
 WALL = np.array([[20.0, 30.0], [30.0, 20.0], [31.0, 21.0], [21.0, 31.0]])
 
@@ -72,6 +73,22 @@ def test_a_free_plan_has_no_mark(straight: Plan) -> None:
     figure = gallery([Example(problem(), [straight], straight, "closed 1")])
     assert not [line for line in figure.axes[0].lines if line.get_marker() == "X"]
     assert not any("no plan found" in text for text in texts(figure))
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+def test_every_body_is_drawn_and_every_trailer_hangs_on_the_body_before(vehicle: Vehicle) -> None:
+    controls = np.tile([1.0, 0.1], (30, 1))
+    plan = Plan(simulate(start_state(problem(), vehicle), controls, vehicle), controls)
+    axes = Figure().add_subplot()
+    draw_plan(axes, plan, vehicle=vehicle)
+    (bodies,) = [found for found in axes.collections if isinstance(found, PolyCollection)]
+    states = 1 + 1 + int(plan.length_m / footprint_spacing_m(vehicle))
+    assert len(bodies.get_paths()) == states * body_count(vehicle)
+    bars = [found for found in axes.collections if isinstance(found, LineCollection)]
+    assert len(bars) == (body_count(vehicle) > 1)
+    for bar in bars:
+        hitch = bar.get_segments()[0][1]  # of the first trailer at the start
+        assert hitch == pytest.approx(plan.states[0, :2], abs=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 6])

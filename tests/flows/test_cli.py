@@ -31,6 +31,8 @@ COMMANDS = (
         (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
         (["train", "--objective", "luck"], 2, "Unknown objective 'luck'"),
         (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
+        (["collect", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'. Known: car, differential-drive"),
+        (["plan", "p.json", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),
         (["solve"], 2, "--problems"),
         (["plan", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
         (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),

@@ -14,7 +14,7 @@ from planners.search.registry import PLANNERS, plan
 from planners.solve import ASSISTS, solve, turned
 from planners.world.authority import faults
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR
+from planners.world.vehicle import CAR, CAR_1_TRAILER
 from tests.worlds import box, problem_of, strewn
 
 PARTS = ("occupancy", "encode", "recall", "scene", "check", "roadmap", "search")
@@ -47,6 +47,11 @@ def shared_memory():
 @pytest.fixture
 def memory():
     return shared_memory()
+
+
+def test_a_memory_of_one_vehicle_is_not_used_for_another(memory):
+    with pytest.raises(ValueError, match="built for vehicle car, asked was car-1-trailer"):
+        solve(problem_of([]), "gust", "closed", 1, memory, vehicle=CAR_1_TRAILER)
 
 
 def blocked_everywhere():

@@ -19,6 +19,7 @@ from planners.world.problem import (
     Problem,
     obstacles_of,
 )
+from planners.world.vehicle import CAR, Vehicle, state_size
 
 quick = settings(deadline=None, max_examples=40)  # the first example compiles or makes folders
 
@@ -57,10 +58,10 @@ def problems(draw: st.DrawFn) -> Problem:
     return problem_with(*groups, identity=draw(_names), class_name=draw(_names))
 
 
-def plan(length: int, seed: int = 0) -> Plan:
+def plan(length: int, seed: int = 0, vehicle: Vehicle = CAR) -> Plan:
     """Some plan; it need not be driveable to be stored."""
     rng = np.random.default_rng(seed)
-    return Plan(rng.normal(size=(length, 5)), rng.normal(size=(length - 1, 2)))
+    return Plan(rng.normal(size=(length, state_size(vehicle))), rng.normal(size=(length - 1, 2)))
 
 
 experiences = st.builds(Experience, problems(), st.builds(plan, st.integers(2, 20), st.integers(0, 99)))

@@ -13,7 +13,7 @@ from planners.memory.encoder import Architecture, Encoder, initial_weights, to_o
 from planners.memory.labels import sweep_plans
 from planners.memory.recall import Memory
 from planners.memory.training import Epoch, TrainedEncoder, TrainingSettings
-from planners.world.vehicle import CAR
+from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES, Vehicle
 from storage.encoders import load_encoder, save_encoder
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
@@ -24,15 +24,15 @@ WEIGHTS = initial_weights(ARCHITECTURE, np.random.default_rng(0))
 GRID = (np.random.default_rng(1).random((64, 64)) < 0.2).astype(np.uint8)
 
 
-def a_memory(plans: int = 3, seed: int = 0) -> Memory:
+def a_memory(plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR) -> Memory:
     rng = np.random.default_rng(seed)
-    stored = tuple(plan(5 + i, seed + i) for i in range(plans))
+    stored = tuple(plan(5 + i, seed + i, vehicle) for i in range(plans))
     rows = (plans + 1, ARCHITECTURE.dimensions)
     return Memory(
         class_name="trap",
-        vehicle=CAR,
+        vehicle=vehicle,
         plans=stored,
-        sweeps=sweep_plans(stored),
+        sweeps=sweep_plans(stored, vehicle),
         centroids=rng.normal(size=rows).astype(np.float32),
         vectors=rng.normal(size=rows).astype(np.float32),
         biases=np.array([-np.inf, *rng.normal(size=plans)], np.float32),
@@ -135,10 +135,32 @@ def test_a_memory_of_another_version_robot_or_grid_is_refused(
     assert "\n" not in str(error.value)
 
 
-def test_a_memory_is_only_loaded_for_its_robot(tmp_path: Path) -> None:
-    save_memory(tmp_path / "m", a_memory())
-    with pytest.raises(StorageError, match="build it with this vehicle"):
-        load_memory(tmp_path / "m", CAR._replace(width=1.5))
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_memory_is_only_loaded_for_its_vehicle(tmp_path: Path, name: str) -> None:
+    memory = a_memory(vehicle=VEHICLES[name])
+    save_memory(tmp_path / "m", memory)
+    assert all(map(same_plan, memory.plans, load_memory(tmp_path / "m", VEHICLES[name]).plans))
+    for other in VEHICLES:
+        if other != name:
+            told = f"made for vehicle {name}, wanted was {other}; ask for --vehicle {name}, or make one"
+            with pytest.raises(StorageError, match=told):
+                load_memory(tmp_path / "m", VEHICLES[other])
+
+
+def test_an_encoder_is_only_loaded_for_its_vehicle(tmp_path: Path) -> None:
+    trained = TrainedEncoder(
+        TrainingSettings(architecture=ARCHITECTURE), WEIGHTS, None, None, (), np.array([], np.int32)
+    )
+    save_encoder(tmp_path / "model", trained, CAR_1_TRAILER)
+    assert load_encoder(tmp_path / "model", CAR_1_TRAILER).settings == trained.settings
+    with pytest.raises(StorageError, match="made for vehicle car-1-trailer, wanted was car;"):
+        load_encoder(tmp_path / "model")
+
+
+def test_a_vehicle_that_is_no_longer_known_is_told_by_its_settings(tmp_path: Path) -> None:
+    save_memory(tmp_path / "m", a_memory(vehicle=CAR._replace(width=1.5)))
+    with pytest.raises(StorageError, match=r'"width": 1.5.*wanted was car; this program knows no such'):
+        load_memory(tmp_path / "m")
 
 
 def test_a_folder_without_a_memory_is_said_so(tmp_path: Path) -> None:

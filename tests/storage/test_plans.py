@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES
 from storage.errors import StorageError
 from storage.plans import PlanRecord, read_plan, write_plan
 from tests.storage.samples import plan, same_plan
@@ -27,12 +28,38 @@ def test_the_file_has_exactly_the_fields_of_the_contract(tmp_path: Path) -> None
     write_plan(tmp_path / "plan.json", RECORD)
     found = json.loads((tmp_path / "plan.json").read_text())
     assert list(found) == [
-        "problem_id", "status", "source", "planner", "assist", "dt", "states", "controls",
+        "problem_id", "status", "source", "planner", "assist", "vehicle", "dt", "states", "controls",
         "planning_seconds", "length_m", "duration_s",
     ]  # fmt: skip
     assert RECORD.plan is not None
     assert found["states"] == RECORD.plan.states.tolist()
     assert found["duration_s"] == pytest.approx(1.9)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_plan_is_only_read_for_its_vehicle(tmp_path: Path, name: str) -> None:
+    vehicle = VEHICLES[name]
+    path = tmp_path / "plan.json"
+    write_plan(path, replace(RECORD, plan=plan(20, 3, vehicle), vehicle=vehicle))
+    read = read_plan(path, vehicle)
+    assert read.plan is not None
+    assert same_plan(read.plan, plan(20, 3, vehicle))
+    for other in VEHICLES:
+        if other != name:
+            with pytest.raises(StorageError, match=f"for vehicle {name}, wanted was {other}; ask for"):
+                read_plan(path, VEHICLES[other])
+
+
+def test_a_plan_that_names_no_vehicle_is_the_cars(tmp_path: Path) -> None:
+    """Files were once of the car alone."""
+    path = tmp_path / "plan.json"
+    write_plan(path, RECORD)
+    found = json.loads(path.read_text())
+    del found["vehicle"]
+    path.write_text(json.dumps(found))
+    assert read_plan(path).vehicle == CAR
+    with pytest.raises(StorageError, match="for vehicle car, wanted was car-1-trailer"):
+        read_plan(path, CAR_1_TRAILER)
 
 
 def test_an_attempt_without_a_plan_can_be_written(tmp_path: Path) -> None:
@@ -44,8 +71,8 @@ def test_an_attempt_without_a_plan_can_be_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"states": [[1, 2, 3], [1, 2, 3]], "controls": [[0, 0]]}, r"states \[2, 3\].*another robot"),
-        ({"states": [[1, 2, 3, 4, 5]]}, "another robot"),
+        ({"states": [[1, 2, 3], [1, 2, 3]], "controls": [[0, 0]]}, r"states \[2, 3\].*another vehicle"),
+        ({"states": [[1, 2, 3, 4, 5]]}, "another vehicle"),
         ({"states": [[1, 2, 3, 4, 5], [1, 2]]}, "is no plan"),
         ({"states": "none"}, "is no plan"),
         ({"dt": None}, "is no plan"),

@@ -4,12 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.experience import Experience
-from planners.world.vehicle import CAR
+from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES, Vehicle, name_of
 from storage.errors import StorageError
 from storage.experiences import merge_experiences, read_experiences, write_experiences
 from storage.hallucinated import read_hallucinated_problems, read_labelled, write_hallucinated
@@ -17,10 +18,14 @@ from storage.recalls import read_recalls, write_recalls
 from storage.results import read_attempts, write_attempts
 from tests.storage.samples import box, experiences, plan, problem_with, quick, same_plan, same_problem
 
+OTHERS = [vehicle for vehicle in VEHICLES.values() if vehicle != CAR]
 
-def store(path: Path, found: list[Experience], key: str = "k") -> None:
-    count = len(found)
-    write_experiences(path, found, planner="rrt", seeds=range(count), planning_seconds=[0.5] * count, key=key)
+
+def store(path: Path, found: list[Experience], key: str = "k", vehicle: Vehicle = CAR) -> None:
+    times = [0.5] * len(found)
+    write_experiences(
+        path, found, planner="rrt", seeds=range(len(found)), planning_seconds=times, key=key, vehicle=vehicle
+    )
 
 
 def same(one: list[Experience], other: list[Experience]) -> bool:
@@ -56,11 +61,46 @@ def test_merged_shards_hold_the_first_rows_in_order(tmp_path: Path) -> None:
         merge_experiences([], tmp_path / "none.parquet", 4)
 
 
-def test_experiences_of_another_robot_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+def test_states_are_as_wide_as_the_vehicle_needs(tmp_path: Path, vehicle: Vehicle) -> None:
+    found = [Experience(problem_with(), plan(3 + i, i, vehicle), vehicle) for i in range(3)]
+    store(tmp_path / "e.parquet", found, vehicle=vehicle)
+    read = read_experiences(tmp_path / "e.parquet", vehicle)
+    assert same(read, found)
+    assert {experience.vehicle for experience in read} == {vehicle}
+
+
+@pytest.mark.parametrize("wanted", [*OTHERS, CAR._replace(width=1.2)])
+def test_experiences_of_another_vehicle_are_refused_by_name(tmp_path: Path, wanted: Vehicle) -> None:
     store(tmp_path / "e.parquet", [Experience(problem_with(), plan(3))])
-    with pytest.raises(StorageError, match="recorded for vehicle") as error:
-        read_experiences(tmp_path / "e.parquet", CAR._replace(width=1.2))
+    with pytest.raises(StorageError, match="was made for vehicle car, wanted was ") as error:
+        read_experiences(tmp_path / "e.parquet", wanted)
+    assert name_of(wanted) in str(error.value)
+    assert "--vehicle car" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_experiences_of_two_vehicles_are_not_merged(tmp_path: Path) -> None:
+    shards = [tmp_path / "0000.parquet", tmp_path / "0001.parquet"]
+    for shard, vehicle in zip(shards, (CAR, CAR_1_TRAILER), strict=True):
+        store(shard, [Experience(problem_with(), plan(3, 0, vehicle), vehicle)], vehicle=vehicle)
+    with pytest.raises(StorageError, match="several vehicles"):
+        merge_experiences(shards, tmp_path / "all.parquet", 2)
+
+
+def test_what_was_written_when_there_was_but_the_car_is_read(tmp_path: Path) -> None:
+    """Its metadata, as the files of that time have it."""
+    path = tmp_path / "e.parquet"
+    found = [Experience(problem_with(), plan(4))]
+    store(path, found)
+    table = pq.read_table(path)
+    assert table.schema.metadata[b"schema"] == b"experiences/1"
+    car = (
+        b'{"front": 1.8, "rear": 0.2, "width": 0.9, "wheelbase": 1.6, "max_steering": 0.6981317007977318, '
+        b'"min_speed": -1.0, "max_speed": 4.0, "max_acceleration": 2.0, "max_steering_rate": 1.6, "dt": 0.1}'
+    )
+    pq.write_table(table.replace_schema_metadata({**table.schema.metadata, b"vehicle": car}), path)
+    assert same(read_experiences(path), found)
 
 
 @quick
@@ -167,7 +207,7 @@ def test_attempts_of_a_folder_come_back_in_the_order_of_their_files(tmp_path: Pa
     write_attempts(tmp_path / "curves" / "0000.parquet", [ATTEMPT, {**ATTEMPT, "verified": True}])
     (tmp_path / "curves" / ".0002.parquet.abc.partial").write_text("half")
     frame = read_attempts(tmp_path)
-    assert list(frame.columns) == [*ATTEMPT, "scene_seconds", "verified"]
+    assert list(frame.columns) == [*ATTEMPT, "scene_seconds", "verified", "vehicle"]
     assert frame["solved"].tolist() == [True, True, False]
     assert frame["recalled"][0].tolist() == [3, 1, 2]
     assert frame["planning_seconds"].tolist() == [0.001] * 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +30,7 @@ SETTINGS = st.builds(
     epochs=st.integers(1, 60),
     combined=st.booleans(),
     strict=st.booleans(),
+    vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
 )
 
 
@@ -59,6 +62,20 @@ def test_a_run_name_says_preset_objective_and_digest() -> None:
     assert (preset, objective, len(digest)) == ("laptop", "triplet", 8)
 
 
+def test_a_run_of_another_vehicle_says_its_name() -> None:
+    assert for_preset("smoke", vehicle="car-1-trailer").run_name.startswith("smoke-labels-car-1-trailer-")
+
+
+def test_settings_from_before_there_were_vehicles_are_the_cars_and_keep_their_name() -> None:
+    settings = for_preset("smoke")
+    values = json.loads(settings.to_json())
+    del values["vehicle"]
+    assert RunSettings.from_json(json.dumps(values)) == settings
+    del values["strict"]
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
+    assert settings.run_name == f"smoke-labels-{digest}"
+
+
 def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Path) -> None:
     for part in ("train", "test"):
         (tmp_path / "forest" / part).mkdir(parents=True)
@@ -81,6 +98,10 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
         ({"objective": "luck"}, "Unknown objective 'luck'. Known: labels, triplet."),
         ({"experiences": 0}, "0 experiences: give 1 or more."),
         ({"test_problems": -5}, "-5 test problems: give 1 or more."),
+        (
+            {"vehicle": "tram"},
+            "Unknown vehicle 'tram'. Known: car, differential-drive, car-1-trailer, car-2-trailers.",
+        ),
         ({"seed": -1}, "Seed -1 is negative. Give 0 or more."),
         ({"worlds": ["/nowhere"]}, "/nowhere is no folder of worlds: it has no train in it."),
     ],

@@ -9,10 +9,11 @@ import shapely
 from hypothesis import given, settings
 
 from planners.world.classes import CLASSES, DIFFICULTIES, ProblemClass, problem_class
-from planners.world.collision import scene_of
+from planners.world.collision import count_free_prefix, scene_of
 from planners.world.problem import BOUNDS, CAR, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.shapes import GOAL_ROOM, START_ROOM
+from planners.world.vehicle import VEHICLES, CarWithTrailers, Vehicle
 from tests.planners.world.kernels import state_is_free
 from tests.planners.world.strategies import seeds
 
@@ -62,6 +63,26 @@ def test_start_and_goal_have_room(drawn: ProblemClass, seed: int) -> None:
         place = shapely.Point(x, y)
         assert all(place.distance(polygon) > room for polygon in polygons(problem))
     assert state_is_free(tuple(start_state(problem)), CAR, scene_of(problem))
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+@each_class
+def test_every_vehicle_stands_free_at_the_start_and_else_gets_the_same_draws(
+    drawn: ProblemClass, vehicle: Vehicle
+) -> None:
+    own = problem_class(drawn.name, drawn.difficulty, vehicle)
+    without = 0
+    for index in range(100):
+        problem, cars = own.draw(9, index), drawn.draw(9, index)
+        assert count_free_prefix(start_state(problem, vehicle)[np.newaxis], vehicle, scene_of(problem)) == 1
+        kept = {piece.tobytes() for piece in problem.obstacles.pieces()}
+        left_out = [piece for piece in cars.obstacles.pieces() if piece.tobytes() not in kept]
+        assert len(kept) == len(cars.obstacles.pieces()) - len(left_out)
+        obstacles = len(cars.obstacles.obstacle_starts) - len(problem.obstacles.obstacle_starts)
+        assert obstacles <= 3  # near the start, of some thirty
+        without += bool(left_out)
+    if not isinstance(vehicle, CarWithTrailers):
+        assert without == 0
 
 
 @each_class

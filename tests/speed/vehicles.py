@@ -1,0 +1,110 @@
+"""The vehicles beside the car: do the planners solve for them too, how fast, and is every plan lawful?
+
+``python -m tests.speed.vehicles`` prints, per vehicle, class at ``easy`` and planner: solved share, times of
+planning from scratch, and how many plans the authority refused; then each vehicle's best planner.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from scipy.stats import binom
+
+from planners.search.outcome import Outcome
+from planners.search.registry import PLANNERS, plan
+from planners.world.authority import faults
+from planners.world.classes import CLASSES, problem_class
+from planners.world.problem import Problem
+from planners.world.vehicle import CAR, VEHICLES, Vehicle
+from tests.speed.planners import measure
+
+SEED = 78
+COUNT = 200  # problems a class
+OTHERS = {name: vehicle for name, vehicle in VEHICLES.items() if vehicle != CAR}
+
+Rows = list[tuple[Outcome, float]]  # of each problem: what came out, and seconds
+
+
+def median_interval(values: list[float]) -> tuple[float, float, float]:
+    """Median and the ends of its 95 % interval, by order statistics."""
+    low, high = binom.ppf((0.025, 0.975), len(values), 0.5).astype(int)
+    ordered = np.sort(values)
+    return float(np.median(values)), float(ordered[low]), float(ordered[min(high, len(values) - 1)])
+
+
+def refused(problems: list[Problem], rows: Rows, vehicle: Vehicle) -> list[str]:
+    """The first fault of each plan that the authority refuses."""
+    found = [
+        faults(p, o.plan, vehicle) for p, (o, _) in zip(problems, rows, strict=True) if o.plan is not None
+    ]
+    return [wrong[0] for wrong in found if wrong]
+
+
+def solved_share(rows: Rows) -> float:
+    """Share of the problems for which a plan was found."""
+    return float(np.mean([outcome.plan is not None for outcome, _ in rows]))
+
+
+def add_rows(table: Table, place: tuple[str, str], rows: dict[str, Rows], wrong: dict[str, int]) -> None:
+    """One row a planner."""
+    for planner, found in rows.items():
+        seconds = [second for _, second in found]
+        plans = [outcome.plan for outcome, _ in found if outcome.plan is not None]
+        median, low, high = (1e3 * value for value in median_interval(seconds))
+        table.add_row(
+            *place,
+            planner,
+            f"{solved_share(found):.1%}",
+            f"{median:.2f} ({low:.2f}-{high:.2f})",
+            f"{1e3 * np.mean(seconds):.2f}",
+            f"{1e3 * np.quantile(seconds, 0.9):.2f}",
+            f"{np.mean([found.duration_s for found in plans]):.1f}" if plans else "-",
+            str(wrong[planner]),
+        )
+
+
+def report(console: Console, count: int = COUNT) -> None:
+    """Print the table and the verdict; AssertionError where the authority refused a plan."""
+    title = f"Vehicles: {count} problems a class at easy, from scratch"
+    table = Table(title=title, title_justify="left")
+    for name in ("vehicle", "class", "planner"):
+        table.add_column(name)
+    for name in ("solved", "median ms (95 %)", "mean ms", "90 % ms", "driving s", "refused"):
+        table.add_column(name, justify="right")
+    lines, reasons = [], []
+    for name, vehicle in OTHERS.items():
+        found: dict[str, Rows] = {planner: [] for planner in PLANNERS}
+        for class_name in CLASSES:
+            drawn = problem_class(class_name, "easy", vehicle)
+            problems = [drawn.draw(SEED, index) for index in range(count)]
+            rows = measure({planner: partial(_plan, planner, vehicle) for planner in PLANNERS}, problems)
+            wrong = {planner: refused(problems, rows[planner], vehicle) for planner in PLANNERS}
+            add_rows(
+                table, (name, class_name), rows, {planner: len(faults) for planner, faults in wrong.items()}
+            )
+            for planner in PLANNERS:
+                found[planner] += rows[planner]
+                reasons += wrong[planner]
+        table.add_section()
+        best = max(found, key=lambda planner: (solved_share(found[planner]), -_mean_seconds(found[planner])))
+        share, seconds = solved_share(found[best]), _mean_seconds(found[best])
+        lines.append(f"{name}: best is {best}, {share:.2%} solved in a mean of {1e3 * seconds:.2f} ms")
+    console.print(table)
+    for line in lines:
+        console.print(line)
+    assert not reasons, f"The authority refused {len(reasons)} plans; the first: {reasons[0]}"
+
+
+def _plan(planner: str, vehicle: Vehicle, problem: Problem, rng: np.random.Generator) -> Outcome:
+    return plan(planner, problem, rng, vehicle=vehicle)
+
+
+def _mean_seconds(rows: Rows) -> float:
+    return float(np.mean([seconds for _, seconds in rows]))
+
+
+if __name__ == "__main__":
+    report(Console(width=120))
