@@ -30,6 +30,7 @@ class Example(NamedTuple):
     recalled: Sequence[Plan]  # in the order of recall, turned to the problem's start as they were checked
     found: Plan | None  # the answer; None where the attempt failed
     caption: str
+    vehicle: Vehicle = CAR
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -81,28 +82,27 @@ def draw_plan(
         shown = states[
             np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], count + 1)), len(states) - 1)
         ]
-        _draw_bodies(axes, shown, vehicle, facecolor="none", edgecolor=colour, linewidth=0.8, zorder=3)
+        _draw_bodies(axes, shown, vehicle, facecolor=(colour, 0.2), edgecolor=colour, linewidth=0.8, zorder=3)
         return
     rest = plan.states[first_collision:]
     axes.plot(rest[:, 0], rest[:, 1], color=colour, linewidth=0.8, linestyle=":", alpha=0.8, zorder=3)
     axes.plot(*states[-1, :2], marker="X", color=colour, markersize=8, markeredgecolor="white", zorder=7)
 
 
-def gallery(examples: Sequence[Example], vehicle: Vehicle = CAR) -> Figure:
+def gallery(examples: Sequence[Example], title: str = "Recalled and found plans") -> Figure:
     """Problems with the plans recalled for them, free or in collision, and the plan that was found."""
-    title = "Recalled and found plans"
     if not examples:
         return message_figure(title, "No problems to show: run the benchmark first.")
-    columns = min(3, len(examples))
+    columns = 2 if len(examples) == 4 else min(3, len(examples))
     rows = math.ceil(len(examples) / columns)
-    figure = new_figure(max(6.4, 3.8 * columns), 4.1 * rows + 1.0, title)
+    figure = new_figure(max(6.4, 3.8 * columns), 3.85 * rows + 0.9, title)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(examples) :]:
         axes.set_axis_off()
     for axes, example in zip(grid, examples, strict=False):
-        _draw_example(axes, example, vehicle)
+        _draw_example(axes, example)
     figure.legend(
-        handles=_legend(vehicle),
+        handles=_legend(examples),
         loc="outside lower left",
         ncols=5 if columns > 2 else 3,
         frameon=False,
@@ -120,8 +120,9 @@ def picture(
 ) -> Figure:
     """One problem with its plan and, where given, the plans recalled for it."""
     figure = new_figure(6.4, 7.2, problem.id or "Problem")
-    _draw_example(figure.add_subplot(), Example(problem, recalled, plan, caption), vehicle)
-    handles = _legend(vehicle)[: 5 if recalled else 3]
+    example = Example(problem, recalled, plan, caption, vehicle)
+    _draw_example(figure.add_subplot(), example)
+    handles = _legend([example])
     figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
     return figure
 
@@ -150,7 +151,8 @@ def _draw_bodies(axes: Axes, states: Floats, vehicle: Vehicle, **style: Any) -> 
         axes.add_collection(LineCollection(list(lines), **style))
 
 
-def _draw_example(axes: Axes, example: Example, vehicle: Vehicle) -> None:
+def _draw_example(axes: Axes, example: Example) -> None:
+    vehicle = example.vehicle
     draw_problem(axes, example.problem, vehicle)
     scene = scene_of(example.problem)
     if example.found is not None:
@@ -167,14 +169,17 @@ def _draw_example(axes: Axes, example: Example, vehicle: Vehicle) -> None:
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
 
 
-def _legend(vehicle: Vehicle) -> list[Line2D | Patch]:
-    found = f"plan found, with the vehicle every {footprint_spacing_m(vehicle):.0f} m"
-    return [
+def _legend(examples: Sequence[Example]) -> list[Line2D | Patch]:
+    """What the examples show; recalled plans only where there are any."""
+    spacings = {footprint_spacing_m(example.vehicle) for example in examples}
+    every = f"{spacings.pop():.0f} m" if len(spacings) == 1 else "few metres"
+    handles: list[Line2D | Patch] = [
         Line2D([], [], color=INK, marker=">", linestyle="none", label="start"),
         Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
                label="goal"),
-        Line2D([], [], color=GREEN, linewidth=1.8, label=found),
+        Line2D([], [], color=GREEN, linewidth=1.8, label=f"plan found, with the vehicle every {every}"),
         Line2D([], [], color=SKY, linewidth=4.5, label="recalled, free"),
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
                markersize=8, label="recalled, collides at the cross"),
     ]  # fmt: skip
+    return handles if any(example.recalled for example in examples) else handles[:3]

@@ -35,7 +35,7 @@ def draw_chunk(chunk: Chunk) -> dict[str, Any]:
     drawn = save(training_curves(epochs), run.figures, f"training-{name}")
     if name in chunk.settings.class_names:
         drawn += save(
-            gallery(list(_examples(chunk)), vehicle_named(chunk.settings.vehicle)),
+            gallery(list(_examples(chunk))),
             run.figures,
             f"problems-{name}",
         )
@@ -77,4 +77,6 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
             problem = source.problem("test", places[identity])
             attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.1f} ms"
-            yield Example(problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption)
+            yield Example(
+                problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption, vehicle
+            )

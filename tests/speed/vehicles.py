@@ -1,28 +1,34 @@
 """The vehicles beside the car: do the planners solve for them too, how fast, and is every plan lawful?
 
 ``python -m tests.speed.vehicles`` prints, per vehicle, class at ``easy`` and planner: solved share, times of
-planning from scratch, and how many plans the authority refused; then each vehicle's best planner.
+planning from scratch, and how many plans the authority refused; then each vehicle's best planner. With a
+folder it draws ``vehicles.png`` there: how each of the four solves one problem.
 """
 
 from __future__ import annotations
 
+import sys
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from scipy.stats import binom
 
+from dashboards.pictures import Example, gallery
 from planners.search.outcome import Outcome
 from planners.search.registry import PLANNERS, plan
 from planners.world.authority import faults
 from planners.world.classes import CLASSES, problem_class
 from planners.world.problem import Problem
+from planners.world.randomness import generator
 from planners.world.vehicle import CAR, VEHICLES, Vehicle
-from tests.speed.planners import measure
+from storage.files import whole_file
+from tests.speed.planners import SEED, measure
 
-SEED = 78
 COUNT = 200  # problems a class
+PICTURED, PICTURED_PLANNER = 2, "follow"
 OTHERS = {name: vehicle for name, vehicle in VEHICLES.items() if vehicle != CAR}
 
 Rows = list[tuple[Outcome, float]]  # of each problem: what came out, and seconds
@@ -106,5 +112,21 @@ def _mean_seconds(rows: Rows) -> float:
     return float(np.mean([seconds for _, seconds in rows]))
 
 
+def draw(folder: Path) -> None:
+    """One problem solved by every vehicle with the best planner."""
+    examples = []
+    for name, vehicle in VEHICLES.items():
+        problem = problem_class("trap", "standard", vehicle).draw(SEED, PICTURED)
+        found = _plan(PICTURED_PLANNER, vehicle, problem, generator(SEED, problem.id)).plan
+        told = "no plan" if found is None else f"{found.length_m:.0f} m in {found.duration_s:.0f} s"
+        examples.append(Example(problem, (), found, f"{name.replace('-', ' ')}: {told}", vehicle))
+    figure = gallery(examples, "Four vehicles, one problem, from scratch")
+    with whole_file(folder / "vehicles.png") as temporary:
+        figure.savefig(temporary, format="png", dpi=130, metadata={"Software": None})
+
+
 if __name__ == "__main__":
-    report(Console(width=120))
+    if len(sys.argv) > 1:
+        draw(Path(sys.argv[1]))
+    else:
+        report(Console(width=120))
