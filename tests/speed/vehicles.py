@@ -119,7 +119,7 @@ def draw(folder: Path) -> None:
         problem = problem_class("trap", "standard", vehicle).draw(SEED, PICTURED)
         found = _plan(PICTURED_PLANNER, vehicle, problem, generator(SEED, problem.id)).plan
         told = "no plan" if found is None else f"{found.length_m:.0f} m in {found.duration_s:.0f} s"
-        examples.append(Example(problem, (), found, f"{name.replace('-', ' ')}: {told}", vehicle))
+        examples.append(Example(problem, (), found, f"{name}: {told}", vehicle))
     figure = gallery(examples, "Four vehicles, one problem, from scratch")
     with whole_file(folder / "vehicles.png") as temporary:
         figure.savefig(temporary, format="png", dpi=130, metadata={"Software": None})
