@@ -21,8 +21,9 @@ class Experience:
 
     @functools.cached_property
     def boxes(self) -> Floats:
-        """The plan's swept boxes ``[T * B, 6]`` in driving order, columns as in ``PlanSweeps``."""
-        return swept_boxes(self.plan.states, self.vehicle)
+        """The plan's swept boxes ``[T, B, 6]`` of B bodies in driving order, columns as in ``PlanSweeps``."""
+        boxes = swept_boxes(self.plan.states, self.vehicle)
+        return boxes.reshape(len(self.plan.states), -1, 6)
 
     @functools.cached_property
     def sweep(self) -> PlanSweeps:

@@ -53,7 +53,7 @@ class Rearrange:
             problem.obstacles,
             draw(rng),
             experience.boxes,
-            goal_box.reshape(1, 6),
+            goal_box.reshape(1, 1, 6),
             self.near_m,
             self.position_std_m,
             self.heading_std_rad,
@@ -190,7 +190,7 @@ def _with_blocking(obstacles: Obstacles, extra: Obstacles, sweeps: PlanSweeps, f
         blocks = False
         for i in range(free.shape[0]):
             if free[i]:
-                boxes = sweeps.boxes[sweeps.starts[i] : sweeps.starts[i + 1]]
+                boxes = sweeps.boxes[sweeps.starts[i] : sweeps.starts[i + 1]].reshape((-1, 1, 6))
                 if obstacle_meets(result, count, boxes, 0.0, math.inf):
                     free[i] = False
                     blocks = True

@@ -56,21 +56,23 @@ def moved_obstacle(
 
 @jit
 def largest_stride(boxes: Floats) -> float:
-    """The most, in metres, by which a gap in x or y can shrink from one of ``boxes [T, 6]`` to the next."""
+    """The most, in metres, by which a gap in x or y can shrink from a state to the next: ``boxes [T, B, 6]``."""
     largest = 0.0
     for t in range(1, boxes.shape[0]):
-        way = max(abs(boxes[t, 0] - boxes[t - 1, 0]), abs(boxes[t, 1] - boxes[t - 1, 1]))
-        growth = abs(boxes[t, 4] - boxes[t - 1, 4]) + abs(boxes[t, 5] - boxes[t - 1, 5])
-        largest = max(largest, way + growth)
+        for b in range(boxes.shape[1]):
+            way_x = abs(boxes[t, b, 0] - boxes[t - 1, b, 0])
+            way_y = abs(boxes[t, b, 1] - boxes[t - 1, b, 1])
+            growth = abs(boxes[t, b, 4] - boxes[t - 1, b, 4]) + abs(boxes[t, b, 5] - boxes[t - 1, b, 5])
+            largest = max(largest, max(way_x, way_y) + growth)
     return largest
 
 
 @jit
 def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float, stride_m: float) -> bool:
-    """Whether obstacle ``o`` meets any of ``boxes [T, 6]`` (as in PlanSweeps), widened on every side.
+    """Whether obstacle ``o`` meets any of ``boxes [T, B, 6]`` (as in PlanSweeps), widened on every side.
 
-    ``stride_m`` is their largest stride, infinite for boxes in no order: boxes that cannot have come near
-    since the last look are skipped.
+    ``stride_m`` is their largest stride, infinite for boxes in no order: states at which no body can have
+    come near since the last look are skipped.
     """
     first_piece = obstacles.obstacle_starts[o]
     last_piece = obstacles.obstacle_starts[o + 1]
@@ -92,15 +94,20 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
             y_max = max(y_max, vertices[i, 1])
         t = 0
         while t < boxes.shape[0]:
-            x = boxes[t, 0]
-            y = boxes[t, 1]
-            half_length = boxes[t, 4] + widened_m
-            half_width = boxes[t, 5] + widened_m
-            gap = max(x_min - x, x - x_max, y_min - y, y - y_max) - math.hypot(half_length, half_width)
-            if gap > 0.0:
-                t += 1 + int(gap / stride_m)
-            elif box_meets_piece(x, y, boxes[t, 2], boxes[t, 3], half_length, half_width, 0, count, edges):
-                return True
-            else:
-                t += 1
+            skipped = boxes.shape[0]
+            for b in range(boxes.shape[1]):
+                x = boxes[t, b, 0]
+                y = boxes[t, b, 1]
+                half_length = boxes[t, b, 4] + widened_m
+                half_width = boxes[t, b, 5] + widened_m
+                gap = max(x_min - x, x - x_max, y_min - y, y - y_max) - math.hypot(half_length, half_width)
+                if gap > 0.0:
+                    skipped = min(skipped, int(gap / stride_m))
+                    continue
+                skipped = 0
+                cos = boxes[t, b, 2]
+                sin = boxes[t, b, 3]
+                if box_meets_piece(x, y, cos, sin, half_length, half_width, 0, count, edges):
+                    return True
+            t += 1 + skipped
     return False

@@ -12,8 +12,10 @@ from planners.memory.hallucination import METHODS, Rearrange, _rearranged, hallu
 from planners.memory.labels import free_plans, sweep_plans
 from planners.memory.placing import largest_stride, obstacle_meets
 from planners.world.collision import count_free_prefix, scene_of
-from planners.world.problem import CAR, obstacles_of
+from planners.world.dynamics import simulate
+from planners.world.problem import CAR, Plan, obstacles_of
 from planners.world.randomness import generator
+from planners.world.vehicle import CAR_2_TRAILERS
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -68,10 +70,26 @@ def test_skipping_boxes_changes_no_verdict(experiences, draw, seed, widened):
         assert obstacle_meets(obstacles, o, boxes, widened, stride) == every
 
 
+@given(seed=SEEDS, widened=st.floats(0.0, 2.0))
+@settings(max_examples=30)
+def test_neither_does_it_with_trailers_and_they_meet_more_than_the_car(experiences, draw, seed, widened):
+    alone = experiences[seed % 8]
+    start = np.append(alone.plan.states[0], [0.0, 0.0])
+    pulled = Plan(simulate(start, alone.plan.controls, CAR_2_TRAILERS), alone.plan.controls)
+    boxes = Experience(alone.problem, pulled, CAR_2_TRAILERS).boxes
+    assert boxes.shape == (len(pulled.states), 3, 6)
+    obstacles = draw(generator(seed))
+    stride = largest_stride(boxes)
+    for o in range(len(obstacles.obstacle_starts) - 1):
+        every = obstacle_meets(obstacles, o, boxes, widened, np.inf)
+        assert obstacle_meets(obstacles, o, boxes, widened, stride) == every
+        assert every or not obstacle_meets(obstacles, o, alone.boxes, widened, np.inf)
+
+
 def test_jitted_rearranging_equals_interpreted(experiences, draw):
     experience = experiences[0]
     fresh = draw(generator(5), 4)
-    goal_box = np.array([[*experience.problem.goal, 1.0, 0.0, 2.0, 2.0]])
+    goal_box = np.array([[[*experience.problem.goal, 1.0, 0.0, 2.0, 2.0]]])
     arguments = (experience.problem.obstacles, fresh, experience.boxes[::8], goal_box, 3.0, 0.3, 0.05, 5)
     jitted = _rearranged(*arguments, generator(9))
     interpreted = _rearranged.py_func(*arguments, generator(9))
