@@ -56,7 +56,7 @@ def moved_obstacle(
 
 @jit
 def largest_stride(boxes: Floats) -> float:
-    """The most, in metres, by which a gap in x or y can shrink from a state to the next: ``boxes [T, B, 6]``."""
+    """The most, in metres, by which a gap in x or y can shrink between states of ``boxes [T, B, 6]``."""
     largest = 0.0
     for t in range(1, boxes.shape[0]):
         for b in range(boxes.shape[1]):
