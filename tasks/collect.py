@@ -28,8 +28,6 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     planner, seed = chunk.settings.collector, chunk.settings.seed
     vehicle = vehicle_named(chunk.settings.vehicle)
     experiences, seconds = [], []
-    # once for nothing: compiling may take as long as a search is given, and no problem may be lost to that
-    solve(source.problem("collect", chunk.first), planner, seed=seed, vehicle=vehicle)
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
         attempt = solve(problem, planner, seed=seed, vehicle=vehicle)

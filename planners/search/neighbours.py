@@ -101,7 +101,7 @@ def remove(buckets: Buckets, item: int, x: float, y: float) -> None:
 def first_ring(buckets: Buckets, column: int, row: int) -> int:
     """The smallest square ring of buckets around (column, row) that can hold a point."""
     extent = buckets.extent
-    return max(extent[0] - column, column - extent[1], extent[2] - row, row - extent[3], 0)
+    return int(max(extent[0] - column, column - extent[1], extent[2] - row, row - extent[3], 0))
 
 
 @inlined
@@ -142,7 +142,7 @@ def _nearest(buckets: Buckets, x: float, y: float) -> tuple[int, float, float]:
 @lean
 def nearest(buckets: Buckets, x: float, y: float) -> int:
     """The nearest point among the newest of each bucket; -1 when there is none."""
-    return int(_nearest(buckets, x, y)[0])
+    return _nearest(buckets, x, y)[0]
 
 
 @lean

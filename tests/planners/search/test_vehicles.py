@@ -18,9 +18,6 @@ OTHERS = [vehicle for vehicle in VEHICLES.values() if vehicle != CAR]
 
 
 def check(planner: str, vehicle: Vehicle, difficulty: str, count: int) -> None:
-    plan(
-        planner, problem_of([]), generator(0), vehicle=vehicle
-    )  # compiled, while no search's time is running
     for name in CLASSES:
         drawn = problem_class(name, difficulty, vehicle)
         for index in range(count):
