@@ -117,12 +117,13 @@ def picture(
     caption: str,
     recalled: Sequence[Plan] = (),
     vehicle: Vehicle = CAR,
+    called: str = "recalled",
 ) -> Figure:
-    """One problem with its plan and, where given, the plans recalled for it."""
+    """One problem with its plan and, where given, the plans recalled for it, or ``called`` otherwise."""
     figure = new_figure(6.4, 7.2, problem.id or "Problem")
     example = Example(problem, recalled, plan, caption, vehicle)
     _draw_example(figure.add_subplot(), example)
-    handles = _legend([example])
+    handles = _legend([example], called)
     figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
     return figure
 
@@ -169,8 +170,8 @@ def _draw_example(axes: Axes, example: Example) -> None:
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
 
 
-def _legend(examples: Sequence[Example]) -> list[Line2D | Patch]:
-    """What the examples show; recalled plans only where there are any."""
+def _legend(examples: Sequence[Example], called: str = "recalled") -> list[Line2D | Patch]:
+    """What the examples show; recalled plans, or what they are ``called``, only where there are any."""
     spacings = {footprint_spacing_m(example.vehicle) for example in examples}
     every = f"{spacings.pop():.0f} m" if len(spacings) == 1 else "few metres"
     handles: list[Line2D | Patch] = [
@@ -178,8 +179,8 @@ def _legend(examples: Sequence[Example]) -> list[Line2D | Patch]:
         Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
                label="goal"),
         Line2D([], [], color=GREEN, linewidth=1.8, label=f"plan found, with the vehicle every {every}"),
-        Line2D([], [], color=SKY, linewidth=4.5, label="recalled, free"),
+        Line2D([], [], color=SKY, linewidth=4.5, label=f"{called}, free"),
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
-               markersize=8, label="recalled, collides at the cross"),
+               markersize=8, label=f"{called}, collides at the cross"),
     ]  # fmt: skip
     return handles if any(example.recalled for example in examples) else handles[:3]

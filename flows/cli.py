@@ -137,6 +137,49 @@ def plan(
 
 
 @app.command
+def optimise(
+    problem: Path,
+    *,
+    plan: Path | None = None,
+    planner: str | None = None,
+    straight: bool = False,
+    clearance_weight: float = 0.0,
+    vehicle: str = "car",
+    seed: int = 1,
+    out: Path | None = None,
+    picture: Path | None = None,
+) -> None:
+    """Optimise a plan for one problem, from a plan that may be blocked, a planner's, or a straight line.
+
+    Parameters
+    ----------
+    problem
+        A .json, .jsonl or .parquet file with one problem.
+    plan
+        Begin with the plan of this .json file, made for this problem or another.
+    planner
+        Begin with the plan of rrt, gust or follow; follow where no beginning is given.
+    straight
+        Begin with a straight line from start to goal.
+    clearance_weight
+        How much a plan should keep away from obstacles rather than be short in time.
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
+    seed
+        Everything random follows from it.
+    out
+        Where to write the plan, .json.
+    picture
+        Where to draw guess and plan, .png, .svg or .pdf.
+
+    """
+    from tasks.optimise import beginning, optimise_one
+
+    begin = beginning(plan, planner, straight, vehicle, seed)
+    optimise_one(begin, problem, clearance_weight, out, picture)
+
+
+@app.command
 def solve(
     problems: Path,
     *,

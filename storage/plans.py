@@ -20,7 +20,7 @@ class PlanRecord:
 
     problem_id: str
     status: str
-    source: str | None  # recalled, repaired or searched
+    source: str | None  # recalled, repaired, searched or optimised
     planner: str
     assist: str
     planning_seconds: float

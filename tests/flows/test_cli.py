@@ -13,7 +13,7 @@ from flows.cli import app, call
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
-    "solve",
+    "optimise", "solve",
 )  # fmt: skip
 
 
@@ -39,6 +39,11 @@ COMMANDS = (
         (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
         (["plan", "p.json"], 1, "p.json does not exist"),
+        (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),
+        (["optimise", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
+        (["optimise", "p.json", "--clearance-weight", "-1"], 2, "Clearance weight -1.0"),
+        (["optimise", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
+        (["optimise", "p.json"], 1, "p.json does not exist"),
         (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
         (["verify", "nowhere"], 1, "nowhere is no data folder"),
         (["verify", "nowhere", "--sample", "2"], 2, "Sample is 2.0"),

@@ -1,0 +1,1 @@
+"""Trajectory optimisation: a guess becomes a shorter or clearer plan, or a blocked one a free one."""

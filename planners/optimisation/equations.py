@@ -1,0 +1,125 @@
+"""The vehicles once more, as CasADi expressions: their step, their limits, and discs that cover them.
+
+A step is the classical Runge-Kutta step of ``planners.world.dynamics``, with a length that may vary.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planners.world.problem import Floats
+from planners.world.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_size
+
+SMOOTH = 0.01  # m/s, rad: how far from 0 an absolute value is rounded off, always upwards
+SHY_OF_JACK_KNIFE = 1e-3  # rad: the limit itself may be passed by the solver's tolerance
+
+
+class Bounds(NamedTuple):
+    """What the vehicle allows; infinite where it allows everything."""
+
+    state_low: Floats  # [S]
+    state_high: Floats  # [S]
+    control_low: Floats  # [2]
+    control_high: Floats  # [2]
+
+
+def slopes(state: ca.SX, controls: ca.SX, vehicle: Vehicle) -> ca.SX:
+    """Time derivative ``[S]`` of ``state [S]`` under ``controls [2]``."""
+    heading, speed, turn = state[2], state[3], state[4]
+    turning = [turn if isinstance(vehicle, DifferentialDrive) else speed * ca.tan(turn) / vehicle.wheelbase]
+    hitches = []
+    if isinstance(vehicle, CarWithTrailers):
+        pull = speed
+        for i, length in enumerate(vehicle.hitch_lengths):
+            turning.append(pull * ca.sin(state[5 + i]) / length)
+            hitches.append(turning[i] - turning[i + 1])
+            pull *= ca.cos(state[5 + i])
+    return ca.vertcat(
+        speed * ca.cos(heading), speed * ca.sin(heading), turning[0], controls[0], controls[1], *hitches
+    )
+
+
+def step_of(vehicle: Vehicle) -> ca.Function:
+    """``(state [S], controls [2], step length in seconds) -> next state [S]``, nothing clamped."""
+    state, controls, h = ca.SX.sym("state", state_size(vehicle)), ca.SX.sym("controls", 2), ca.SX.sym("h")
+    k1 = slopes(state, controls, vehicle)
+    k2 = slopes(state + 0.5 * h * k1, controls, vehicle)
+    k3 = slopes(state + 0.5 * h * k2, controls, vehicle)
+    k4 = slopes(state + h * k3, controls, vehicle)
+    return ca.Function("step", [state, controls, h], [state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)])
+
+
+def bounds_of(vehicle: Vehicle) -> Bounds:
+    """Limits of speed, steering or turn rate, hitches and controls; position and heading are free."""
+    if isinstance(vehicle, DifferentialDrive):
+        turn, turn_control = vehicle.max_turn_rate, vehicle.max_turn_acceleration
+    else:
+        turn, turn_control = vehicle.max_steering, vehicle.max_steering_rate
+    hitches = []
+    if isinstance(vehicle, CarWithTrailers):
+        hitches = [vehicle.max_hitch - SHY_OF_JACK_KNIFE] * len(vehicle.hitch_lengths)
+    controls = np.array([vehicle.max_acceleration, turn_control])
+    return Bounds(
+        np.array([-np.inf] * 3 + [vehicle.min_speed, -turn] + [-hitch for hitch in hitches]),
+        np.array([np.inf] * 3 + [vehicle.max_speed, turn, *hitches]),
+        -controls,
+        controls,
+    )
+
+
+def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
+    """``state [S] -> centres [2, D], radii [D]`` in metres: ``a_body`` discs in a row over each body.
+
+    They cover the bodies with the margins that the kernels' check adds: half of the farthest way of a body
+    point in a step into or out of the state.
+    """
+    state = ca.SX.sym("state", state_size(vehicle))
+    x, y, heading = state[0], state[1], state[2]
+    speed = _absolute(state[3]) + vehicle.max_acceleration * vehicle.dt
+    if isinstance(vehicle, DifferentialDrive):
+        turn = _absolute(state[4]) + vehicle.max_turn_acceleration * vehicle.dt
+    else:
+        sharpest = _absolute(state[4]) + vehicle.max_steering_rate * vehicle.dt
+        turn = speed * ca.tan(sharpest) / vehicle.wheelbase
+    body = (vehicle.front, vehicle.rear, vehicle.width)
+    rows = [_row(x, y, heading, body, speed, turn, vehicle.dt, a_body)]
+    if isinstance(vehicle, CarWithTrailers):
+        trailer = (vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width)
+        for hitch, length in zip(ca.vertsplit(state[5:]), vehicle.hitch_lengths, strict=True):
+            heading -= hitch
+            x -= length * ca.cos(heading)
+            y -= length * ca.sin(heading)
+            widest = _absolute(hitch) + vehicle.dt * (turn + speed / length)
+            turn = speed * ca.sin(ca.fmin(widest, 0.5 * math.pi)) / length
+            rows.append(_row(x, y, heading, trailer, speed, turn, vehicle.dt, a_body))
+    return ca.Function("discs", [state], [ca.horzcat(*part) for part in zip(*rows, strict=True)])
+
+
+def _absolute(value: ca.SX) -> ca.SX:
+    return ca.sqrt(value**2 + SMOOTH**2)
+
+
+def _row(
+    x: ca.SX,
+    y: ca.SX,
+    heading: ca.SX,
+    body: tuple[float, float, float],
+    speed: ca.SX,
+    turn: ca.SX,
+    dt: float,
+    count: int,
+) -> tuple[ca.SX, ca.SX]:
+    """Centres ``[2, count]`` and radii ``[1, count]`` of discs over one body, inflated by its margin."""
+    front, rear, width = body
+    margin = 0.5 * dt * ca.sqrt((speed + 0.5 * width * turn) ** 2 + (max(front, rear) * turn) ** 2)
+    half_length = 0.5 * (front + rear) + margin
+    centres = []
+    for i in range(count):
+        along = 0.5 * (front - rear) + (2 * i + 1 - count) / count * half_length
+        centres.append(ca.vertcat(x + along * ca.cos(heading), y + along * ca.sin(heading)))
+    radius = ca.sqrt((half_length / count) ** 2 + (0.5 * width + margin) ** 2)
+    return ca.horzcat(*centres), ca.repmat(radius, 1, count)

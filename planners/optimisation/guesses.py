@@ -1,0 +1,74 @@
+"""Where an optimisation may start: any sequence of states and controls, whether or not it could be driven."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from planners.world.collision import Scene, count_free_prefix
+from planners.world.jit import jit
+from planners.world.problem import Floats, Plan, Problem, start_state
+from planners.world.vehicle import CAR, Vehicle, state_size
+
+
+def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
+    """Straight from start to goal, through everything: full acceleration to full speed, held to the end."""
+    (x, y, _), (goal_x, goal_y) = problem.start, problem.goal
+    distance = math.dist((x, y), problem.goal)
+    gain = vehicle.max_acceleration * vehicle.dt
+    speeds = [0.0]
+    way = [0.0]
+    while way[-1] < distance:
+        speeds.append(min(speeds[-1] + gain, vehicle.max_speed))
+        way.append(way[-1] + 0.5 * vehicle.dt * (speeds[-2] + speeds[-1]))
+    share = np.minimum(np.array(way) / max(distance, 1e-9), 1.0)
+    states = np.zeros((len(way), state_size(vehicle)))
+    states[:, 0] = x + share * (goal_x - x)
+    states[:, 1] = y + share * (goal_y - y)
+    states[:, 2] = math.atan2(goal_y - y, goal_x - x)
+    states[:, 3] = speeds
+    controls = np.zeros((len(way) - 1, 2))
+    controls[:, 0] = np.diff(speeds) / vehicle.dt
+    return Plan(states, controls, vehicle.dt)
+
+
+def least_blocked(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR) -> int:
+    """The number of the plan with the fewest states in collision, the first of equals.
+
+    Raises ValueError when there is no plan.
+    """
+    if not plans:
+        raise ValueError("There is no plan to choose from: store some first.")
+    return int(np.argmin([count_blocked(plan.states, vehicle, scene) for plan in plans]))
+
+
+@jit
+def count_blocked(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
+    """How many of ``states [T, S]`` are in collision."""
+    blocked = 0
+    for i in range(states.shape[0]):
+        blocked += 1 - count_free_prefix(states[i : i + 1], vehicle, scene)
+    return blocked
+
+
+def resampled(guess: Plan, steps: int) -> Plan:
+    """The same motion in the same time, in ``steps`` steps of another length, between states linearly."""
+    old = np.linspace(0.0, 1.0, len(guess.states))
+    new = np.linspace(0.0, 1.0, steps + 1)
+    states = np.column_stack([np.interp(new, old, column) for column in guess.states.T])
+    middles = 0.5 * (old[1:] + old[:-1])
+    controls = np.column_stack(
+        [np.interp(0.5 * (new[1:] + new[:-1]), middles, column) for column in guess.controls.T]
+    )
+    return Plan(states, controls, guess.duration_s / steps)
+
+
+def begun_at(guess: Plan, problem: Problem, vehicle: Vehicle = CAR) -> Plan:
+    """The guess with its first state put to the problem's start, its headings counted from there."""
+    states = guess.states.copy()
+    turns = round((problem.start[2] - states[0, 2]) / (2.0 * math.pi))
+    states[:, 2] += 2.0 * math.pi * turns
+    states[0] = start_state(problem, vehicle)
+    return Plan(states, guess.controls, guess.dt)

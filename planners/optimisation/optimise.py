@@ -1,0 +1,195 @@
+"""From a guess to a plan: a trajectory of least time near it, driven at the vehicle's own step, and judged.
+
+First h is free: the guess's motion is bent out of obstacles and shortened. Then h is the vehicle's and the
+number of steps what the found time needs, which takes few iterations. What comes out is simulated from its
+controls; a plan that the kernels or the authority refuse is tried again with more clearance, or not returned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import StrEnum
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planners.optimisation.clearance_field import CELL_M, clearance_field
+from planners.optimisation.equations import bounds_of
+from planners.optimisation.guesses import begun_at, resampled
+from planners.optimisation.transcription import Objective, Solution, transcribe
+from planners.world.authority import faults
+from planners.world.collision import count_free_prefix, scene_of
+from planners.world.dynamics import simulate
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicle import CAR, Vehicle, state_names, state_size
+
+FEWEST_STEPS = 4
+
+
+class OptimiseSettings(NamedTuple):
+    """How to optimise; IPOPT's settings are reasoned about in docs/optimisation.md."""
+
+    objective: Objective = Objective()
+    iterations: int = 300  # IPOPT's, of all programmes of an optimisation together
+    discs: int = 3  # a body: a car's swept half width of 0.66 m becomes 0.77; 0.90 with two, 0.73 with four
+    cell_m: float = CELL_M
+    step_low: float = 0.25  # of the vehicle's step, while h is free
+    step_high: float = 2.0
+    barriers: tuple[float, ...] = (0.001, 0.1)  # while h is free: the next where one led into an obstacle
+    last_barrier: float = 0.0001  # at the vehicle's own step, begun next to the answer
+    attempts: int = 3  # at the vehicle's own step, each a step longer and, if refused, with more clearance
+    more_margin_m: float = 0.05
+
+
+DEFAULT_SETTINGS = OptimiseSettings()
+
+
+class Status(StrEnum):
+    """How an optimisation ended. Not to converge is data, not an error."""
+
+    CONVERGED = "converged"
+    INFEASIBLE = "infeasible"  # a local minimum of the violation, inside some obstacle
+    ITERATIONS_SPENT = "iterations-spent"
+    REFUSED = "refused"  # converged, but what can be driven of it is no plan
+    START_BLOCKED = "start-blocked"
+    FAILED = "failed"  # any other of IPOPT's endings
+
+
+class Optimised(NamedTuple):
+    """One optimisation: its plan, if it converged, and what it cost."""
+
+    status: Status
+    plan: Plan | None
+    iterations: int
+    seconds: float  # everything, from the problem and the guess to the plan
+    field_seconds: float  # of that, for the clearance field
+
+    @property
+    def converged(self) -> bool:
+        """Whether there is a plan."""
+        return self.plan is not None
+
+
+def optimise(
+    problem: Problem, guess: Plan, settings: OptimiseSettings = DEFAULT_SETTINGS, vehicle: Vehicle = CAR
+) -> Optimised:
+    """A plan for ``problem`` near ``guess``, locally least in the objective. The guess may collide or jump.
+
+    Raises ValueError for a guess of another vehicle's shape, or with fewer than one step or numbers missing.
+    """
+    _check(guess, settings, vehicle)
+    began = perf_counter()
+    scene = scene_of(problem)
+    field_seconds = 0.0
+    iterations = 0
+
+    def ended(status: Status, plan: Plan | None = None) -> Optimised:
+        return Optimised(status, plan, iterations, perf_counter() - began, field_seconds)
+
+    start = start_state(problem, vehicle)
+    alone = Plan(start[None], np.empty((0, 2)), vehicle.dt)
+    if count_free_prefix(alone.states, vehicle, scene) == 0:
+        return ended(Status.START_BLOCKED)
+    if math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
+        return ended(Status.CONVERGED, alone)
+    building = perf_counter()
+    field = clearance_field(problem, settings.cell_m)
+    field_seconds = perf_counter() - building
+
+    def solve(
+        near: Plan, steps: int, step_s: tuple[float, float], barriers: Sequence[float], margin_m: float
+    ) -> Solution:
+        """The first of the solutions, a barrier each, that converges; else the last."""
+        nonlocal iterations
+        programme = transcribe(problem, field, steps, settings.objective, vehicle, settings.discs, margin_m)
+        found = Solution(SPENT, 0, near)
+        for barrier in barriers:
+            if iterations < settings.iterations and found.status != SOLVED:
+                options = _ipopt(settings.iterations - iterations, barrier)
+                found = programme.solve(resampled(near, steps), step_s, options)
+                iterations += found.iterations
+        return found
+
+    near = begun_at(guess, problem, vehicle)
+    free_step_s = (settings.step_low * vehicle.dt, settings.step_high * vehicle.dt)
+    found = solve(near, max(len(guess.controls), FEWEST_STEPS), free_step_s, settings.barriers, 0.0)
+    near, margin_m = found.trajectory, 0.0
+    steps = max(math.ceil(near.duration_s / vehicle.dt - 1e-6), FEWEST_STEPS)
+    if found.status == SOLVED:
+        for _ in range(settings.attempts):
+            found = solve(near, steps, (vehicle.dt, vehicle.dt), [settings.last_barrier], margin_m)
+            if found.status == SOLVED:
+                plan = _driven(problem, found.trajectory, vehicle)
+                free = count_free_prefix(plan.states, vehicle, scene) == len(plan.states)
+                if free and not faults(problem, plan, vehicle):
+                    return ended(Status.CONVERGED, plan)
+                margin_m += settings.more_margin_m
+            steps += 1
+    return ended(_ENDINGS.get(found.status, Status.FAILED))
+
+
+def improve(
+    problem: Problem, plan: Plan, settings: OptimiseSettings = DEFAULT_SETTINGS, vehicle: Vehicle = CAR
+) -> Plan:
+    """The valid ``plan`` optimised, if that makes it better by the objective; else ``plan`` itself."""
+    better = optimise(problem, plan, settings, vehicle).plan
+    if better is None or len(plan.controls) == 0:
+        return plan
+    field = clearance_field(problem, settings.cell_m)
+    old, new = (
+        transcribe(problem, field, len(each.controls), settings.objective, vehicle, settings.discs).cost(each)
+        for each in (plan, better)
+    )
+    return better if new < old else plan
+
+
+SOLVED, SPENT = "Solve_Succeeded", "Maximum_Iterations_Exceeded"  # IPOPT's own words
+_ENDINGS = {
+    SOLVED: Status.REFUSED,
+    SPENT: Status.ITERATIONS_SPENT,
+    "Infeasible_Problem_Detected": Status.INFEASIBLE,
+}
+
+
+def _ipopt(iterations: int, barrier: float) -> dict[str, Any]:
+    """IPOPT's options; silent, and a linear solver that gives the same result each time."""
+    return {
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.linear_solver": "mumps",
+        "ipopt.max_iter": iterations,
+        "ipopt.mu_init": barrier,
+        "ipopt.bound_mult_init_method": "mu-based",
+        "ipopt.tol": 1e-4,
+        "ipopt.constr_viol_tol": 1e-8,
+        "ipopt.acceptable_iter": 0,
+    }
+
+
+def _driven(problem: Problem, trajectory: Plan, vehicle: Vehicle) -> Plan:
+    """What the vehicle does under the trajectory's controls, these within its limits."""
+    limits = bounds_of(vehicle)
+    controls = np.clip(trajectory.controls, limits.control_low, limits.control_high)
+    return Plan(simulate(start_state(problem, vehicle), controls, vehicle), controls, vehicle.dt)
+
+
+def _check(guess: Plan, settings: OptimiseSettings, vehicle: Vehicle) -> None:
+    size = state_size(vehicle)
+    states, controls = guess.states, guess.controls
+    if states.ndim != 2 or states.shape[1] != size or controls.shape != (len(states) - 1, 2):
+        raise ValueError(
+            f"Guess has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
+            f"[T, {size}] ({', '.join(state_names(vehicle))}) and [T - 1, 2]. Was it made for another robot?"
+        )
+    if len(controls) < 1 or not (np.isfinite(states).all() and np.isfinite(controls).all()):
+        raise ValueError("Guess needs at least one step, and finite numbers only.")
+    if not (guess.dt > 0.0 and math.isfinite(guess.dt)):
+        raise ValueError(f"Guess has a step of {guess.dt} s; give a positive one.")
+    if settings.iterations < 1 or settings.discs < 1 or settings.cell_m <= 0.0:
+        raise ValueError(
+            f"Settings: {settings.iterations} iterations, {settings.discs} discs a body, cells of "
+            f"{settings.cell_m} m; all must be positive."
+        )

@@ -1,0 +1,146 @@
+"""The nonlinear programme: all states and controls of a trajectory at once (direct multiple shooting).
+
+Unknown are the states, the controls and the common step length h; each state follows from the one before by
+the vehicle's own Runge-Kutta step, so that what is feasible here can be driven. Minimised is
+
+    time_weight T + effort_weight h sum (u / u_max)^2 + clearance_weight h sum max(0, wanted - clearance)^2
+
+with one summand a step and control, or a step and disc. J. T. Betts, Practical Methods for Optimal Control
+and Estimation Using Nonlinear Programming (2010); A. Waechter and L. T. Biegler, IPOPT (2006).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from planners.optimisation.clearance_field import ClearanceField
+from planners.optimisation.equations import bounds_of, discs_of, step_of
+from planners.world.problem import Floats, Plan, Problem, start_state
+from planners.world.vehicle import Vehicle, state_size
+
+GOAL_SHY_M = 1e-3  # inside the goal disc: states simulated again are some 1e-7 m off
+H_UNIT_S = 0.1  # the unknown step length is near 1, like the others
+
+
+class Objective(NamedTuple):
+    """What a plan should be: short in time, gentle, clear of obstacles."""
+
+    time_weight: float = 1.0  # a second
+    effort_weight: float = 0.1  # a second of full control; without any, controls that change nothing jump
+    clearance_weight: float = 0.0  # a second at which a disc lacks a metre of the wanted clearance
+    wanted_clearance_m: float = 1.0  # from a disc of the covered, inflated footprint
+
+
+class Solution(NamedTuple):
+    """What the solver ended with, converged or not."""
+
+    status: str  # IPOPT's own word
+    iterations: int
+    trajectory: Plan  # its dt is h
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """A problem as a nonlinear programme of ``steps`` steps."""
+
+    steps: int
+    state_size: int
+    expressions: dict[str, ca.MX]  # x [n] the unknowns, f the objective, g [m] the constraints
+    low: Floats  # [n] of the unknowns; the last, h, is set for each solution
+    high: Floats  # [n]
+    constraint_low: Floats  # [m]
+    constraint_high: Floats  # [m]
+
+    def solve(self, guess: Plan, step_s: tuple[float, float], options: dict[str, Any]) -> Solution:
+        """From ``guess``, of ``steps`` steps, with h between the two of ``step_s`` (equal: fixed)."""
+        solver = ca.nlpsol("plan", "ipopt", self.expressions, options)
+        found = solver(
+            x0=_packed(guess),
+            lbx=np.append(self.low[:-1], step_s[0] / H_UNIT_S),
+            ubx=np.append(self.high[:-1], step_s[1] / H_UNIT_S),
+            lbg=self.constraint_low,
+            ubg=self.constraint_high,
+        )
+        told = solver.stats()
+        unknowns = np.array(found["x"]).ravel()
+        return Solution(str(told["return_status"]), int(told["iter_count"]), self._unpacked(unknowns))
+
+    def cost(self, plan: Plan) -> float:
+        """The objective of a plan of ``steps`` steps."""
+        return float(ca.Function("cost", [self.expressions["x"]], [self.expressions["f"]])(_packed(plan)))
+
+    def _unpacked(self, unknowns: Floats) -> Plan:
+        columns = self.state_size + 2
+        body = unknowns[: self.steps * columns].reshape(self.steps, columns)
+        last = unknowns[self.steps * columns : -1]
+        states = np.vstack((body[:, : self.state_size], last))
+        return Plan(states, body[:, self.state_size :].copy(), H_UNIT_S * float(unknowns[-1]))
+
+
+def transcribe(
+    problem: Problem,
+    field: ClearanceField,
+    steps: int,
+    objective: Objective,
+    vehicle: Vehicle,
+    discs: int,
+    margin_m: float = 0.0,
+) -> Programme:
+    """The programme of ``steps`` steps, with ``discs`` a body that stay ``margin_m`` clear."""
+    size = state_size(vehicle)
+    columns = size + 2
+    unknowns = ca.MX.sym("x", steps * columns + size + 1)
+    body = ca.reshape(unknowns[: steps * columns], columns, steps)
+    states = ca.horzcat(body[:size, :], unknowns[steps * columns : -1])
+    controls, h = body[size:, :], H_UNIT_S * unknowns[-1]
+
+    following = step_of(vehicle).map(steps)(states[:, :-1], controls, ca.repmat(h, 1, steps))
+    gaps = _gaps(field, vehicle, discs).map(steps)(states[:, 1:])  # the start cannot be moved
+    miss = ca.sumsqr(states[:2, -1] - ca.DM(problem.goal))
+
+    limits = bounds_of(vehicle)
+    effort = ca.sumsqr(controls / ca.repmat(ca.DM(limits.control_high), 1, steps))
+    cost = objective.time_weight * steps * h + objective.effort_weight * h * effort
+    if objective.clearance_weight > 0.0:
+        lacking = ca.fmax(0.0, objective.wanted_clearance_m - gaps)
+        cost += objective.clearance_weight * h * ca.sumsqr(lacking)
+
+    low, high = limits.state_low.copy(), limits.state_high.copy()
+    low[:2], high[:2] = problem.bounds[:2], problem.bounds[2:]
+    start = start_state(problem, vehicle)
+    row_low, row_high = np.append(low, limits.control_low), np.append(high, limits.control_high)
+    all_low, all_high = (
+        np.concatenate((np.tile(row, steps), row[:size], [0.0])) for row in (row_low, row_high)
+    )
+    all_low[:size] = all_high[:size] = start
+    reach = max(problem.goal_radius - GOAL_SHY_M, 0.0)
+    dynamics, clear = np.zeros(size * steps), np.full(gaps.numel(), margin_m)
+    return Programme(
+        steps,
+        size,
+        {"x": unknowns, "f": cost, "g": ca.veccat(following - states[:, 1:], gaps, miss)},
+        all_low,
+        all_high,
+        np.concatenate((dynamics, clear, [-np.inf])),
+        np.concatenate((dynamics, np.full_like(clear, np.inf), [reach**2])),
+    )
+
+
+def _gaps(field: ClearanceField, vehicle: Vehicle, discs: int) -> ca.Function:
+    """``state [S] -> [D]``: how far each disc is from the nearest obstacle or bound, metres."""
+    state = ca.MX.sym("state", state_size(vehicle))
+    centres, radii = discs_of(vehicle, discs)(state)
+    distance = field.symbolic()
+    gaps = [distance(centres[:, i]) - radii[i] for i in range(centres.shape[1])]
+    return ca.Function("gaps", [state], [ca.vertcat(*gaps)])
+
+
+def _packed(plan: Plan) -> Floats:
+    """The unknowns ``[n]`` in the order of a trajectory: state, controls, ..., last state, h."""
+    return np.concatenate(
+        (np.hstack((plan.states[:-1], plan.controls)).ravel(), plan.states[-1], [plan.dt / H_UNIT_S])
+    )

@@ -1,0 +1,59 @@
+"""The vehicles in CasADi are those of the kernels."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planners.optimisation.equations import bounds_of, discs_of, step_of
+from planners.world.bodies import body_count, swept_boxes
+from planners.world.dynamics import simulate
+from planners.world.problem import Floats
+from planners.world.vehicle import VEHICLES, Vehicle
+from tests.planners.world.strategies import box_corners
+
+names = st.sampled_from(list(VEHICLES))
+seeds = st.integers(0, 2**32 - 1)
+STEPS = {name: step_of(vehicle) for name, vehicle in VEHICLES.items()}
+DISCS = {name: discs_of(vehicle, 3) for name, vehicle in VEHICLES.items()}
+
+
+def state_within(rng: np.random.Generator, vehicle: Vehicle) -> Floats:
+    """A state ``[S]`` within the limits, so far that a step of controls does not pass them."""
+    limits = bounds_of(vehicle)
+    state = np.concatenate((rng.uniform(-5.0, 55.0, 2), rng.uniform(-math.pi, math.pi, 1)))
+    reserve = vehicle.dt * np.append(limits.control_high, np.zeros(len(limits.state_low) - 5))
+    return np.append(state, rng.uniform(limits.state_low[3:] + reserve, limits.state_high[3:] - reserve))
+
+
+@given(names, seeds)
+def test_a_symbolic_step_is_the_kernels_step(name: str, seed: int) -> None:
+    rng, vehicle = np.random.default_rng(seed), VEHICLES[name]
+    state, limits = state_within(rng, vehicle), bounds_of(vehicle)
+    controls = rng.uniform(limits.control_low, limits.control_high)
+    expected = simulate(state, controls[None], vehicle)[1]
+    found = np.array(STEPS[name](state, controls, vehicle.dt)).ravel()
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-9)
+
+
+@given(names, seeds)
+def test_discs_cover_the_boxes_that_the_kernels_check(name: str, seed: int) -> None:
+    vehicle = VEHICLES[name]
+    state = state_within(np.random.default_rng(seed), vehicle)
+    centres, radii = (np.array(part) for part in DISCS[name](state))
+    discs = shapely.union_all(shapely.buffer(shapely.points(centres.T), radii.ravel(), quad_segs=64))
+    for x, y, cos, sin, half_length, half_width in swept_boxes(state[None], vehicle):
+        box = shapely.Polygon(box_corners(x, y, math.atan2(sin, cos), half_length, half_width))
+        assert box.difference(discs).area < 1e-3  # m^2: the discs are polygons of 256 corners here
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_there_are_as_many_discs_as_asked_for_on_each_body(name: str) -> None:
+    centres, radii = discs_of(VEHICLES[name], 2)(np.zeros(len(bounds_of(VEHICLES[name]).state_low)))
+    assert centres.shape == (2, 2 * body_count(VEHICLES[name]))
+    assert radii.shape == (1, centres.shape[1])
