@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from planners.world.jit import implements, inlined
 from planners.world.problem import Floats
-from planners.world.trigonometry import sincos, tan, turned_by
+from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
 from planners.world.vehicle import Car, CarWithTrailers
 from planners.world.vehicles.interface import (
     Box,
@@ -104,8 +102,7 @@ def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> 
 @implements(turn_error, Car, CarWithTrailers)
 def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
     """The angle between the way to (x, y) and the wheels."""
-    turn = math.atan2(y - state[1], x - state[0]) - state[2] - state[4]
-    return turn - 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+    return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - state[4])
 
 
 @implements(is_folded, Car)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from planners.world.jit import implements
 from planners.world.problem import Floats
-from planners.world.trigonometry import sincos
+from planners.world.trigonometry import angle_to, sincos, wrapped
 from planners.world.vehicle import DifferentialDrive
 from planners.world.vehicles.car import drive
 from planners.world.vehicles.interface import (
@@ -67,8 +65,7 @@ def _admissible(state: State, first: float, second: float, vehicle: Differential
 
 @implements(turn_error, DifferentialDrive)
 def _turn_error(state: State, x: float, y: float, vehicle: DifferentialDrive) -> float:
-    turn = math.atan2(y - state[1], x - state[0]) - state[2] - LOOK_AHEAD_S * state[4]
-    return turn - 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
+    return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - LOOK_AHEAD_S * state[4])
 
 
 @implements(is_folded, DifferentialDrive)
