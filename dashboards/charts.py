@@ -9,17 +9,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, PercentFormatter, StrMethodFormatter
 
 from dashboards.statistics import PLANNERS, ranked
 from dashboards.style import (
     BLUE,
+    GREEN,
     GREY,
     INK,
     NOTE_SIZE,
     ORANGE,
+    PURPLE,
     SKY,
     VERMILLION,
+    YELLOW,
     message_figure,
     new_figure,
     tidy,
@@ -30,6 +33,10 @@ PLANNING_TIME_NOTE: Final = (
     "encoding, recall, checking recalled plans, the planner's own structures, search. One problem at a time, "
     "one thread, compiled code warm. Failures keep their time."
 )
+CONTROLS_NOTE: Final = (
+    "closed, open, repair: with the best recalled plans (their number). Controls: all plans: every stored "
+    "plan is checked; fresh guide: no memory, the planner is led along a way over the occupancy grid."
+)
 PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
 
 _BARS: Final = {
@@ -38,12 +45,16 @@ _BARS: Final = {
     ("closed", 5): ("closed\n5", BLUE),
     ("open", 1): ("open\n1", ORANGE),
     ("open", 5): ("open\n5", VERMILLION),
+    ("repair", 5): ("repair\n5", GREEN),
+    ("exhaustive", 0): ("all\nplans", PURPLE),
+    ("fresh", 0): ("fresh\nguide", YELLOW),
 }
 
 
 def planning_times(summary: pd.DataFrame) -> Figure:
-    """Mean planning time of the baseline and four uses of the memory: a row a planner, a column a class.
+    """Mean planning time of the baseline, five uses of the memory, and two controls.
 
+    A row a planner, a column a class.
     ``summary`` is ``statistics.summarise``'s. Whiskers are its 95 % intervals; each bar but the baseline's
     carries the change of the mean against the baseline, and the baseline's its time.
     """
@@ -52,8 +63,9 @@ def planning_times(summary: pd.DataFrame) -> Figure:
         return message_figure(title, "No attempts to show: run the benchmark first.")
     planners = ranked(summary["planner"], PLANNERS)
     panels = list(summary["panel"].unique())
-    note = f"{PLANNING_TIME_NOTE}\nWhiskers: 95 % bootstrap intervals of the mean, problems resampled."
-    figure = new_figure(max(5.6, 3.1 * len(panels) + 0.5), 2.3 * len(planners) + 1.5, title, note)
+    whiskers = "Whiskers: 95 % bootstrap intervals of the mean, problems resampled."
+    note = f"{PLANNING_TIME_NOTE}\n{CONTROLS_NOTE}\n{whiskers}"
+    figure = new_figure(max(5.6, 4.3 * len(panels) + 0.5), 2.3 * len(planners) + 1.5, title, note)
     grid = figure.subplots(len(planners), len(panels), squeeze=False)
     for i, planner in enumerate(planners):
         for j, panel in enumerate(panels):
@@ -123,8 +135,45 @@ def training_curves(epochs: pd.DataFrame) -> Figure:
     return figure
 
 
+def anytime_curves(history: pd.DataFrame) -> Figure:
+    """What improving a plan brings: mean driving time of the best plan against the time spent.
+
+    Columns ``panel, planner, seconds, mean_s, low_s, high_s``: one row a moment from when all problems have a
+    plan, mean and 95 % interval over all problems.
+    """
+    title = "Driving time of the best plan so far"
+    if history.empty:
+        return message_figure(title, "No history to show: improve some plans first.")
+    panels = list(history["panel"].unique())
+    note = (
+        "Repeated searches, each for a plan that takes less time than the best so far. Mean over all "
+        "problems, from when all have a plan; bands: 95 % bootstrap intervals."
+    )
+    figure = new_figure(max(5.6, 3.3 * len(panels) + 0.5), 3.9, title, note)
+    for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        for planner, colour in zip(PLANNERS, (VERMILLION, BLUE, GREEN), strict=True):
+            rows = history[(history["panel"] == panel) & (history["planner"] == planner)]
+            axes.fill_between(
+                rows["seconds"], rows["low_s"], rows["high_s"], color=colour, alpha=0.15, linewidth=0
+            )
+            axes.plot(
+                rows["seconds"], rows["mean_s"], color=colour, label=PLANNER_TITLES.get(planner, planner)
+            )
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_xlim(float(history["seconds"].min()), float(history["seconds"].max()))
+        axes.set_title(panel, fontsize=10, color=INK, pad=8)
+        axes.set_xlabel("time spent, s", fontsize=9, color=INK)
+        tidy(axes)
+    figure.axes[0].set_ylabel("mean driving time, s", fontsize=9, color=INK)
+    figure.axes[0].legend(loc="upper right", frameon=False, fontsize=9)
+    return figure
+
+
 def _bars(axes: Axes, rows: pd.DataFrame) -> None:
-    """The five bars of one panel; a configuration without attempts is said to be missing."""
+    """The bars of one panel; a configuration without attempts is said to be missing."""
     by_key = {(row["assist"], int(row["top_k"])): row for _, row in rows.iterrows()}
     top = max((by_key[key]["mean_high_ms"] for key in _BARS if key in by_key), default=1.0)
     axes.set_ylim(0.0, 1.22 * top)

@@ -19,7 +19,10 @@ COMBINED: Final = "combined"  # the memory of all classes; its attempts form a p
 
 PANELS: Final = ("curves", "random", "trap")
 PLANNERS: Final = ("rrt", "gust", "follow")
-ASSISTS: Final = ("none", "closed", "open", "repair", "random-closed", "random-open")
+ASSISTS: Final = (
+    "none", "closed", "open", "repair", "exhaustive", "fresh",
+    "random-closed", "random-open", "random-repair",
+)  # fmt: skip
 
 _CHUNK_VALUES: Final = 2_000_000  # resampled counts held at once: 16 MB
 
@@ -27,10 +30,10 @@ _CHUNK_VALUES: Final = 2_000_000  # resampled counts held at once: 16 MB
 def panels(attempts: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Attempt rows by panel: each class with its own memory, then all with the combined memory, if any.
 
-    Attempts without memory are the baseline of both.
+    Attempts without memory belong to both.
     """
     combined = attempts["memory"] == COMBINED
-    alone = attempts["assist"] == "none"
+    alone = attempts["memory"].isna()
     own = attempts[alone | ~combined]
     found = {name: own[own["problem_class"] == name] for name in ranked(own["problem_class"], PANELS)}
     if (combined & ~alone).any():

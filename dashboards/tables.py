@@ -29,8 +29,8 @@ _Rows = list[list[str]]
 
 
 def configuration(assist: str, top_k: int) -> str:
-    """The name of a configuration in tables and figures, as ``closed 5``."""
-    return assist if assist == "none" else f"{assist} {top_k}"
+    """The name of a configuration in tables and figures, as ``closed 5``, or ``none``."""
+    return f"{assist} {top_k}" if top_k else assist
 
 
 def summary_table(summary: pd.DataFrame) -> Group:

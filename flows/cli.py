@@ -103,6 +103,7 @@ def plan(
     memory: Path | None = None,
     vehicle: str = "car",
     seed: int = 1,
+    improve_seconds: float = 0.0,
     out: Path | None = None,
     picture: Path | None = None,
 ) -> None:
@@ -115,7 +116,7 @@ def plan(
     planner
         rrt, gust or follow.
     assist
-        How the memory helps: none, closed or open.
+        How the memory helps: none, closed, open, repair, exhaustive; or fresh, a guide without memory.
     top_k
         How many plans are recalled.
     memory
@@ -124,6 +125,8 @@ def plan(
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
+    improve_seconds
+        Keep improving the plan for this long; 0: the first plan is the answer.
     out
         Where to write the plan, .json.
     picture
@@ -132,7 +135,7 @@ def plan(
     """
     from tasks.solve import Assistant, plan_one
 
-    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds)
     plan_one(assistant, problem, out, picture)
 
 
@@ -189,6 +192,7 @@ def solve(
     memory: Path | None = None,
     vehicle: str = "car",
     seed: int = 1,
+    improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
 ) -> None:
@@ -201,7 +205,7 @@ def solve(
     planner
         rrt, gust or follow.
     assist
-        How the memory helps: none, closed or open.
+        How the memory helps: none, closed, open, repair, exhaustive; or fresh, a guide without memory.
     top_k
         How many plans are recalled.
     memory
@@ -210,6 +214,8 @@ def solve(
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
+    improve_seconds
+        Keep improving the plan for this long; 0: the first plan is the answer.
     out
         Where to write the rows, .parquet.
     plans
@@ -218,7 +224,7 @@ def solve(
     """
     from tasks.solve import Assistant, solve_many
 
-    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds)
     solve_many(assistant, problems, out, plans)
 
 

@@ -85,7 +85,7 @@ ATTEMPTS: Final = _schema(
         ("problem_id", pa.string()),
         ("problem_class", pa.string()),
         ("planner", pa.string()),
-        ("assist", pa.string()),  # none, closed, open, repair, or one of these after "random-"
+        ("assist", pa.string()),  # none, closed, open, repair, exhaustive, fresh, random-...
         ("top_k", pa.int32()),
         ("memory", pa.string()),
         ("status", pa.string()),
@@ -109,10 +109,12 @@ ATTEMPTS: Final = _schema(
         ("commit", pa.string()),
         ("host", pa.string()),
         ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
+        ("guide_seconds", pa.float64()),  # a way over the grid, a recalled plan as a guide
+        ("repair_seconds", pa.float64()),  # repairing a recalled plan, in vain or not
         ("verified", pa.bool_()),  # an independent check agreed; null where none was made
         ("vehicle", pa.string()),  # its name
     ],
-    optional=("scene_seconds", "verified", "vehicle"),
+    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle"),
 )
 
 

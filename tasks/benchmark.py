@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from planners.memory.labels import free_plans
 from planners.memory.recall import Memory, rank
-from planners.solve import Attempt, solve
+from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.collision import scene_of
 from planners.world.occupancy import occupancy_of
 from planners.world.problem import Problem
@@ -24,6 +24,7 @@ from tasks.attempts import attempt_row, check_attempt
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
+from tasks.warm_up import compile_repair
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
@@ -42,9 +43,10 @@ def configurations(settings: RunSettings, class_name: str) -> list[Configuration
     """Every way in which each problem of a class is solved."""
     found = []
     for planner in settings.planners:
-        found.append(Configuration(planner, UNASSISTED, None))
+        alone = [assist for assist in settings.assists if assist.name in WITHOUT_MEMORY]
+        found += [Configuration(planner, assist, None) for assist in (UNASSISTED, *alone)]
         for memory in memories_of(settings, class_name):
-            found += [Configuration(planner, assist, memory) for assist in settings.assists]
+            found += [Configuration(planner, each, memory) for each in settings.assists if each not in alone]
         if planner == ABLATION_PLANNER:
             found += [Configuration(planner, assist, class_name) for assist in ABLATION]
     return found
@@ -65,6 +67,7 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     asked = configurations(settings, name)
     rows: list[dict[str, Any]] = []
     recalls: dict[str, list[dict[str, Any]]] = {memory: [] for memory in memories}
+    compile_repair(vehicle)
     for asked_first in asked:  # code and caches are warm before the first time counts
         _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
     with _no_garbage_collection():

@@ -17,13 +17,25 @@ Objective = Literal["labels", "triplet"]
 class Assist(NamedTuple):
     """How much of a memory an attempt may use."""
 
-    name: str  # "none", "closed", "open", or one of these after "random-"
-    top_k: int  # recalled plans; 0 with "none"
+    name: str  # one of planners.solve.ASSISTS
+    top_k: int  # recalled plans; 0 where none is recalled by rank
 
 
 UNASSISTED: Final = Assist("none", 0)
-ASSISTS: Final = (Assist("closed", 1), Assist("closed", 5), Assist("open", 1), Assist("open", 5))
-ABLATION: Final = (Assist("random-open", 1), Assist("random-open", 5))  # the paper's: plans drawn blindly
+ASSISTS: Final = (
+    Assist("closed", 1),
+    Assist("closed", 5),
+    Assist("open", 1),
+    Assist("open", 5),
+    Assist("repair", 5),
+    Assist("exhaustive", 0),  # a control: every stored plan is checked
+    Assist("fresh", 0),  # a control: no memory, a guide made on the spot
+)
+ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
+    Assist("random-open", 1),
+    Assist("random-open", 5),
+    Assist("random-repair", 5),
+)
 COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
 ABLATION_PLANNER: Final = "gust"
 DEFAULT_VEHICLE: Final = "car"

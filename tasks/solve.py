@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -9,7 +10,7 @@ from typing import Final
 from dashboards.pictures import picture
 from planners.memory.recall import Memory
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, Attempt, solve, turned
+from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
@@ -36,6 +37,7 @@ class Assistant:
         memory: Path | None,
         seed: int,
         vehicle: str = DEFAULT_VEHICLE,
+        improve_seconds: float = 0.0,
     ) -> None:
         """UsageError with one line for an unknown name, a top k below 1, a missing memory."""
         check_known("planner", [planner], tuple(PLANNERS))
@@ -45,11 +47,13 @@ class Assistant:
             raise UsageError(f"Top k is {top_k}: give 1 or more.")
         if seed < 0:
             raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
-        if assist != "none" and memory is None:
+        if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: the folder of a run, or of one memory.")
+        if not 0.0 <= improve_seconds < math.inf:
+            raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
         self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
-        self.vehicle = vehicle_named(vehicle)
-        self._place = memory if assist != "none" else None
+        self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
+        self._place = None if assist in WITHOUT_MEMORY else memory
         self._memories: dict[Path, Memory] = {}
 
     def memory_of(self, class_name: str) -> Memory | None:
@@ -77,6 +81,8 @@ class Assistant:
         attempt = solve(
             canonical, self.planner, self.assist, self.top_k, memory, self.seed, vehicle=self.vehicle
         )
+        if self.improve_seconds > 0.0:
+            attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)
         check_attempt(canonical, attempt, set(), self.vehicle)
         stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
         recalled = [from_canonical(plan, alignment) for plan in stored]

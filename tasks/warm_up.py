@@ -13,6 +13,7 @@ from planners.memory.experience import Experience
 from planners.memory.hallucination import METHODS, hallucinate, no_plan
 from planners.memory.labels import free_plans
 from planners.search.registry import PLANNERS
+from planners.search.repair import blocked_states, repair
 from planners.solve import solve
 from planners.world.classes import CLASSES, problem_class
 from planners.world.collision import scene_of
@@ -67,10 +68,26 @@ def _compile_hallucination(vehicle: Vehicle) -> None:
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 
+def compile_repair(vehicle: Vehicle) -> None:
+    """What repair needs: a plan through an empty world, with a box put on it."""
+    plan = solve(EMPTY, COLLECTOR, vehicle=vehicle).plan
+    if plan is None:
+        return
+    x, y = plan.states[len(plan.states) // 2, :2]
+    box = np.array([[x - 1.0, y - 1.0], [x + 1.0, y - 1.0], [x + 1.0, y + 1.0], [x - 1.0, y + 1.0]])
+    blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
+    scene = scene_of(blocked)
+    states, _ = blocked_states(plan, scene, vehicle)
+    if states is not None:
+        repair(COLLECTOR, blocked, plan, states, occupancy_of(blocked), scene, generator(0), vehicle)
+
+
 def _compile_rest(vehicle: Vehicle) -> None:
     """What only the benchmark needs."""
+    compile_repair(vehicle)
     for planner in PLANNERS:
-        solve(EMPTY, planner, vehicle=vehicle)
+        for assist in ("none", "fresh"):
+            solve(EMPTY, planner, assist, vehicle=vehicle)
 
 
 # In the order of need: of two workers each compiles one of the first two, and whoever is free the last.

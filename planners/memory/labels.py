@@ -151,3 +151,37 @@ def turned_plan_is_free(
         ):
             return False, j - sweeps.starts[i] + 1
     return True, sweeps.starts[i + 1] - sweeps.starts[i]
+
+
+@jit
+def plan_answers(
+    sweeps: PlanSweeps,
+    i: int,
+    scene: Scene,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    goal_radius: float,
+) -> tuple[bool, int]:
+    """Whether plan ``i``, turned to the start's heading if it has another, answers a problem; the checks."""
+    if abs(sweeps.first_poses[i, 2] - start[2]) <= START_TOLERANCE:
+        return plan_is_free(sweeps, i, scene, start, goal, goal_radius)
+    return turned_plan_is_free(sweeps, i, scene, start, goal, goal_radius)
+
+
+@jit
+def first_answer(
+    sweeps: PlanSweeps,
+    order: Integers,
+    scene: Scene,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    goal_radius: float,
+) -> tuple[int, int]:
+    """The first plan of ``order`` that answers a problem (-1: none), and how many footprints were checked."""
+    checks = 0
+    for i in order:
+        free, checked = plan_answers(sweeps, i, scene, start, goal, goal_radius)
+        checks += checked
+        if free:
+            return i, checks
+    return -1, checks

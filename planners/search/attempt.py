@@ -26,6 +26,7 @@ from planners.world.problem import Floats, Plan, Problem, start_state
 from planners.world.vehicle import Vehicle, state_size
 
 NO_CONTROLS = np.empty((0, 2))
+GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
 SLICE = 256  # expansions between two looks at the clock: some milliseconds
 
 
@@ -44,10 +45,12 @@ def attempt(
     prefix: Plan | None,
     prepare: Callable[[Tree, Floats], None],
     grow: Callable[[Tree, Floats, int], None],
+    follow_guide: Callable[[Tree, Floats, int], None] | None = None,
 ) -> Outcome:
     """Plant a tree, ``prepare(tree, goal)`` once (roadmaps), then ``grow(tree, goal, until)`` until solved.
 
     The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
+    ``follow_guide`` grows it before that, for ``GUIDED`` expansions: mostly nothing else is needed then.
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()
@@ -66,19 +69,25 @@ def attempt(
         counts[GOAL_VERTEX] = 0
         status = Status.SOLVED
     else:
-        prepare(tree, goal)
-        roadmap_seconds = perf_counter() - began
-        status = Status.BUDGET_SPENT
+        if follow_guide is not None:
+            follow_guide(tree, goal, min(GUIDED, limits.expansions))
+        if counts[GOAL_VERTEX] < 0 and counts[EXPANSIONS] < limits.expansions:
+            preparing = perf_counter()
+            prepare(tree, goal)
+            roadmap_seconds = perf_counter() - preparing
+        status = Status.BUDGET_SPENT if counts[GOAL_VERTEX] < 0 else Status.SOLVED
         running_since = math.inf  # the clock starts after the first slice, which may have to be compiled
-        while counts[EXPANSIONS] < limits.expansions and counts[SIZE] < limits.nodes:
+        while (
+            status is Status.BUDGET_SPENT
+            and counts[EXPANSIONS] < limits.expansions
+            and counts[SIZE] < limits.nodes
+        ):
             grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, limits.expansions))
+            running_since = min(running_since, perf_counter())
             if counts[GOAL_VERTEX] >= 0:
                 status = Status.SOLVED
-                break
-            running_since = min(running_since, perf_counter())
-            if perf_counter() - running_since > limits.seconds:
+            elif perf_counter() - running_since > limits.seconds:
                 status = Status.TIME_SPENT
-                break
     plan = plan_to_goal(tree, vehicle.dt) if status is Status.SOLVED else None
     return Outcome(
         status=status,

@@ -22,7 +22,7 @@ from planners.search.gust import (
     keep,
 )
 from planners.search.neighbours import Indices
-from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
+from planners.search.outcome import Guide, Limits, Outcome
 from planners.search.roadmap import (
     CHECKS as ROADMAP_CHECKS,
 )
@@ -31,9 +31,9 @@ from planners.search.roadmap import (
     RoadmapSettings,
     allocate_roadmap,
     build_roadmap,
-    node_of,
     resample_way,
 )
+from planners.search.rrt import along_guide
 from planners.search.sampling import in_disc
 from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
@@ -195,27 +195,25 @@ def follow(
     vehicle: Vehicle = CAR,
     prefix: Plan | None = None,
 ) -> Outcome:
-    """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
+    """Plan from the problem's start to its goal disc; with a guide, along it first."""
     ready = scene_of(problem) if scene is None else scene
-    guiding = NO_GUIDE if guide is None else guide
     on_roadmap = settings.gust.roadmap
     roadmap = allocate_roadmap(on_roadmap.most_nodes, on_roadmap.neighbours)
     groups = allocate_groups(on_roadmap.most_nodes)
     lead = allocate_lead()
+    along = along_guide(guide, vehicle, ready, rng)
     exploring = settings.gust._replace(guide_probability=0.0)
 
     def prepare(tree: Tree, goal: Floats) -> None:
-        root = tree.states[0]
-        build_roadmap(roadmap, root, goal, guiding, on_roadmap, vehicle, ready, rng)
+        build_roadmap(roadmap, tree.states[0], goal, on_roadmap, vehicle, ready, rng)
         tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
         clear_groups(groups)
         size = int(tree.counts[SIZE])
         join_groups(tree, 0, size, roadmap, groups, settings.gust.distance_exponent, rng)
         lead.marks[:] = 0
-        last = tree.states[size - 1]
-        _new_lead(tree, node_of(roadmap, last[0], last[1]), roadmap, groups, lead, settings, rng)
+        _new_lead(tree, heaviest(groups), roadmap, groups, lead, settings, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow)
+    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow, along)

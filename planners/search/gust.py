@@ -10,7 +10,7 @@ import numpy as np
 
 from planners.search.attempt import attempt
 from planners.search.neighbours import Indices, nearest_for
-from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
+from planners.search.outcome import Guide, Limits, Outcome
 from planners.search.roadmap import (
     CHECKS as ROADMAP_CHECKS,
 )
@@ -21,6 +21,7 @@ from planners.search.roadmap import (
     build_roadmap,
     resample_way,
 )
+from planners.search.rrt import along_guide
 from planners.search.sampling import in_bounds, in_disc
 from planners.search.tree import (
     CHECKS,
@@ -208,14 +209,15 @@ def gust(
     vehicle: Vehicle = CAR,
     prefix: Plan | None = None,
 ) -> Outcome:
-    """Plan from the problem's start to its goal disc; a guide places the roadmap's nodes near its plans."""
+    """Plan from the problem's start to its goal disc; with a guide, along it first."""
     ready = scene_of(problem) if scene is None else scene
-    guiding = NO_GUIDE if guide is None else guide
     roadmap = allocate_roadmap(settings.roadmap.most_nodes, settings.roadmap.neighbours)
     groups = allocate_groups(settings.roadmap.most_nodes)
 
+    along = along_guide(guide, vehicle, ready, rng)
+
     def prepare(tree: Tree, goal: Floats) -> None:
-        build_roadmap(roadmap, tree.states[0], goal, guiding, settings.roadmap, vehicle, ready, rng)
+        build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, ready, rng)
         tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
         clear_groups(groups)
         join_groups(tree, 0, int(tree.counts[SIZE]), roadmap, groups, settings.distance_exponent, rng)
@@ -223,4 +225,4 @@ def gust(
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow)
+    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow, along)

@@ -23,10 +23,10 @@ class Status(StrEnum):
 
 
 class Guide(NamedTuple):
-    """Positions to sample around: plan i with probability b_i, else the goal, else anywhere."""
+    """Ways to sample around: way i with probability b_i, else the goal, else anywhere."""
 
-    points: Floats  # [M, 2] metres, positions of all guiding plans one after another
-    starts: Integers  # [k + 1] plan i owns points[starts[i] : starts[i + 1]]
+    points: Floats  # [M, 2] metres, some a metre apart, of all guiding ways one after another
+    starts: Integers  # [k + 1] way i owns points[starts[i] : starts[i + 1]]
     probabilities: Floats  # [k] b_1 > ... > b_k
     goal_probability: float
     # what remains to 1 is b_other

@@ -18,12 +18,10 @@ from planners.search.neighbours import (
     Indices,
     allocate_buckets,
     clear_buckets,
-    nearest,
     nearest_k,
     put,
 )
-from planners.search.outcome import Guide
-from planners.search.sampling import guided
+from planners.search.sampling import in_bounds
 from planners.world.collision import Scene, box_is_free
 from planners.world.jit import inlined, lean
 from planners.world.problem import Floats
@@ -44,7 +42,6 @@ class RoadmapSettings(NamedTuple):
     most_nodes: int = 3000
     body_length_scale: float = 1.5  # a node's body must be free: a little more room than the car needs
     body_width_scale: float = 1.25
-    guide_radius_m: float = 4.0
     clearance_exponent: float = 0.0  # edge cost: length / clearance^f; GUST 0, Follow 1
     clearance_limit_m: float = 5.0  # places with more room than this are all alike
 
@@ -216,21 +213,18 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehic
 def grow_roadmap(
     roadmap: Roadmap,
     batch: int,
-    goal: Floats,
-    guide: Guide,
     settings: RoadmapSettings,
     vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
-    """Add ``batch`` draws, then search from the goal again; the guide places the nodes, if there is one."""
+    """Add ``batch`` draws, then search from the goal again."""
     half_length = 0.5 * settings.body_length_scale * (vehicle.front + vehicle.rear)
     half_width = 0.5 * settings.body_width_scale * vehicle.width
-    near = settings.guide_radius_m
     for _ in range(batch):
         if roadmap.counts[NODES] == roadmap.nodes.shape[0]:
             break
-        x, y = guided(guide, goal, scene.bounds, near, near, rng)
+        x, y = in_bounds(scene.bounds, rng)
         heading = 2.0 * math.pi * rng.random()
         roadmap.counts[CHECKS] += 1
         cos = math.cos(heading)
@@ -245,33 +239,22 @@ def build_roadmap(
     roadmap: Roadmap,
     start: Floats,
     goal: Floats,
-    guide: Guide,
     settings: RoadmapSettings,
     vehicle: Vehicle,
     scene: Scene,
     rng: np.random.Generator,
 ) -> bool:
     """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
-    anywhere = Guide(guide.points[:0], guide.starts[:1], guide.probabilities[:0], 0.0)
     roadmap.counts.fill(0)
     clear_buckets(roadmap.sampled, scene.bounds, BUCKET_M)
     add_node(roadmap, goal[0], goal[1], settings, scene)
     add_node(roadmap, start[0], start[1], settings, scene)
-    if guide.probabilities.shape[0] > 0:
-        grow_roadmap(roadmap, settings.batch, goal, guide, settings, vehicle, scene, rng)
-    else:
-        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, vehicle, scene, rng)
+    grow_roadmap(roadmap, settings.batch, settings, vehicle, scene, rng)
     draws = settings.batch
     while roadmap.distances[START] == math.inf and draws < settings.most_nodes:
-        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, vehicle, scene, rng)
+        grow_roadmap(roadmap, settings.batch, settings, vehicle, scene, rng)
         draws += settings.batch
     return bool(roadmap.distances[START] < math.inf)
-
-
-@lean
-def node_of(roadmap: Roadmap, x: float, y: float) -> int:
-    """The nearest node that reaches the goal: the group of a vertex at (x, y)."""
-    return nearest(roadmap.connected, x, y)
 
 
 @lean

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,12 +33,13 @@ class RrtSettings(NamedTuple):
 
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0
+    guide_lead: int = 16  # points of the guide, a metre apart: how far ahead the target lies
     restart_after: int = 1000  # expansions of the first tree; each next one may grow twice as long
     extension: Extension = EXTENSION
 
 
 @lean
-def _grow(
+def grow_rrt(
     tree: Tree,
     goal: Floats,
     until: int,
@@ -48,13 +50,28 @@ def _grow(
     scene: Scene,
     rng: np.random.Generator,
 ) -> None:
+    """Extend along the guide, or towards anywhere, until solved or ``until`` expansions."""
     counts = tree.counts
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
-        x, y = guided(guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng)
-        vertex = nearest(tree.buckets, x, y)
+        from_x, from_y, x, y = guided(
+            guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, settings.guide_lead, rng
+        )
+        vertex = nearest(tree.buckets, from_x, from_y)
         extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return
+
+
+def along_guide(
+    guide: Guide | None, vehicle: Vehicle, scene: Scene, rng: np.random.Generator
+) -> Callable[[Tree, Floats, int], None] | None:
+    """How any planner grows its tree along a guide, as ``attempt`` wants it; None without a guide."""
+    if guide is None:
+        return None
+    settings = RrtSettings()
+    return lambda tree, goal, until: grow_rrt(
+        tree, goal, until, guide, NO_LEAD, settings, vehicle, scene, rng
+    )
 
 
 def rrt(
@@ -67,7 +84,7 @@ def rrt(
     vehicle: Vehicle = CAR,
     prefix: Plan | None = None,
 ) -> Outcome:
-    """Plan from the problem's start to its goal disc; a guide draws the targets near its plans."""
+    """Plan from the problem's start to its goal disc; a guide leads the tree along its ways."""
     ready = scene_of(problem) if scene is None else scene
     guiding = NO_GUIDE if guide is None else guide
     planted = 1 if prefix is None else len(prefix.states)
@@ -80,7 +97,7 @@ def rrt(
             restart_at += patience
             prune(tree, planted, ready.bounds)
         until = min(until, restart_at)
-        _grow(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng)
+        grow_rrt(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng)
 
     return attempt(
         problem,

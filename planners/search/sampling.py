@@ -1,4 +1,4 @@
-"""Where a planner's samples come from: anywhere, a disc, or near a guiding plan."""
+"""Where a planner's samples come from: anywhere, a disc, or along a guiding way."""
 
 from __future__ import annotations
 
@@ -30,19 +30,35 @@ def in_bounds(bounds: Floats, rng: np.random.Generator) -> tuple[float, float]:
 
 @lean
 def guided(
-    guide: Guide, goal: Floats, bounds: Floats, near_m: float, far_m: float, rng: np.random.Generator
-) -> tuple[float, float]:
-    """A point near plan i with probability b_i, of the goal disc with b_goal, else anywhere in the bounds.
+    guide: Guide,
+    goal: Floats,
+    bounds: Floats,
+    near_m: float,
+    far_m: float,
+    lead: int,
+    rng: np.random.Generator,
+) -> tuple[float, float, float, float]:
+    """From where to extend, x, y, and where to, x, y: along way i of the guide with probability b_i.
 
-    Near: around a uniformly drawn state of the plan, within a radius of U(near_m, far_m) (paper, III-D).
+    From around a uniformly drawn point of the way, radius U(near_m, far_m), to around one of the ``lead``
+    points after it. With b_goal the target lies in the goal disc, else anywhere in the bounds; then what is
+    nearest to the target is extended. (The paper, III-D, draws targets near a plan as it does anywhere. That
+    says where to be, but not which way to go on from there, and is slower than no guide: docs/planners.md.)
     """
     draw = rng.random()
     for i in range(guide.probabilities.shape[0]):
         draw -= guide.probabilities[i]
         if draw < 0.0:
             first = guide.starts[i]
-            point = guide.points[first + int(rng.random() * (guide.starts[i + 1] - first))]
-            return in_disc(point[0], point[1], near_m + (far_m - near_m) * rng.random(), rng)
+            count = guide.starts[i + 1] - first
+            chosen = int(rng.random() * count)
+            ahead = min(chosen + 1 + int(rng.random() * lead), count - 1)
+            radius = near_m + (far_m - near_m) * rng.random()
+            x, y = in_disc(guide.points[first + chosen, 0], guide.points[first + chosen, 1], radius, rng)
+            to_x, to_y = in_disc(guide.points[first + ahead, 0], guide.points[first + ahead, 1], near_m, rng)
+            return x, y, to_x, to_y
     if draw < guide.goal_probability:
-        return in_disc(goal[0], goal[1], goal[2], rng)
-    return in_bounds(bounds, rng)
+        x, y = in_disc(goal[0], goal[1], goal[2], rng)
+    else:
+        x, y = in_bounds(bounds, rng)
+    return x, y, x, y

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-STANDARD = [("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("open", 5)]
+STANDARD = [
+    ("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("open", 5), ("repair", 5), ("exhaustive", 0),
+    ("fresh", 0),
+]  # fmt: skip
 
 
 def attempts(
@@ -28,7 +31,7 @@ def attempts(
         for (assist, top_k), i in product(configurations, range(problems)):
             seconds = 1e-3 * hardness[i] * rng.lognormal(0.0, 0.3) / (1.0 if assist == "none" else speed_up)
             solved = bool(rng.random() < 0.95)
-            recalled = assist != "none" and rng.random() < 0.5
+            recalled = assist not in ("none", "fresh") and rng.random() < 0.5
             rows.append(
                 {
                     "problem_id": f"{name}-{i}",
@@ -36,7 +39,7 @@ def attempts(
                     "planner": planner,
                     "assist": assist,
                     "top_k": top_k,
-                    "memory": None if assist == "none" else memory or name,
+                    "memory": None if assist in ("none", "fresh") else memory or name,
                     "solved": solved,
                     "source": ("recalled" if recalled else "searched") if solved else None,
                     "planning_seconds": seconds,

@@ -37,6 +37,7 @@ COMMANDS = (
         (["plan", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
         (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),
         (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
+        (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
         (["plan", "p.json"], 1, "p.json does not exist"),
         (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),

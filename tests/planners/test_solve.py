@@ -7,17 +7,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
-from planners.memory.labels import sweep_plans
+from planners.memory.labels import free_plans, sweep_plans
 from planners.memory.recall import Memory
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import ASSISTS, solve, turned
+from planners.solve import ASSISTS, improved, solve, turned
 from planners.world.authority import faults
+from planners.world.collision import scene_of
 from planners.world.randomness import generator
 from planners.world.vehicle import CAR, CAR_1_TRAILER
-from tests.worlds import box, problem_of, strewn
+from tests.worlds import box, problem_of, strewn, walled_goal
 
-PARTS = ("occupancy", "encode", "recall", "scene", "check", "roadmap", "search")
+PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
 
 
 def memory_that_prefers(biases):
@@ -69,7 +70,7 @@ def test_without_assistance_the_answer_is_the_planners_own(planner):
     assert attempt.collision_checks == own.collision_checks
 
 
-@pytest.mark.parametrize("assist", ["closed", "open"])
+@pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_the_best_recalled_plan_that_is_free_is_the_answer(memory, assist):
     attempt = solve(problem_of([]), "gust", assist, 5, memory)
     assert attempt.recalled == (4, 3, 2, 1, 0)
@@ -96,7 +97,7 @@ def test_an_open_box_is_guided_elsewhere(memory, planner):
     assert not np.array_equal(alone.plan.states, guided.plan.states)
 
 
-@pytest.mark.parametrize("assist", ["closed", "open"])
+@pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_where_no_plan_scores_best_nothing_is_recalled(assist):
     problem = strewn(3, 20)
     attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]))
@@ -151,6 +152,57 @@ def test_a_turned_plan_is_driven_by_the_same_controls(memory):
 def test_a_wrong_question_is_refused(memory, planner, assist, k, with_memory, says):
     with pytest.raises(ValueError, match=says):
         solve(problem_of([]), planner, assist, k, memory if with_memory else None)
+
+
+@given(seed=st.integers(0, 10**6), count=st.integers(0, 30))
+@settings(max_examples=30, deadline=None)
+def test_exhaustive_recall_finds_a_free_plan_if_and_only_if_there_is_one(seed, count):
+    memory, problem = shared_memory(), strewn(seed, count)
+    free = free_plans(memory.sweeps, scene_of(problem))
+    attempt = solve(problem, "follow", "exhaustive", 7, memory)
+    assert (attempt.source == "recalled") == free.any()
+    assert attempt.recalled == ((int(free.argmax()),) if free.any() else ())
+    assert attempt.top_k == 0
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_a_fresh_guide_needs_no_memory_and_leads_elsewhere(planner, memory):
+    problem = strewn(3, 30)
+    attempt, again = solve(problem, planner, "fresh"), solve(problem, planner, "fresh", 5, memory)
+    np.testing.assert_array_equal(attempt.plan.states, again.plan.states)
+    assert not np.array_equal(attempt.plan.states, solve(problem, planner).plan.states)
+    assert (attempt.source, attempt.recalled, attempt.top_k) == ("searched", (), 0)
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+def test_without_a_way_over_the_grid_there_is_no_fresh_guide(planner):
+    few = Limits(expansions=300)
+    plain, fresh = (solve(walled_goal(), planner, assist, limits=few) for assist in ("none", "fresh"))
+    assert (plain.collision_checks, plain.nodes) == (fresh.collision_checks, fresh.nodes)
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("assist", ["repair", "random-repair"])
+def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(planner, assist, memory):
+    blocking = [box(*stored.states[120, :2], 0.0, 1.2, 1.2) for stored in memory.plans]
+    problem = problem_of(blocking, "each plan blocked")
+    attempt = solve(problem, planner, assist, 5, memory)
+    assert attempt.source == "repaired"
+    assert faults(problem, attempt.plan) == []
+    assert any((attempt.plan.states[:5] == memory.plans[i].states[:5]).all() for i in attempt.recalled)
+    assert attempt.repair_seconds > 0.0
+    assert attempt.search_seconds == 0.0
+
+
+@pytest.mark.parametrize("assist", ["none", "closed"])
+def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory):
+    problem = strewn(4, 20)
+    first = solve(problem, "gust", assist, 5, memory)
+    better = improved(first, problem, 0.1)
+    assert better.duration_s < first.duration_s
+    assert better.planning_seconds >= first.planning_seconds + 0.1
+    assert better.expansions > first.expansions
+    assert faults(problem, better.plan) == []
 
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):

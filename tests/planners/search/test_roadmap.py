@@ -7,7 +7,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from planners.search.clearance import clearance, strip_is_free
-from planners.search.outcome import NO_GUIDE, Guide
 from planners.search.roadmap import (
     BLOCKED,
     CHECKS,
@@ -30,12 +29,12 @@ def shape(problem):
     return shapely.union_all([shapely.Polygon(piece) for piece in problem.obstacles.pieces()])
 
 
-def build(problem, settings, seed=0, guide=NO_GUIDE):
+def build(problem, settings, seed=0):
     scene = scene_of(problem)
     roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
     goal = np.array([*problem.goal, problem.goal_radius])
     start = np.array([*problem.start, 0.0, 0.0])
-    joined = build_roadmap(roadmap, start, goal, guide, settings, CAR, scene, generator(seed))
+    joined = build_roadmap(roadmap, start, goal, settings, CAR, scene, generator(seed))
     return roadmap, joined, scene
 
 
@@ -88,15 +87,6 @@ def test_a_goal_behind_walls_is_given_up_at_the_most_nodes():
     assert not joined
     assert roadmap.counts[NODES] <= 500
     assert roadmap.counts[CHECKS] > 0
-
-
-def test_a_guide_draws_the_nodes_near_its_plan():
-    line = np.linspace([0, 0], [50, 50], 200)
-    guide = Guide(line, np.array([0, 200], np.int32), np.array([0.9]), 0.06)
-    roadmap, _, _ = build(strewn(0, 0), RoadmapSettings(), 0, guide)
-    nodes = roadmap.nodes[2 : roadmap.counts[NODES]]
-    near = np.abs(nodes[:, 0] - nodes[:, 1]) / np.sqrt(2) <= 4.0 + 1e-9
-    assert near.mean() > 0.9
 
 
 def test_a_resampled_way_has_even_steps_and_ends_at_the_goal():

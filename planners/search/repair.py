@@ -1,0 +1,168 @@
+"""Repair of a plan that is blocked in places (paper, III-D): only these are planned anew.
+
+What is free before the first collision stays as it is and becomes the tree's first branch; the planner
+searches from there to a place where the plan is free again; a tracking controller follows the plan from
+there, every state simulated and checked. Where that meets the next collision, the same begins again.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from planners.search.grid_path import grid_path
+from planners.search.guidance import guidance
+from planners.search.outcome import Limits, Outcome, Status
+from planners.search.registry import plan
+from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
+from planners.world.collision import Scene, state_is_free
+from planners.world.dynamics import load
+from planners.world.jit import lean
+from planners.world.occupancy import Grid
+from planners.world.problem import Floats, Plan, Problem
+from planners.world.trigonometry import length
+from planners.world.vehicle import CAR, Vehicle, state_size
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+TOO_LATE_STEPS = 10  # before a collision: a second, too late to turn away
+LONGEST = 4096  # states of a repaired plan: a stored one has some 250
+
+
+@dataclass(frozen=True)
+class RepairSettings:
+    """How much a repair may cost before it is given up, and where the plan is joined again."""
+
+    expansions: int = 150  # of each local search; from scratch a planner needs some hundreds
+    rounds: int = 4  # local searches
+    rejoin_radius_m: float = 2.0
+    rejoin_beyond_m: float = 5.0  # from the end of what is free before; twice as far after each failure
+    free_steps: int = 5  # for which the plan must be free where it is joined
+    tracking: Tracking = TRACKING
+
+
+REPAIR = RepairSettings()
+
+
+@lean
+def _fill_blocked(states: Floats, vehicle: Vehicle, scene: Scene, most: int, blocked: Flags) -> int:
+    count = 0
+    for i in range(states.shape[0]):
+        blocked[i] = not state_is_free(load(states, i, vehicle), vehicle, scene)
+        count += blocked[i]
+        if count > most:
+            return i + 1
+    return states.shape[0]
+
+
+def blocked_states(
+    stored: Plan, scene: Scene, vehicle: Vehicle = CAR, most: int | None = None
+) -> tuple[Flags | None, int]:
+    """Which of a plan's states are not free, ``[T]``, and how many were checked; None: more than ``most``."""
+    count = len(stored.states)
+    blocked = np.empty(count, np.bool_)
+    limit = count if most is None else most
+    checked = int(_fill_blocked(np.ascontiguousarray(stored.states), vehicle, scene, limit, blocked))
+    return (blocked if checked == count else None), checked
+
+
+def free_prefix(stored: Plan, blocked: Flags) -> Plan | None:
+    """The plan until shortly before its first blocked state; None where that is the very first."""
+    free = int(blocked.argmax()) if blocked.any() else len(blocked)
+    return shortened(stored, free) if free else None
+
+
+def shortened(drive: Plan, free: int) -> Plan:
+    """The first ``free`` states of a drive but ``TOO_LATE_STEPS``."""
+    kept = max(free - TOO_LATE_STEPS, 1)
+    return Plan(drive.states[:kept], drive.controls[: kept - 1], drive.dt)
+
+
+@lean
+def rejoin_at(
+    way: Floats, blocked: Flags, after: int, x: float, y: float, beyond_m: float, steps: int
+) -> int:
+    """The first state from ``after`` on that is ``beyond_m`` away from (x, y) and begins ``steps`` free ones.
+
+    The last state of ``way [T, S]`` where there is none.
+    """
+    last = way.shape[0] - 1
+    free = 0
+    for i in range(after, last):
+        free = 0 if blocked[i] else free + 1
+        begin = i - steps + 1
+        if free >= steps and length(way[begin, 0] - x, way[begin, 1] - y) >= beyond_m:
+            return begin
+    return last
+
+
+@functools.lru_cache(maxsize=1)
+def allocate_drive(size: int) -> tuple[Floats, Floats]:
+    """Buffers for the states ``[LONGEST, size]`` and controls of a repaired plan."""
+    return np.empty((LONGEST, size)), np.empty((LONGEST, 2))
+
+
+def repair(
+    name: str,
+    problem: Problem,
+    stored: Plan,
+    blocked: Flags,
+    grid: Grid,
+    scene: Scene,
+    rng: np.random.Generator,
+    vehicle: Vehicle = CAR,
+    settings: RepairSettings = REPAIR,
+) -> Outcome:
+    """Make a plan for ``problem`` of a ``stored`` one that begins at its start, ``blocked [T]`` in places.
+
+    The planner called ``name`` searches, the occupancy ``grid`` shows it the way around. Status when that
+    fails: ``BUDGET_SPENT``.
+    """
+    began = perf_counter()
+    way = np.ascontiguousarray(stored.states)
+    states, controls = allocate_drive(state_size(vehicle))
+    goal = np.array([*problem.goal, problem.goal_radius])
+    drive = free_prefix(stored, blocked)
+    at = 0 if drive is None else len(drive.states)  # of the way: where to look for the next free place
+    beyond_m = settings.rejoin_beyond_m
+    searches: list[Outcome] = []
+    tracked = 0
+    solved = False
+    while drive is not None and not solved and len(searches) < settings.rounds:
+        x, y = drive.states[-1, :2].tolist()
+        at = int(rejoin_at(way, blocked, min(at, len(way) - 1), x, y, beyond_m, settings.free_steps))
+        to_goal = at == len(way) - 1
+        disc = goal if to_goal else np.array([way[at, 0], way[at, 1], settings.rejoin_radius_m])
+        target = (float(disc[0]), float(disc[1]))
+        around = grid_path(grid, (x, y), target, float(disc[2]))
+        guide = guidance([drive.states] if around is None else [around, drive.states])
+        local = replace(problem, goal=target, goal_radius=float(disc[2]))
+        limits = Limits(expansions=settings.expansions)
+        found = plan(name, local, rng, guide, scene, limits, vehicle, drive)
+        searches.append(found)
+        if found.plan is None:
+            beyond_m *= 2.0
+            continue
+        drive, solved = found.plan, to_goal
+        if not solved:
+            last = len(drive.states) - 1
+            states[: last + 1], controls[:last] = drive.states, drive.controls
+            ended, end, at = track(states, controls, last, way, at, goal, settings.tracking, vehicle, scene)
+            tracked += end - last
+            solved = ended == ARRIVED
+            drive = Plan(states[: end + 1].copy(), controls[:end].copy(), vehicle.dt)
+            if not solved:
+                drive = shortened(drive, end + 1)
+    roadmap_seconds = sum(each.roadmap_seconds for each in searches)
+    return Outcome(
+        status=Status.SOLVED if solved else Status.BUDGET_SPENT,
+        plan=drive if solved else None,
+        collision_checks=tracked + sum(each.collision_checks for each in searches),
+        expansions=sum(each.expansions for each in searches),
+        nodes=sum(each.nodes for each in searches),
+        roadmap_seconds=roadmap_seconds,
+        search_seconds=perf_counter() - began - roadmap_seconds,
+    )

@@ -1,0 +1,96 @@
+"""A tracking controller: drive on along a plan from a state that is not quite on it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planners.search.tree import EXTENSION, Extension, clamp
+from planners.world.collision import Scene, state_is_free
+from planners.world.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.jit import lean
+from planners.world.problem import Floats
+from planners.world.trigonometry import length
+from planners.world.vehicle import Vehicle
+
+ARRIVED, BLOCKED, LOST = range(3)
+
+
+class Tracking(NamedTuple):
+    """Pure pursuit: steer towards a point ahead on the plan, at the plan's speed there."""
+
+    ahead_m: float = 2.0  # the point looked at is the first farther away than this ...
+    ahead_s: float = 0.3  # ... plus the way driven in this time
+    lost_m: float = 4.0  # farther from the plan than this, it is not followed any more
+    slowest_share: float = 0.25  # of the maximal speed: where a plan stands still, it is driven on
+    controller: Extension = EXTENSION  # gains of the steering and speed controllers
+
+
+TRACKING = Tracking()
+
+
+@lean
+def track(
+    states: Floats,
+    controls: Floats,
+    first: int,
+    way: Floats,
+    beginning: int,
+    goal: Floats,
+    settings: Tracking,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> tuple[int, int, int]:
+    """Follow ``way [T, S]`` from its state ``beginning`` on, starting in ``states[first]``.
+
+    Fills ``states [C, S]`` and ``controls [C, 2]`` (from each state to the next) behind ``first``, every
+    state checked; ``goal [3]`` is x, y, radius in metres. Returns how it ended, the last state that was
+    filled, and the state of ``way`` that was looked at then.
+    """
+    gains = settings.controller
+    limit_1, limit_2 = control_limits(vehicle)
+    state = load(states, first, vehicle)
+    turn_sum = 0.0
+    speed_sum = 0.0
+    last_turn = 0.0
+    last_speed = 0.0
+    at = beginning
+    filled = first
+    most = min(states.shape[0] - 1, first + 2 * (way.shape[0] - beginning) + 50)
+    while filled < most:
+        ahead = settings.ahead_m + settings.ahead_s * abs(state[3])
+        while at < way.shape[0] - 1 and length(way[at, 0] - state[0], way[at, 1] - state[1]) < ahead:
+            at += 1
+        if length(way[at, 0] - state[0], way[at, 1] - state[1]) > ahead + settings.lost_m:
+            return LOST, filled, at
+        turn = turn_error(state, way[at, 0], way[at, 1], vehicle)
+        lack = max(way[at, 3], settings.slowest_share * vehicle.max_speed) - state[3]
+        if filled == first:
+            last_turn = turn
+            last_speed = lack
+        turn_sum += turn * vehicle.dt
+        speed_sum += lack * vehicle.dt
+        control_2 = clamp(
+            gains.proportional * turn
+            + gains.integral * turn_sum
+            + gains.derivative * (turn - last_turn) / vehicle.dt,
+            limit_2,
+        )
+        control_1 = clamp(
+            gains.proportional * lack
+            + gains.integral * speed_sum
+            + gains.derivative * (lack - last_speed) / vehicle.dt,
+            limit_1,
+        )
+        last_turn = turn
+        last_speed = lack
+        driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
+        state = step(state, driven_1, driven_2, vehicle)
+        if not state_is_free(state, vehicle, scene):
+            return BLOCKED, filled, at
+        controls[filled, 0] = driven_1
+        controls[filled, 1] = driven_2
+        filled += 1
+        store(states, filled, state)
+        if length(state[0] - goal[0], state[1] - goal[1]) <= goal[2]:
+            return ARRIVED, filled, at
+    return LOST, filled, at

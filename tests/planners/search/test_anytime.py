@@ -1,0 +1,60 @@
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.search.anytime import improve
+from planners.search.registry import PLANNERS, plan
+from planners.world.authority import faults
+from planners.world.randomness import generator
+from tests.worlds import problem_of, strewn, walled_goal
+
+EVERY = pytest.mark.parametrize("name", PLANNERS)
+
+
+@EVERY
+@given(seed=st.integers(0, 10**6), count=st.integers(0, 40), beginning=st.booleans())
+@settings(max_examples=6, deadline=None)
+def test_every_plan_of_the_history_is_better_and_the_last_passes_the_authority(name, seed, count, beginning):
+    problem = strewn(seed, count)
+    known = plan("follow", problem, generator(seed)).plan if beginning else None
+    result = improve(name, problem, known, expansions=2_000, seed=seed)
+    durations = [each.duration_s for each in result.history]
+    assert all(a > b for a, b in itertools.pairwise(durations))
+    assert [each.expansions for each in result.history] == sorted(each.expansions for each in result.history)
+    assert (result.plan is None) == (not result.history)
+    if result.plan is not None:
+        assert result.plan.duration_s == durations[-1]
+        assert faults(problem, result.plan) == []
+    if known is not None:
+        assert durations[0] == known.duration_s
+    assert result.expansions <= 2_000
+
+
+@EVERY
+def test_the_same_seed_improves_alike(name):
+    first, again = (improve(name, strewn(3, 30), expansions=3_000, seed=4) for _ in range(2))
+    np.testing.assert_array_equal(first.plan.states, again.plan.states)
+    assert [each[1:] for each in first.history] == [each[1:] for each in again.history]
+
+
+def test_more_work_gives_shorter_drives():
+    short, long = (improve("gust", strewn(1, 30), expansions=n).plan.duration_s for n in (1_000, 20_000))
+    assert long < short
+
+
+def test_a_limit_in_seconds_is_kept():
+    result = improve("rrt", strewn(1, 30), seconds=0.2)
+    assert 0.2 <= result.seconds < 1.0
+
+
+@EVERY
+def test_what_has_no_solution_ends_too(name):
+    assert improve(name, walled_goal(), expansions=500).plan is None
+
+
+def test_without_a_limit_nothing_is_begun():
+    with pytest.raises(ValueError, match="give it seconds or expansions"):
+        improve("rrt", problem_of([]))
