@@ -18,6 +18,7 @@ import pytest
 
 from storage.layout import DataFolder, RunFolder
 from storage.memories import load_memory
+from tasks.settings import ABLATION, ASSISTS
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.timeout(600)  # three runs, on a machine that may be busy
@@ -81,7 +82,7 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
     rows = pd.concat([_rows(path) for path in sorted(runs[0].results.rglob("*.parquet"))])
     asked = rows.groupby(["problem_class", "planner", "assist", "top_k"])["problem_id"].nunique()
     assert (asked == 6).all()
-    assert len(asked) == 2 * (3 * 5 + 2)
+    assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(ABLATION))
     counts = Counter(rows["memory"].fillna("none"))
     assert counts == {"none": 36, "random": 84, "trap": 84, "combined": 144}
     assert rows.loc[rows["solved"], "verified"].all()

@@ -139,7 +139,7 @@ def difference(milliseconds: Floats, baseline: Floats) -> str:
 
 
 def table(title: str) -> Table:
-    """An empty table with the columns of ``add``; rec. and rep.: % answered by a recalled, a repaired plan."""
+    """An empty table with the columns of ``add``; rec., rep.: % answered by a recalled, a repaired plan."""
     result = Table(title=title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("planner", "assist"):
         result.add_column(name, no_wrap=True)
