@@ -84,7 +84,7 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
     assert (asked == 6).all()
     assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(ABLATION))
     counts = Counter(rows["memory"].fillna("none"))
-    assert counts == {"none": 36, "random": 84, "trap": 84, "combined": 144}
+    assert counts == {"none": 72, "random": 126, "trap": 126, "combined": 216}
     assert rows.loc[rows["solved"], "verified"].all()
 
 
@@ -132,7 +132,7 @@ def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
     asked = [sys.executable, "-m", "flows.cli", "verify", str(folder), "--sample", "1", "--workers", "1"]
     done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "348 attempts made again" in done.stdout
+    assert "540 attempts made again" in done.stdout
     damaged = run.memory("trap") / "encoder.onnx"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
     done = subprocess.run(
