@@ -18,6 +18,7 @@ from planners.search.tree import (
     allocate_tree,
     plan_to_goal,
     plant,
+    prune,
 )
 from planners.world.collision import Scene, box_is_free, state_is_free
 from planners.world.dynamics import load
@@ -43,14 +44,18 @@ def attempt(
     limits: Limits,
     vehicle: Vehicle,
     prefix: Plan | None,
-    prepare: Callable[[Tree, Floats], None],
+    restart_after: int,
+    prepare: Callable[[Tree, Floats, int], None],
     grow: Callable[[Tree, Floats, int], None],
     follow_guide: Callable[[Tree, Floats, int], None] | None = None,
 ) -> Outcome:
-    """Plant a tree, ``prepare(tree, goal)`` once (roadmaps), then ``grow(tree, goal, until)`` until solved.
+    """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until)`` until solved.
 
     The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
     ``follow_guide`` grows it before that, for ``GUIDED`` expansions: mostly nothing else is needed then.
+    A tree that fills up, or does not get there within ``restart_after`` expansions, is given up for a new one,
+    the next ``trial`` (from 0), which may grow twice as long: that cuts the tails of a search with random
+    choices (Luby, Sinclair and Zuckerman 1993).
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()
@@ -73,16 +78,19 @@ def attempt(
             follow_guide(tree, goal, min(GUIDED, limits.expansions))
         if counts[GOAL_VERTEX] < 0 and counts[EXPANSIONS] < limits.expansions:
             preparing = perf_counter()
-            prepare(tree, goal)
+            prepare(tree, goal, 0)
             roadmap_seconds = perf_counter() - preparing
         status = Status.BUDGET_SPENT if counts[GOAL_VERTEX] < 0 else Status.SOLVED
+        trial = 0
+        restart_at = int(counts[EXPANSIONS]) + restart_after
         running_since = math.inf  # the clock starts after the first slice, which may have to be compiled
-        while (
-            status is Status.BUDGET_SPENT
-            and counts[EXPANSIONS] < limits.expansions
-            and counts[SIZE] < limits.nodes
-        ):
-            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, limits.expansions))
+        while status is Status.BUDGET_SPENT and counts[EXPANSIONS] < limits.expansions:
+            if counts[EXPANSIONS] >= restart_at or counts[SIZE] >= limits.nodes:
+                trial += 1
+                restart_at = int(counts[EXPANSIONS]) + restart_after * 2**trial
+                prune(tree, len(first), scene.bounds)
+                prepare(tree, goal, trial)
+            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, restart_at, limits.expansions))
             running_since = min(running_since, perf_counter())
             if counts[GOAL_VERTEX] >= 0:
                 status = Status.SOLVED

@@ -14,28 +14,25 @@ from planners.search.gust import (
     Groups,
     GustSettings,
     allocate_groups,
+    begin_gust,
     choose_member,
-    clear_groups,
     grow_gust,
     heaviest,
     join_groups,
     keep,
+    larger,
 )
 from planners.search.neighbours import Indices
 from planners.search.outcome import Guide, Limits, Outcome
 from planners.search.roadmap import (
-    CHECKS as ROADMAP_CHECKS,
-)
-from planners.search.roadmap import (
     Roadmap,
     RoadmapSettings,
     allocate_roadmap,
-    build_roadmap,
     resample_way,
 )
 from planners.search.rrt import along_guide
 from planners.search.sampling import in_disc
-from planners.search.tree import CHECKS, EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
+from planners.search.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import lean
 from planners.world.problem import Floats, Plan, Problem
@@ -185,6 +182,24 @@ def _grow(
             marks[SINCE_GROUP] = 0
 
 
+@lean
+def _begin(
+    tree: Tree,
+    goal: Floats,
+    roadmap: Roadmap,
+    groups: Groups,
+    lead: Lead,
+    settings: FollowSettings,
+    vehicle: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    """As GUST begins, and a first lead."""
+    begin_gust(tree, goal, roadmap, groups, settings.gust, vehicle, scene, rng)
+    lead.marks.fill(0)
+    _new_lead(tree, heaviest(groups), roadmap, groups, lead, settings, rng)
+
+
 def follow(
     problem: Problem,
     settings: FollowSettings,
@@ -204,16 +219,13 @@ def follow(
     along = along_guide(guide, vehicle, ready, rng)
     exploring = settings.gust._replace(guide_probability=0.0)
 
-    def prepare(tree: Tree, goal: Floats) -> None:
-        build_roadmap(roadmap, tree.states[0], goal, on_roadmap, vehicle, ready, rng)
-        tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
-        clear_groups(groups)
-        size = int(tree.counts[SIZE])
-        join_groups(tree, 0, size, roadmap, groups, settings.gust.distance_exponent, rng)
-        lead.marks[:] = 0
-        _new_lead(tree, heaviest(groups), roadmap, groups, lead, settings, rng)
+    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+        begun = settings._replace(gust=larger(settings.gust, trial))
+        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow, along)
+    return attempt(
+        problem, ready, limits or Limits(), vehicle, prefix, settings.gust.restart_after, prepare, grow, along
+    )

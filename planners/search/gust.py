@@ -52,6 +52,7 @@ class GustSettings(NamedTuple):
     guide_spacing_m: float = 3.0
     guide_steps: int = 4  # U{1 .. this} points ahead
     guide_radius_m: float = 2.0
+    restart_after: int = 2000  # expansions
     extension: Extension = EXTENSION
 
 
@@ -199,6 +200,31 @@ def grow_gust(
         join_groups(tree, first, added, roadmap, groups, settings.distance_exponent, rng)
 
 
+@lean
+def begin_gust(
+    tree: Tree,
+    goal: Floats,
+    roadmap: Roadmap,
+    groups: Groups,
+    settings: GustSettings,
+    vehicle: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> None:
+    """Build the roadmap and put the vertices that are there into their groups."""
+    build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, scene, rng)
+    tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
+    clear_groups(groups)
+    join_groups(tree, 0, tree.counts[SIZE], roadmap, groups, settings.distance_exponent, rng)
+
+
+def larger(settings: GustSettings, trial: int) -> GustSettings:
+    """Settings with a roadmap twice as large at each new ``trial``: the last one did not show the way."""
+    roadmap = settings.roadmap
+    batch = min(roadmap.batch * 2**trial, roadmap.most_nodes)
+    return settings._replace(roadmap=roadmap._replace(batch=batch)) if trial else settings
+
+
 def gust(
     problem: Problem,
     settings: GustSettings,
@@ -216,13 +242,12 @@ def gust(
 
     along = along_guide(guide, vehicle, ready, rng)
 
-    def prepare(tree: Tree, goal: Floats) -> None:
-        build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, ready, rng)
-        tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
-        clear_groups(groups)
-        join_groups(tree, 0, int(tree.counts[SIZE]), roadmap, groups, settings.distance_exponent, rng)
+    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
 
-    return attempt(problem, ready, limits or Limits(), vehicle, prefix, prepare, grow, along)
+    return attempt(
+        problem, ready, limits or Limits(), vehicle, prefix, settings.restart_after, prepare, grow, along
+    )

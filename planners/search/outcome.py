@@ -16,7 +16,7 @@ class Status(StrEnum):
     """How an attempt ended. Failing to plan is data, not an error."""
 
     SOLVED = "solved"
-    BUDGET_SPENT = "budget-spent"  # expansions or tree nodes used up
+    BUDGET_SPENT = "budget-spent"  # all expansions used up
     TIME_SPENT = "time-spent"
     START_BLOCKED = "start-blocked"
     GOAL_BLOCKED = "goal-blocked"
@@ -40,7 +40,7 @@ class Limits:
     """When to give up. Expansions decide the result; seconds only guard against a machine's bad day."""
 
     expansions: int = 20_000
-    nodes: int = 400_000  # tree vertices
+    nodes: int = 400_000  # tree vertices at once
     seconds: float = 30.0
     bound_s: float = math.inf  # only plans that take less time than this count as solutions
 

@@ -20,7 +20,6 @@ from planners.search.tree import (
     Extension,
     Tree,
     extend,
-    prune,
 )
 from planners.world.collision import Scene, scene_of
 from planners.world.jit import lean
@@ -34,7 +33,7 @@ class RrtSettings(NamedTuple):
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0
     guide_lead: int = 16  # points of the guide, a metre apart: how far ahead the target lies
-    restart_after: int = 1000  # expansions of the first tree; each next one may grow twice as long
+    restart_after: int = 1000  # expansions
     extension: Extension = EXTENSION
 
 
@@ -87,24 +86,15 @@ def rrt(
     """Plan from the problem's start to its goal disc; a guide leads the tree along its ways."""
     ready = scene_of(problem) if scene is None else scene
     guiding = NO_GUIDE if guide is None else guide
-    planted = 1 if prefix is None else len(prefix.states)
-    patience, restart_at = settings.restart_after, settings.restart_after
-
-    def grow(tree: Tree, goal: Floats, until: int) -> None:
-        nonlocal patience, restart_at
-        if tree.counts[EXPANSIONS] >= restart_at:
-            patience *= 2
-            restart_at += patience
-            prune(tree, planted, ready.bounds)
-        until = min(until, restart_at)
-        grow_rrt(tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng)
-
     return attempt(
         problem,
         ready,
         limits or Limits(),
         vehicle,
         prefix,
-        lambda tree, goal: None,
-        grow,
+        settings.restart_after,
+        lambda tree, goal, trial: None,
+        lambda tree, goal, until: grow_rrt(
+            tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng
+        ),
     )
