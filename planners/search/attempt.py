@@ -53,9 +53,9 @@ def attempt(
 
     The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
     ``follow_guide`` grows it before that, for ``GUIDED`` expansions: mostly nothing else is needed then.
-    A tree that fills up, or does not get there within ``restart_after`` expansions, is given up for a new one,
-    the next ``trial`` (from 0), which may grow twice as long: that cuts the tails of a search with random
-    choices (Luby, Sinclair and Zuckerman 1993).
+    A tree that fills up, or does not get there within ``restart_after`` expansions, is given up for a new
+    one, the next ``trial``, which may grow twice as long: that cuts the tails of a search with random choices
+    (Luby, Sinclair and Zuckerman 1993).
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()

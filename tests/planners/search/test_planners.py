@@ -52,10 +52,12 @@ def test_the_budget_of_expansions_is_spent_exactly_where_the_goal_is_walled_in(n
 
 
 @EVERY
-def test_a_full_tree_ends_the_search(name):
-    outcome = plan(name, walled_goal(), generator(0), limits=Limits(nodes=500))
+def test_a_full_tree_makes_room_for_a_new_one_until_all_expansions_are_used(name):
+    limits = Limits(expansions=1000, nodes=500)
+    outcome = plan(name, walled_goal(), generator(0), limits=limits)
     assert outcome.status is Status.BUDGET_SPENT
-    assert outcome.nodes == 500
+    assert outcome.expansions == limits.expansions
+    assert outcome.nodes <= limits.nodes
 
 
 @EVERY
