@@ -132,9 +132,8 @@ class _Work:
         self.lap("recall")
         return recalled
 
-    def pick(self, memory: Memory, top_k: int, seed: int) -> tuple[int, ...]:
+    def pick(self, memory: Memory, top_k: int, rng: np.random.Generator) -> tuple[int, ...]:
         """Plans picked blindly."""
-        rng = generator(seed, "random-plans", self.problem.id)
         picked = rng.choice(len(memory.plans), min(top_k, len(memory.plans)), replace=False)
         self.lap("recall")
         return tuple(int(i) for i in picked)
@@ -211,11 +210,12 @@ def solve(
     known = None if assist in WITHOUT_MEMORY else memory
     blindly, use = assist.startswith("random-"), assist.removeprefix("random-")
     rng = generator(seed, "search", problem.id, planner)
+    picking = generator(seed, "random-plans", problem.id)
 
     work = _Work(problem, vehicle)
     recalled: tuple[int, ...] = ()
     if known is not None and assist != "exhaustive":
-        recalled = work.pick(known, top_k, seed) if blindly else work.recall(known, top_k)
+        recalled = work.pick(known, top_k, picking) if blindly else work.recall(known, top_k)
     scene = work.scene
     answer: Plan | None = None
     source = ""
