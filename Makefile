@@ -26,8 +26,8 @@ check: $(READY)  ## lint, types, import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-speed: $(READY)  ## per class and planner: times, solved share, collision checks a second; roadmap size sweep
-	$(BIN)/python -m tests.speed.planners
+speed: $(READY)  ## all that is measured of speed, some 25 minutes: kernels, planners, OMPL, assists, warm starts
+	$(BIN)/python -m tests.speed
 
 format: $(READY)
 	$(BIN)/ruff check --fix .

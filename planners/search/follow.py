@@ -47,19 +47,19 @@ class FollowSettings(NamedTuple):
     """docs/planners.md, Follow; edges of the roadmap cost length / clearance.
 
     Of the roadmap sizes that are as fast (60 to 150 nodes) it takes one whose plans keep clear of obstacles.
-    Distances and patience are published for a car of 2.25 m/s (3 m, 2 m, 150, 100); at 4 m/s these halve the
-    median time.
+    Distances, patience and penalty are published for a car of 2.25 m/s (3 m, 2 m, 150, 100, 0.95); at 4 m/s
+    these take half the time.
     """
 
     gust: GustSettings = GustSettings(roadmap=RoadmapSettings(batch=100, clearance_exponent=1.0))
     spacing_m: float = 5.0  # R: between waypoints, and the radius of the tube around the lead
-    passing_m: float = 3.0  # a waypoint is passed within this distance
+    passing_m: float = 5.0  # a waypoint is passed within this distance
     near_radius_m: float = 2.0  # targets: around the next waypoint, one radius or the other
     far_radius_m: float = 3.0
     progress_base: float = 4.0  # a group's weight is this to the power of its waypoint
-    selection_penalty: float = 0.95
-    patience: int = 50  # iterations without a new follow group before a new lead may be drawn
-    group_patience: int = 50  # iterations without a new GUST group before exploring ...
+    selection_penalty: float = 0.9
+    patience: int = 100  # iterations without a new follow group before a new lead may be drawn
+    group_patience: int = 100  # iterations without a new GUST group before exploring ...
     explorations: int = 20  # ... for this many
 
 

@@ -47,12 +47,12 @@ class GustSettings(NamedTuple):
 
     roadmap: RoadmapSettings = RoadmapSettings()
     distance_exponent: float = 8.0  # delta: how much nearer groups are preferred
-    selection_penalty: float = 0.95  # alpha
-    guide_probability: float = 0.5  # else the target is uniform
-    guide_spacing_m: float = 3.0
-    guide_steps: int = 4  # U{1 .. this} points ahead
+    selection_penalty: float = 0.9  # alpha
+    guide_probability: float = 0.9  # else the target is uniform
+    guide_spacing_m: float = 5.0
+    guide_steps: int = 6  # U{1 .. this} points ahead
     guide_radius_m: float = 2.0
-    restart_after: int = 2000  # expansions
+    restart_after: int = 500  # expansions
     extension: Extension = EXTENSION
 
 

@@ -25,6 +25,7 @@ from planners.search.roadmap import RoadmapSettings
 from planners.world.classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from tests.speed.statistics import with_interval
 
 SEED = 77  # the tuning seed
 COUNT = 200  # problems a class
@@ -55,7 +56,7 @@ def cells(rows: list[tuple[Outcome, float]]) -> list[str]:
     checks = np.array([outcome.collision_checks for outcome, _ in rows])
     return [
         f"{np.mean([outcome.status is Status.SOLVED for outcome, _ in rows]):.1%}",
-        f"{1e3 * np.median(seconds):.2f}",
+        with_interval(1e3 * seconds, ".2f"),
         f"{1e3 * seconds.mean():.2f}",
         f"{1e3 * np.quantile(seconds, 0.9):.2f}",
         f"{1e3 * np.median([outcome.roadmap_seconds for outcome, _ in rows]):.2f}",
@@ -69,7 +70,7 @@ def table(title: str, first: str) -> Table:
     result = Table(title=title, title_justify="left")
     for name in ("class", first):
         result.add_column(name)
-    for name in ("solved", "median ms", "mean ms", "90 % ms", "roadmap ms", "checks", "M checks/s"):
+    for name in ("solved", "median ms [95 %]", "mean ms", "90 % ms", "roadmap ms", "checks", "M checks/s"):
         result.add_column(name, justify="right")
     return result
 
@@ -94,9 +95,8 @@ def _default(name: str, problem: Problem, rng: np.random.Generator) -> Outcome:
     return PLANNERS[name](problem, rng=rng)
 
 
-def main() -> None:
+def report(console: Console) -> None:
     """Print both tables."""
-    console = Console(width=110)
     totals: dict[str, list[float]] = {}  # mean milliseconds of a roadmap size, class by class
     speeds = table(f"From scratch, defaults, {COUNT} problems a class", "planner")
     sweep = table("Roadmap size: nodes drawn at first / neighbours", "planner")
@@ -128,4 +128,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    report(Console(width=110))

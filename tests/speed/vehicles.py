@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scipy.stats import binom
 
 from dashboards.pictures import Example, gallery
 from planners.search.outcome import Outcome
@@ -26,19 +25,13 @@ from planners.world.randomness import generator
 from planners.world.vehicle import CAR, VEHICLES, Vehicle
 from storage.files import whole_file
 from tests.speed.planners import SEED, measure
+from tests.speed.statistics import with_interval
 
 COUNT = 200  # problems a class
 PICTURED, PICTURED_PLANNER = 2, "follow"
 OTHERS = {name: vehicle for name, vehicle in VEHICLES.items() if vehicle != CAR}
 
 Rows = list[tuple[Outcome, float]]  # of each problem: what came out, and seconds
-
-
-def median_interval(values: list[float]) -> tuple[float, float, float]:
-    """Median and the ends of its 95 % interval, by order statistics."""
-    low, high = binom.ppf((0.025, 0.975), len(values), 0.5).astype(int)
-    ordered = np.sort(values)
-    return float(np.median(values)), float(ordered[low]), float(ordered[min(high, len(values) - 1)])
 
 
 def refused(problems: list[Problem], rows: Rows, vehicle: Vehicle) -> list[str]:
@@ -59,12 +52,11 @@ def add_rows(table: Table, place: tuple[str, str], rows: dict[str, Rows], wrong:
     for planner, found in rows.items():
         seconds = [second for _, second in found]
         plans = [outcome.plan for outcome, _ in found if outcome.plan is not None]
-        median, low, high = (1e3 * value for value in median_interval(seconds))
         table.add_row(
             *place,
             planner,
             f"{solved_share(found):.1%}",
-            f"{median:.2f} ({low:.2f}-{high:.2f})",
+            with_interval(1e3 * np.array(seconds), ".2f"),
             f"{1e3 * np.mean(seconds):.2f}",
             f"{1e3 * np.quantile(seconds, 0.9):.2f}",
             f"{np.mean([found.duration_s for found in plans]):.1f}" if plans else "-",
@@ -78,7 +70,7 @@ def report(console: Console, count: int = COUNT) -> None:
     table = Table(title=title, title_justify="left")
     for name in ("vehicle", "class", "planner"):
         table.add_column(name)
-    for name in ("solved", "median ms (95 %)", "mean ms", "90 % ms", "driving s", "refused"):
+    for name in ("solved", "median ms [95 %]", "mean ms", "90 % ms", "driving s", "refused"):
         table.add_column(name, justify="right")
     lines, reasons = [], []
     for name, vehicle in OTHERS.items():

@@ -1,0 +1,40 @@
+"""All that is measured of speed, one table after another: what ``make speed`` prints.
+
+``python -m tests.speed [SECTION]...`` prints some of them. What a section is about stands at the top of its
+file. Problems have seeds of their own: they are neither collected from nor tested on.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from typing import Final
+
+from rich.console import Console
+
+SECTIONS: Final = {
+    "kernels": "tests.speed.kernels",
+    "planners": "tests.speed.planners",
+    "vehicles": "tests.speed.vehicles",
+    "peers": "tests.speed.peers.comparison",
+    "assists": "tests.speed.assists",
+    "anytime": "tests.speed.anytime",
+    "warm_start": "tests.speed.warm_start",
+}
+
+
+def main(asked: list[str]) -> int:
+    """Print the sections that are asked for, all of them by default; 2 for one that is not known."""
+    unknown = [name for name in asked if name not in SECTIONS]
+    if unknown:
+        print(f"No section {unknown[0]!r}: choose some of {', '.join(SECTIONS)}.", file=sys.stderr)
+        return 2
+    console = Console(width=150)
+    for name in asked or SECTIONS:
+        console.rule(f"{name}: {SECTIONS[name]}")
+        importlib.import_module(SECTIONS[name]).report(console)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
