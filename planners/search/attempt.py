@@ -46,10 +46,10 @@ def attempt(
     prefix: Plan | None,
     restart_after: int,
     prepare: Callable[[Tree, Floats, int], None],
-    grow: Callable[[Tree, Floats, int], None],
+    grow: Callable[[Tree, Floats, int, int], None],
     follow_guide: Callable[[Tree, Floats, int], None] | None = None,
 ) -> Outcome:
-    """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until)`` until solved.
+    """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until, trial)``.
 
     The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
     ``follow_guide`` grows it before that, for ``GUIDED`` expansions: mostly nothing else is needed then.
@@ -90,7 +90,7 @@ def attempt(
                 restart_at = int(counts[EXPANSIONS]) + restart_after * 2**trial
                 prune(tree, len(first), scene.bounds)
                 prepare(tree, goal, trial)
-            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, restart_at, limits.expansions))
+            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, restart_at, limits.expansions), trial)
             running_since = min(running_since, perf_counter())
             if counts[GOAL_VERTEX] >= 0:
                 status = Status.SOLVED

@@ -30,7 +30,7 @@ from planners.search.roadmap import (
     allocate_roadmap,
     resample_way,
 )
-from planners.search.rrt import along_guide
+from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.sampling import in_disc
 from planners.search.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.collision import Scene, scene_of
@@ -46,12 +46,13 @@ LENGTH, SINCE_FOLLOW, SINCE_GROUP = range(3)
 class FollowSettings(NamedTuple):
     """docs/planners.md, Follow; edges of the roadmap cost length / clearance.
 
-    Of the roadmap sizes that are as fast (60 to 150 nodes) it takes one whose plans keep clear of obstacles.
     Distances, patience and penalty are published for a car of 2.25 m/s (3 m, 2 m, 150, 100, 0.95); at 4 m/s
     these take half the time.
     """
 
-    gust: GustSettings = GustSettings(roadmap=RoadmapSettings(batch=100, clearance_exponent=1.0))
+    gust: GustSettings = GustSettings(
+        roadmap=RoadmapSettings(batch=60, neighbours=12, clearance_exponent=1.0)
+    )
     spacing_m: float = 5.0  # R: between waypoints, and the radius of the tube around the lead
     passing_m: float = 5.0  # a waypoint is passed within this distance
     near_radius_m: float = 2.0  # targets: around the next waypoint, one radius or the other
@@ -219,12 +220,18 @@ def follow(
     along = along_guide(guide, vehicle, ready, rng)
     exploring = settings.gust._replace(guide_probability=0.0)
 
-    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        begun = settings._replace(gust=larger(settings.gust, trial))
-        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
+    anywhere = towards_anywhere(vehicle, ready, rng)
 
-    def grow(tree: Tree, goal: Floats, until: int) -> None:
-        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
+    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+        if trial % 2 == 0:
+            begun = settings._replace(gust=larger(settings.gust, trial))
+            _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
+
+    def grow(tree: Tree, goal: Floats, until: int, trial: int) -> None:
+        if trial % 2 == 0:
+            _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
+        else:  # as GUST does
+            anywhere(tree, goal, until)
 
     return attempt(
         problem, ready, limits or Limits(), vehicle, prefix, settings.gust.restart_after, prepare, grow, along

@@ -21,7 +21,7 @@ from planners.search.roadmap import (
     build_roadmap,
     resample_way,
 )
-from planners.search.rrt import along_guide
+from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.sampling import in_bounds, in_disc
 from planners.search.tree import (
     CHECKS,
@@ -52,7 +52,7 @@ class GustSettings(NamedTuple):
     guide_spacing_m: float = 5.0
     guide_steps: int = 6  # U{1 .. this} points ahead
     guide_radius_m: float = 2.0
-    restart_after: int = 500  # expansions
+    restart_after: int = 500  # expansions; each second trial is RRT's: a portfolio (Gomes and Selman 2001)
     extension: Extension = EXTENSION
 
 
@@ -242,11 +242,17 @@ def gust(
 
     along = along_guide(guide, vehicle, ready, rng)
 
-    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
+    anywhere = towards_anywhere(vehicle, ready, rng)
 
-    def grow(tree: Tree, goal: Floats, until: int) -> None:
-        grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
+    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+        if trial % 2 == 0:
+            begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
+
+    def grow(tree: Tree, goal: Floats, until: int, trial: int) -> None:
+        if trial % 2 == 0:
+            grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
+        else:  # the roadmap did not show the way: for once without it
+            anywhere(tree, goal, until)
 
     return attempt(
         problem, ready, limits or Limits(), vehicle, prefix, settings.restart_after, prepare, grow, along

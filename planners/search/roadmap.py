@@ -37,7 +37,7 @@ UNKNOWN, FREE, BLOCKED = range(3)
 class RoadmapSettings(NamedTuple):
     """How a roadmap is built (docs/planners.md); batch and neighbours are what ``make speed`` finds best."""
 
-    batch: int = 150  # nodes drawn before the first, and between two, searches for a way from the start
+    batch: int = 100  # nodes drawn before the first, and between two, searches for a way from the start
     neighbours: int = 8
     most_nodes: int = 3000
     body_length_scale: float = 1.5  # a node's body must be free: a little more room than the car needs

@@ -61,6 +61,16 @@ def grow_rrt(
             return
 
 
+def towards_anywhere(
+    vehicle: Vehicle, scene: Scene, rng: np.random.Generator
+) -> Callable[[Tree, Floats, int], None]:
+    """How any planner grows its tree without looking where, as ``attempt`` wants it."""
+    settings = RrtSettings()
+    return lambda tree, goal, until: grow_rrt(
+        tree, goal, until, NO_GUIDE, NO_LEAD, settings, vehicle, scene, rng
+    )
+
+
 def along_guide(
     guide: Guide | None, vehicle: Vehicle, scene: Scene, rng: np.random.Generator
 ) -> Callable[[Tree, Floats, int], None] | None:
@@ -94,7 +104,7 @@ def rrt(
         prefix,
         settings.restart_after,
         lambda tree, goal, trial: None,
-        lambda tree, goal, until: grow_rrt(
+        lambda tree, goal, until, trial: grow_rrt(
             tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng
         ),
     )
