@@ -194,6 +194,20 @@ def verdict(name: str, times: dict[str, Times]) -> str:
     )
 
 
+def verdicts_of(name: str, times: dict[str, Times]) -> list[str]:
+    """The verdict, and another without the problems that nobody solved, where there are any."""
+    solved = np.zeros(len(times[MARK].solved), bool)
+    for one in times.values():
+        solved[: len(one.solved)] |= one.solved.any(axis=1)
+    lines = [verdict(name, times)]
+    if not solved.all():
+        left = {
+            planner: Times(*(each[solved[: len(each)]] for each in one)) for planner, one in times.items()
+        }
+        lines.append(verdict(f"{name} without {np.sum(~solved)} that nobody solved", left))
+    return lines
+
+
 def report(console: Console, count: int = COUNT, seeds: int = 1, worlds: Path = WORLDS) -> None:
     """Measure all planners on all problem sets and print a table of each; then, a line a set, the ratio."""
     try:
@@ -209,7 +223,7 @@ def report(console: Console, count: int = COUNT, seeds: int = 1, worlds: Path = 
         for name, problems in problem_sets(console, SEED, PART, count, worlds):
             times = measure(peers, problems, seeds, name)
             console.print(table_of(name, times))
-            verdicts += [verdict(name, times)] if MARK in times else []
+            verdicts += verdicts_of(name, times) if MARK in times else []
     finally:
         if native is not None:
             native.close()
