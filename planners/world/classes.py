@@ -43,11 +43,11 @@ _CURVES_STANDARD: Final = Curves(
     small=Scatter(sites=16, presence=0.85, jitter_m=1.25, radius_min_m=0.8, radius_max_m=1.8, strays=0),
 )
 _CURVES: Final = {
-    # 1.000; 0.96, 1.08 ms; 9.4 x
+    # 1.000; 0.38, 0.43 ms; 5.3 x
     "easy": _CURVES_STANDARD._replace(curves=3, outer_m=24.0, gap_m=6.0, presence=0.8),
-    # 0.942; 1.23, 1.56 ms; 31.2 x
+    # 0.934; 0.53, 0.62 ms; 8.6 x
     "standard": _CURVES_STANDARD,
-    # 0.482; 2.53, 3.97 ms; 59.0 x
+    # 0.586; 0.90, 1.26 ms; 22.4 x
     "hard": _CURVES_STANDARD._replace(curves=5, inner_m=6.0, outer_m=29.0, gap_m=4.25),
 }
 
@@ -55,11 +55,11 @@ _RANDOM_STANDARD: Final = Random(
     Scatter(sites=36, presence=0.97, jitter_m=0.5, radius_min_m=2.9, radius_max_m=4.2, strays=0)
 )
 _RANDOM: Final = {
-    # 1.000; 0.98, 1.04 ms; 4.8 x
+    # 1.000; 0.34, 0.37 ms; 3.0 x
     "easy": Random(_RANDOM_STANDARD.shapes._replace(radius_min_m=1.8, radius_max_m=2.8)),
-    # 0.948; 1.05, 1.24 ms; 24.6 x
+    # 0.968; 0.43, 0.50 ms; 5.6 x
     "standard": _RANDOM_STANDARD,
-    # 0.696; 1.45, 1.80 ms; 32.7 x
+    # 0.734; 0.61, 0.72 ms; 7.6 x
     "hard": Random(_RANDOM_STANDARD.shapes._replace(sites=38, jitter_m=0.8, strays=2)),
 }
 
@@ -74,11 +74,11 @@ _TRAP_STANDARD: Final = Trap(
     small=Scatter(sites=26, presence=0.85, jitter_m=2.0, radius_min_m=1.0, radius_max_m=2.5, strays=1),
 )
 _TRAP: Final = {
-    # 0.986; 1.21, 1.25 ms; 9.3 x
+    # 0.996; 0.40, 0.44 ms; 5.1 x
     "easy": _TRAP_STANDARD._replace(width_m=18.0, flank_m=12.0, gap_m=9.0, depth_m=8.0),
-    # 0.938; 1.34, 1.45 ms; 26.4 x
+    # 0.966; 0.47, 0.58 ms; 12.9 x
     "standard": _TRAP_STANDARD,
-    # 0.758; 1.20, 5.32 ms; 46.5 x
+    # 0.854; 0.70, 3.31 ms; 29.7 x
     "hard": _TRAP_STANDARD._replace(width_m=26.0, flank_m=18.0, gap_m=6.0, depth_m=14.0),
 }
 
