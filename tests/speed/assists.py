@@ -35,6 +35,7 @@ from planners.world.problem import Floats, Problem
 from planners.world.randomness import generator
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
+from tasks.caching import key_of
 
 COLLECTING = 79  # seed of the stored experiences
 MEASURING = 80  # seed of the problems here
@@ -62,7 +63,7 @@ EVERY = [
 def memory_of(name: str) -> Memory:
     """A small memory of a class, from the data folder if it is there."""
     data = Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
-    place = data / "speed" / f"{name}-{COLLECTING}-{EXPERIENCES}-{HALLUCINATED}-{EPOCHS}"
+    place = data / "speed" / f"{name}-{key_of(COLLECTING, EXPERIENCES, HALLUCINATED, EPOCHS)}"
     try:
         return load_memory(place)
     except StorageError:
