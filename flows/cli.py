@@ -241,6 +241,7 @@ def _do(stage: str, options: Options) -> None:
         objective=options.objective,
         strict=options.strict,
         vehicle=options.vehicle,
+        optimised=options.optimised,
     )
     run_stage(
         f"flows.{stage}",

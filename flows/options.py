@@ -39,6 +39,8 @@ class Options:
         Address of a Dask scheduler to use instead, like tcp://host:8786.
     strict
         Stop at a bad world instead of skipping it.
+    optimised
+        Make collected plans shorter and clearer before they are kept: about a second each.
 
     """
 
@@ -53,6 +55,7 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
+    optimised: Annotated[bool, Parameter(negative=())] = False
 
     @property
     def folder(self) -> Path:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from planners.memory.experience import Experience
 from planners.solve import solve
-from planners.world.vehicle import vehicle_named
+from planners.world.problem import Plan, Problem
+from planners.world.vehicle import Vehicle, vehicle_named
 from storage.experiences import merge_experiences, write_experiences
 from storage.shards import metadata_of, shard_is_done
 from tasks.attempts import check_attempt
@@ -16,6 +18,7 @@ from tasks.settings import COMBINED, RunError, RunSettings
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 25
+CLEARANCE_WEIGHT: Final = 1.0  # buys most of a metre of clearance for half a second (docs/optimisation.md)
 SPARE: Final = 1.1  # problems asked for each one still wanted: some are not solved
 GIVE_UP: Final = 20  # problems asked a wanted one; a class this hard is no class to remember
 
@@ -31,10 +34,13 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
         attempt = solve(problem, planner, seed=seed, vehicle=vehicle)
-        if attempt.plan is None:
+        plan = attempt.plan
+        if plan is None:
             continue
-        check_attempt(problem, attempt, set(), vehicle)
-        experiences.append(Experience(problem, attempt.plan, vehicle))
+        if chunk.settings.optimised:
+            plan = _optimised(problem, plan, vehicle)
+        check_attempt(problem, replace(attempt, plan=plan), set(), vehicle)
+        experiences.append(Experience(problem, plan, vehicle))
         seconds.append(attempt.planning_seconds)
     write_experiences(
         chunk.run.shard("experiences", chunk.class_name, chunk.index),
@@ -46,6 +52,14 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
         vehicle=vehicle,
     )
     return {"solved": len(experiences), "asked": chunk.last - chunk.first}
+
+
+def _optimised(problem: Problem, plan: Plan, vehicle: Vehicle) -> Plan:
+    """The plan made shorter and clearer; as it is where that fails."""
+    from planners.optimisation.optimise import DEFAULT_SETTINGS, improve  # late: few runs need CasADi
+
+    objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=CLEARANCE_WEIGHT)
+    return improve(problem, plan, DEFAULT_SETTINGS._replace(objective=objective), vehicle)
 
 
 collect_problems = chunk_task(collect_chunk)
@@ -75,7 +89,7 @@ def _chunks_wanted(data: str, settings: RunSettings, class_name: str, done: Resu
             f"Class {class_name}: {solved} of {asked} problems solved, {settings.experiences} are wanted; "
             "ask for fewer, or take easier problems."
         )
-    inputs = [settings.seed, settings.collector, *source_key(settings, class_name)]
+    inputs = [settings.seed, settings.collector, settings.optimised, *source_key(settings, class_name)]
     return chunks_of(data, settings, "collect", class_name, until, CHUNK_PROBLEMS, inputs)[len(results) :]
 
 

@@ -50,6 +50,9 @@ class RunError(RuntimeError):
     """A stage cannot go on; the message is one line that says why and what to do (exit code 1)."""
 
 
+_LATER: Final[dict[str, Any]] = {"vehicle": DEFAULT_VEHICLE, "optimised": False}  # fields that were added
+
+
 @dataclass(frozen=True)
 class RunSettings:
     """One run. Equal settings, wherever the data lies and whoever works, give equal rows."""
@@ -70,6 +73,7 @@ class RunSettings:
     combined: bool  # also one memory for all classes together
     strict: bool = False  # a bad world stops the run instead of being skipped
     vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicle``)
+    optimised: bool = False  # collected plans are made shorter and clearer before they are kept
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -81,8 +85,9 @@ class RunSettings:
         """Eight hexadecimal digits that tell settings with different results apart."""
         asked = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
         del asked["strict"]
-        if self.vehicle == DEFAULT_VEHICLE:  # such runs were made, and named, before there was another
-            del asked["vehicle"]
+        for name, default in _LATER.items():  # runs with these were made, and named, before there was another
+            if asked[name] == default:
+                del asked[name]
         return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
 
     @property
@@ -101,7 +106,7 @@ class RunSettings:
     @classmethod
     def from_json(cls, text: str) -> RunSettings:
         """The settings that ``to_json`` wrote; ValueError with one line when they are of another version."""
-        values: dict[str, Any] = {"vehicle": DEFAULT_VEHICLE} | json.loads(text)
+        values: dict[str, Any] = _LATER | json.loads(text)
         known = {field.name for field in fields(cls)}
         if set(values) != known:
             odd = ", ".join(sorted(set(values) ^ known))
@@ -149,6 +154,7 @@ def for_preset(
     epochs: int | None = None,
     strict: bool = False,
     vehicle: str = DEFAULT_VEHICLE,
+    optimised: bool = False,
 ) -> RunSettings:
     """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
 
@@ -195,6 +201,7 @@ def for_preset(
         combined=base.combined,
         strict=strict,
         vehicle=vehicle,
+        optimised=optimised,
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))

@@ -31,6 +31,7 @@ SETTINGS = st.builds(
     combined=st.booleans(),
     strict=st.booleans(),
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
+    optimised=st.booleans(),
 )
 
 
@@ -66,10 +67,10 @@ def test_a_run_of_another_vehicle_says_its_name() -> None:
     assert for_preset("smoke", vehicle="car-1-trailer").run_name.startswith("smoke-labels-car-1-trailer-")
 
 
-def test_settings_from_before_there_were_vehicles_are_the_cars_and_keep_their_name() -> None:
+def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
     settings = for_preset("smoke")
     values = json.loads(settings.to_json())
-    del values["vehicle"]
+    del values["vehicle"], values["optimised"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
