@@ -26,7 +26,7 @@ check: $(READY)  ## lint, types, import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-speed: $(READY)  ## all that is measured of speed, some 25 minutes: kernels, planners, OMPL, assists, warm starts
+speed: $(READY)  ## all that is measured of speed, some 17 minutes: kernels, planners, OMPL, assists, warm starts
 	$(BIN)/python -m tests.speed
 
 format: $(READY)

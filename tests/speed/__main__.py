@@ -29,7 +29,7 @@ def main(asked: list[str]) -> int:
     if unknown:
         print(f"No section {unknown[0]!r}: choose some of {', '.join(SECTIONS)}.", file=sys.stderr)
         return 2
-    console = Console(width=150)
+    console = Console(width=170)
     for name in asked or SECTIONS:
         console.rule(f"{name}: {SECTIONS[name]}")
         importlib.import_module(SECTIONS[name]).report(console)
