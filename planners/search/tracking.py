@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planners.search.tree import EXTENSION, Extension, clamp
+from planners.search.tree import EXTENSION, Extension, pid
 from planners.world.collision import Scene, state_is_free
 from planners.world.dynamics import admissible, control_limits, load, step, store, turn_error
 from planners.world.jit import lean
@@ -69,18 +69,8 @@ def track(
             last_speed = lack
         turn_sum += turn * vehicle.dt
         speed_sum += lack * vehicle.dt
-        control_2 = clamp(
-            gains.proportional * turn
-            + gains.integral * turn_sum
-            + gains.derivative * (turn - last_turn) / vehicle.dt,
-            limit_2,
-        )
-        control_1 = clamp(
-            gains.proportional * lack
-            + gains.integral * speed_sum
-            + gains.derivative * (lack - last_speed) / vehicle.dt,
-            limit_1,
-        )
+        control_2 = pid(turn, last_turn, turn_sum, gains, vehicle.dt, limit_2)
+        control_1 = pid(lack, last_speed, speed_sum, gains, vehicle.dt, limit_1)
         last_turn = turn
         last_speed = lack
         driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)

@@ -98,9 +98,10 @@ def prune(tree: Tree, size: int, bounds: Floats) -> None:
 
 
 @inlined
-def clamp(value: float, limit: float) -> float:
-    """``value`` within plus and minus ``limit``."""
-    return min(max(value, -limit), limit)
+def pid(error: float, last: float, total: float, gains: Extension, dt: float, limit: float) -> float:
+    """Control within plus and minus ``limit``; ``last`` error a step ago, ``total`` its sum over time."""
+    control = gains.proportional * error + gains.integral * total + gains.derivative * (error - last) / dt
+    return min(max(control, -limit), limit)
 
 
 @inlined
@@ -168,18 +169,8 @@ def extend(
                 last_speed = lack
             turn_sum += turn * vehicle.dt
             speed_sum += lack * vehicle.dt
-            control_2 = clamp(
-                settings.proportional * turn
-                + settings.integral * turn_sum
-                + settings.derivative * (turn - last_turn) / vehicle.dt,
-                limit_2,
-            )
-            control_1 = clamp(
-                settings.proportional * lack
-                + settings.integral * speed_sum
-                + settings.derivative * (lack - last_speed) / vehicle.dt,
-                limit_1,
-            )
+            control_2 = pid(turn, last_turn, turn_sum, settings, vehicle.dt, limit_2)
+            control_1 = pid(lack, last_speed, speed_sum, settings, vehicle.dt, limit_1)
             last_turn = turn
             last_speed = lack
         driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
