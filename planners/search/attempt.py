@@ -46,16 +46,18 @@ def attempt(
     prefix: Plan | None,
     restart_after: int,
     prepare: Callable[[Tree, Floats, int], None],
-    grow: Callable[[Tree, Floats, int, int], None],
+    grow: Callable[[Tree, Floats, int], None],
+    explore: Callable[[Tree, Floats, int], None] | None = None,
     follow_guide: Callable[[Tree, Floats, int], None] | None = None,
 ) -> Outcome:
-    """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until, trial)``.
+    """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until)`` until solved.
 
     The tree begins with the states of ``prefix``, a free drive from the problem's start, if there is one.
     ``follow_guide`` grows it before that, for ``GUIDED`` expansions: mostly nothing else is needed then.
     A tree that fills up, or does not get there within ``restart_after`` expansions, is given up for a new
     one, the next ``trial``, which may grow twice as long: that cuts the tails of a search with random choices
-    (Luby, Sinclair and Zuckerman 1993).
+    (Luby, Sinclair and Zuckerman 1993). Each second trial is grown by ``explore``, if given, with nothing
+    prepared: where the one way fails for long the other need not (a portfolio, Gomes and Selman 2001).
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()
@@ -82,6 +84,7 @@ def attempt(
             roadmap_seconds = perf_counter() - preparing
         status = Status.BUDGET_SPENT if counts[GOAL_VERTEX] < 0 else Status.SOLVED
         trial = 0
+        extend_tree = grow
         restart_at = int(counts[EXPANSIONS]) + restart_after
         running_since = math.inf  # the clock starts after the first slice, which may have to be compiled
         while status is Status.BUDGET_SPENT and counts[EXPANSIONS] < limits.expansions:
@@ -89,8 +92,10 @@ def attempt(
                 trial += 1
                 restart_at = int(counts[EXPANSIONS]) + restart_after * 2**trial
                 prune(tree, len(first), scene.bounds)
-                prepare(tree, goal, trial)
-            grow(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, restart_at, limits.expansions), trial)
+                extend_tree = explore if explore is not None and trial % 2 else grow
+                if extend_tree is grow:
+                    prepare(tree, goal, trial)
+            extend_tree(tree, goal, min(int(counts[EXPANSIONS]) + SLICE, restart_at, limits.expansions))
             running_since = min(running_since, perf_counter())
             if counts[GOAL_VERTEX] >= 0:
                 status = Status.SOLVED

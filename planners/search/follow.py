@@ -217,22 +217,19 @@ def follow(
     roadmap = allocate_roadmap(on_roadmap.most_nodes, on_roadmap.neighbours)
     groups = allocate_groups(on_roadmap.most_nodes)
     lead = allocate_lead()
-    along = along_guide(guide, vehicle, ready, rng)
     exploring = settings.gust._replace(guide_probability=0.0)
 
-    anywhere = towards_anywhere(vehicle, ready, rng)
-
     def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        if trial % 2 == 0:
-            begun = settings._replace(gust=larger(settings.gust, trial))
-            _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
+        begun = settings._replace(gust=larger(settings.gust, trial))
+        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
 
-    def grow(tree: Tree, goal: Floats, until: int, trial: int) -> None:
-        if trial % 2 == 0:
-            _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
-        else:  # as GUST does
-            anywhere(tree, goal, until)
+    def grow(tree: Tree, goal: Floats, until: int) -> None:
+        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
+
+    explore = towards_anywhere(vehicle, ready, rng)
+    along = along_guide(guide, vehicle, ready, rng)
+    restart_after = settings.gust.restart_after
 
     return attempt(
-        problem, ready, limits or Limits(), vehicle, prefix, settings.gust.restart_after, prepare, grow, along
+        problem, ready, limits or Limits(), vehicle, prefix, restart_after, prepare, grow, explore, along
     )

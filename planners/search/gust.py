@@ -52,7 +52,7 @@ class GustSettings(NamedTuple):
     guide_spacing_m: float = 5.0
     guide_steps: int = 6  # U{1 .. this} points ahead
     guide_radius_m: float = 2.0
-    restart_after: int = 500  # expansions; each second trial is RRT's: a portfolio (Gomes and Selman 2001)
+    restart_after: int = 500  # expansions; each second trial is RRT's
     extension: Extension = EXTENSION
 
 
@@ -219,7 +219,7 @@ def begin_gust(
 
 
 def larger(settings: GustSettings, trial: int) -> GustSettings:
-    """Settings with a roadmap twice as large at each new ``trial``: the last one did not show the way."""
+    """Settings with a roadmap that doubles with each ``trial``: the last one did not show the way."""
     roadmap = settings.roadmap
     batch = min(roadmap.batch * 2**trial, roadmap.most_nodes)
     return settings._replace(roadmap=roadmap._replace(batch=batch)) if trial else settings
@@ -240,20 +240,24 @@ def gust(
     roadmap = allocate_roadmap(settings.roadmap.most_nodes, settings.roadmap.neighbours)
     groups = allocate_groups(settings.roadmap.most_nodes)
 
+    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
+
+    def grow(tree: Tree, goal: Floats, until: int) -> None:
+        grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
+
+    explore = towards_anywhere(vehicle, ready, rng)
     along = along_guide(guide, vehicle, ready, rng)
 
-    anywhere = towards_anywhere(vehicle, ready, rng)
-
-    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        if trial % 2 == 0:
-            begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
-
-    def grow(tree: Tree, goal: Floats, until: int, trial: int) -> None:
-        if trial % 2 == 0:
-            grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
-        else:  # the roadmap did not show the way: for once without it
-            anywhere(tree, goal, until)
-
     return attempt(
-        problem, ready, limits or Limits(), vehicle, prefix, settings.restart_after, prepare, grow, along
+        problem,
+        ready,
+        limits or Limits(),
+        vehicle,
+        prefix,
+        settings.restart_after,
+        prepare,
+        grow,
+        explore,
+        along,
     )

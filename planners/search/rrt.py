@@ -104,7 +104,7 @@ def rrt(
         prefix,
         settings.restart_after,
         lambda tree, goal, trial: None,
-        lambda tree, goal, until, trial: grow_rrt(
+        lambda tree, goal, until: grow_rrt(
             tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng
         ),
     )

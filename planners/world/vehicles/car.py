@@ -10,10 +10,10 @@ from planners.world.vehicles.interface import (
     Box,
     State,
     admissible,
-    box_at,
     control_limits,
-    half_way,
     is_folded,
+    kept_within,
+    leading_body,
     load,
     step,
     swept_bodies,
@@ -90,12 +90,9 @@ def _control_limits(vehicle: CarLike) -> tuple[float, float]:
 
 @implements(admissible, Car, CarWithTrailers)
 def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
-    speed = state[3]
-    steering = state[4]
-    h = vehicle.dt
     return (
-        min(max(first, (vehicle.min_speed - speed) / h), (vehicle.max_speed - speed) / h),
-        min(max(second, (-vehicle.max_steering - steering) / h), (vehicle.max_steering - steering) / h),
+        kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
+        kept_within(second, state[4], -vehicle.max_steering, vehicle.max_steering, vehicle.dt),
     )
 
 
@@ -121,7 +118,4 @@ def most_motion(speed: float, steering: float, car: CarLike) -> tuple[float, flo
 @implements(swept_bodies, Car)
 def _swept_bodies(state: State, vehicle: Car) -> tuple[Box, ...]:
     speed, turn = most_motion(state[3], state[4], vehicle)
-    reach = max(vehicle.front, vehicle.rear)
-    margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
-    sin, cos = sincos(state[2])
-    return (box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin),)
+    return (leading_body(state, speed, turn, vehicle),)

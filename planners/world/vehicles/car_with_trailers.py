@@ -19,6 +19,7 @@ from planners.world.vehicles.interface import (
     box_at,
     half_way,
     is_folded,
+    leading_body,
     load,
     step,
     swept_bodies,
@@ -128,10 +129,7 @@ def _swept_bodies(state: State, vehicle: CarWithTrailers) -> tuple[Box, ...]:
     y = state[1]
     heading = state[2]
     speed, turn = most_motion(state[3], state[4], vehicle)
-    reach = max(vehicle.front, vehicle.rear)
-    margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
-    sin, cos = sincos(heading)
-    car = box_at(x, y, cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin)
+    car = leading_body(state, speed, turn, vehicle)
     x, y, heading, turn, first = _trailer(
         x, y, heading, state[5], vehicle.hitch_lengths[0], speed, turn, vehicle
     )

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from planners.world.jit import implements
 from planners.world.problem import Floats
-from planners.world.trigonometry import angle_to, sincos, wrapped
+from planners.world.trigonometry import angle_to, wrapped
 from planners.world.vehicle import DifferentialDrive
 from planners.world.vehicles.car import drive
 from planners.world.vehicles.interface import (
     Box,
     State,
     admissible,
-    box_at,
     control_limits,
-    half_way,
     is_folded,
+    kept_within,
+    leading_body,
     load,
     step,
     swept_bodies,
@@ -54,12 +54,9 @@ def _control_limits(vehicle: DifferentialDrive) -> tuple[float, float]:
 
 @implements(admissible, DifferentialDrive)
 def _admissible(state: State, first: float, second: float, vehicle: DifferentialDrive) -> tuple[float, float]:
-    speed = state[3]
-    turn = state[4]
-    h = vehicle.dt
     return (
-        min(max(first, (vehicle.min_speed - speed) / h), (vehicle.max_speed - speed) / h),
-        min(max(second, (-vehicle.max_turn_rate - turn) / h), (vehicle.max_turn_rate - turn) / h),
+        kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
+        kept_within(second, state[4], -vehicle.max_turn_rate, vehicle.max_turn_rate, vehicle.dt),
     )
 
 
@@ -78,7 +75,4 @@ def _swept_bodies(state: State, vehicle: DifferentialDrive) -> tuple[Box, ...]:
     h = vehicle.dt
     speed = min(abs(state[3]) + vehicle.max_acceleration * h, max(vehicle.max_speed, -vehicle.min_speed))
     turn = min(abs(state[4]) + vehicle.max_turn_acceleration * h, vehicle.max_turn_rate)
-    reach = max(vehicle.front, vehicle.rear)
-    margin = half_way(h, speed, turn, reach, 0.5 * vehicle.width)
-    sin, cos = sincos(state[2])
-    return (box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin),)
+    return (leading_body(state, speed, turn, vehicle),)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from planners.world.jit import by_vehicle, inlined
 from planners.world.problem import Floats
-from planners.world.trigonometry import length
+from planners.world.trigonometry import length, sincos
 from planners.world.vehicle import Vehicle
 
 State = tuple[float, ...]
@@ -71,6 +71,12 @@ def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
 
 
 @inlined
+def kept_within(control: float, value: float, low: float, high: float, dt: float) -> float:
+    """The control, reduced where ``dt`` seconds of it would lead ``value`` out of ``low`` to ``high``."""
+    return min(max(control, (low - value) / dt), (high - value) / dt)
+
+
+@inlined
 def half_way(dt: float, speed: float, turn: float, reach: float, half_width: float) -> float:
     """Half of the farthest way, in metres, of a body's points in ``dt`` seconds.
 
@@ -88,3 +94,12 @@ def box_at(
     ahead = 0.5 * (front - rear)
     half_length = 0.5 * (front + rear) + margin
     return x + ahead * cos, y + ahead * sin, cos, sin, half_length, 0.5 * width + margin
+
+
+@inlined
+def leading_body(state: State, speed: float, turn: float, vehicle: Vehicle) -> Box:
+    """The swept box of the first body, which goes and turns at most so fast (m/s, rad/s) in a step."""
+    reach = max(vehicle.front, vehicle.rear)
+    margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
+    sin, cos = sincos(state[2])
+    return box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin)
