@@ -4,13 +4,12 @@
 checks, solved share, length and duration of the plans, and the paired difference of the mean time to the
 planner alone and to a fresh guide. First for all problems, then for those in which none of the k recalled
 plans is free: there closed box can only fail. Problems have a seed of their own: they are neither collected
-from, nor tuned or tested on. The memory is small, made here in a minute, and kept in the data folder.
+from, nor tuned or tested on. The memory is small, made here in a minute, and kept in build/speed.
 """
 
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -37,6 +36,7 @@ from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
 from tasks.caching import key_of
 
+KEPT = Path("build") / "speed"  # not the data folder: a run wants that empty or its own
 COLLECTING = 79  # seed of the stored experiences
 MEASURING = 80  # seed of the problems here
 EXPERIENCES = 100
@@ -61,9 +61,8 @@ EVERY = [
 
 
 def memory_of(name: str) -> Memory:
-    """A small memory of a class, from the data folder if it is there."""
-    data = Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
-    place = data / "speed" / f"{name}-{key_of(COLLECTING, EXPERIENCES, HALLUCINATED, EPOCHS)}"
+    """A small memory of a class, from where it is kept if it is there."""
+    place = KEPT / f"{name}-{key_of(COLLECTING, EXPERIENCES, HALLUCINATED, EPOCHS)}"
     try:
         return load_memory(place)
     except StorageError:
