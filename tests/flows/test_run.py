@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 
 from storage.layout import DataFolder, RunFolder
 from storage.memories import load_memory
 from tasks.settings import ABLATION, ASSISTS
+from tests.flows.same_rows import assert_same_rows, rows_of
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.timeout(600)  # three runs, on a machine that may be busy
@@ -46,28 +46,8 @@ def runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> tuple[RunF
     return two[0], one[0]
 
 
-def _rows(path: Path) -> pd.DataFrame:
-    rows: pd.DataFrame = pq.read_table(path, partitioning=None).to_pandas()
-    return rows
-
-
-def _equal(one: object, other: object) -> bool:
-    return bool(np.array_equal(np.asarray(one), np.asarray(other))) or (one != one and other != other)
-
-
 def test_one_worker_and_two_give_identical_rows_but_for_times(runs: tuple[RunFolder, RunFolder]) -> None:
-    two, one = runs
-    files = sorted(path.relative_to(two.path) for path in two.path.rglob("*.parquet"))
-    assert files == sorted(path.relative_to(one.path) for path in one.path.rglob("*.parquet"))
-    assert len(files) > 12
-    for file in files:
-        ours, theirs = _rows(two.path / file), _rows(one.path / file)
-        assert list(ours.columns) == list(theirs.columns)
-        assert len(ours) == len(theirs)
-        for name in ours.columns:
-            if not name.endswith("_seconds"):
-                pairs = zip(ours[name], theirs[name], strict=True)
-                assert all(_equal(a, b) for a, b in pairs), f"{file}: {name}"
+    assert len(assert_same_rows(*runs)) > 12
 
 
 def test_one_worker_and_two_give_identical_memories(runs: tuple[RunFolder, RunFolder]) -> None:
@@ -79,7 +59,7 @@ def test_one_worker_and_two_give_identical_memories(runs: tuple[RunFolder, RunFo
 
 
 def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolder]) -> None:
-    rows = pd.concat([_rows(path) for path in sorted(runs[0].results.rglob("*.parquet"))])
+    rows = pd.concat([rows_of(path) for path in sorted(runs[0].results.rglob("*.parquet"))])
     asked = rows.groupby(["problem_class", "planner", "assist", "top_k"])["problem_id"].nunique()
     assert (asked == 6).all()
     assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(ABLATION))
@@ -89,8 +69,10 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
 
 
 def test_collected_problems_are_never_tested_with(runs: tuple[RunFolder, RunFolder]) -> None:
-    collected = {identity for path in runs[0].shards("experiences", "trap") for identity in _rows(path)["id"]}
-    tested = set(_rows(runs[0].shard("results", "trap", 0))["problem_id"])
+    collected = {
+        identity for path in runs[0].shards("experiences", "trap") for identity in rows_of(path)["id"]
+    }
+    tested = set(rows_of(runs[0].shard("results", "trap", 0))["problem_id"])
     assert collected
     assert tested
     assert not collected & tested

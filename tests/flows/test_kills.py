@@ -1,0 +1,89 @@
+"""The main job, killed again and again: the same command goes on, and ends with an undisturbed run's rows."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from storage.layout import DataFolder, RunFolder
+from tests.flows.same_rows import assert_same_rows
+
+ROOT = Path(__file__).parents[2]
+KILLS = 20
+LONGEST_SECONDS = 30.0  # until a kill; a smoke run that has nothing left to do takes less
+SETTLED_SECONDS = 1.0  # a shard this old was finished: whoever wrote it had the time to say so
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
+
+
+def _start(data: Path, workers: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "flows.cli", "run", "--preset", "smoke", "--data", str(data)]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    with (data.parent / f"{data.name}.log").open("ab") as log:
+        return subprocess.Popen(
+            [*command, "--workers", str(workers)], cwd=ROOT, env=environment, stdout=log, stderr=log
+        )
+
+
+def _log(data: Path) -> str:
+    return (data.parent / f"{data.name}.log").read_text()[-3000:]
+
+
+def _finish(data: Path, workers: int) -> RunFolder:
+    assert _start(data, workers).wait(timeout=900) == 0, _log(data)
+    (run,) = DataFolder(data).runs()
+    return run
+
+
+def _kill_somebody(parent: subprocess.Popen[bytes], chance: random.Random) -> None:
+    """-9 to the command, to its workers' keepers or its server: whoever comes up."""
+    family = psutil.Process(parent.pid)
+    victims = [family, *family.children(recursive=True)]
+    victim = chance.choice(victims) if chance.random() < 0.5 else family
+    victim.kill()
+
+
+def _finished(data: Path) -> dict[Path, int]:
+    before = time.time() - SETTLED_SECONDS
+    stats = {path: path.stat() for path in (data / "runs").rglob("*.parquet")}
+    return {path: stat.st_mtime_ns for path, stat in stats.items() if stat.st_mtime < before}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return _finish(tmp_path_factory.mktemp("undisturbed") / "data", 2)
+
+
+def test_a_run_killed_twenty_times_ends_with_the_rows_of_an_undisturbed_one(
+    undisturbed: RunFolder, tmp_path: Path
+) -> None:
+    chance = random.Random(1)
+    data = tmp_path / "data"
+    finished: dict[Path, int] = {}
+    for _ in range(KILLS):
+        running = _start(data, 2)
+        time.sleep(chance.uniform(1.0, LONGEST_SECONDS))
+        if running.poll() is None:
+            finished = _finished(data) | finished
+            _kill_somebody(running, chance)
+            time.sleep(chance.uniform(0.0, 5.0))  # a killed worker is replaced meanwhile
+            running.kill()
+        running.wait()
+    run = _finish(data, 2)
+    again = [path for path, when in finished.items() if path.stat().st_mtime_ns != when]
+    assert not again, f"finished, and made once more: {again}"
+    assert_same_rows(run, undisturbed)
+
+
+@pytest.mark.parametrize("workers", [1, 4])
+def test_any_number_of_workers_gives_the_same_rows(
+    workers: int, undisturbed: RunFolder, tmp_path: Path
+) -> None:
+    assert_same_rows(_finish(tmp_path / "data", workers), undisturbed)
