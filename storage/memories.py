@@ -1,4 +1,4 @@
-"""Memories on disk: the encoder as ONNX, plans and centroids as safetensors, the rest as JSON."""
+"""Memories on disk: weights, plans and centroids as safetensors, the encoder as ONNX, the rest as JSON."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from planners.memory.encoder import Encoder
 from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.world.problem import Plan
 from planners.world.vehicle import CAR, Vehicle, state_size
@@ -21,7 +21,8 @@ from storage.errors import StorageError
 
 _KIND: Final = "memory"
 _TENSORS: Final = "tensors.safetensors"
-_ENCODER: Final = "encoder.onnx"
+_ENCODER: Final = "encoder.safetensors"
+_ONNX: Final = "encoder.onnx"  # the same network for other programs
 
 
 def save_memory(folder: Path, memory: Memory) -> None:
@@ -35,7 +36,8 @@ def save_memory(folder: Path, memory: Memory) -> None:
     }
     files = {
         _TENSORS: save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}),
-        _ENCODER: memory.encoder.model,
+        _ENCODER: save({name: np.ascontiguousarray(tensor) for name, tensor in memory.weights.items()}),
+        _ONNX: memory.encoder.model,
     }
     write_archive(folder, _KIND, memory.vehicle, header, files)
 
@@ -49,16 +51,18 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     try:
         tensors = load(files[_TENSORS])
         plans = _plans(tensors)
+        sweeps = sweep_plans(plans, vehicle)
         return Memory(
             class_name=header["class"],
             vehicle=vehicle,
             plans=plans,
-            sweeps=sweep_plans(plans, vehicle),
+            sweeps=sweeps,
+            masks=masks_of(sweeps),
             centroids=tensors["centroids"],
             vectors=tensors["vectors"],
             biases=tensors["biases"],
             objective=header["objective"],
-            encoder=Encoder(files[_ENCODER]),
+            weights=load(files[_ENCODER]),
             metadata=header["metadata"],
         )
     except (KeyError, ValueError, SafetensorError) as error:

@@ -9,6 +9,7 @@ import numpy as np
 
 from planners.memory.encoder import Encoder, Floats32, to_onnx
 from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.memory.training import TrainedEncoder
 from planners.world.occupancy import GRID, Grid
@@ -80,15 +81,17 @@ def build_memory(
     else:  # logits: recall unless the odds that no plan is free are that many times those of the best plan
         vectors, biases = trained.vectors, trained.biases.copy()
         biases[0] -= np.float32(np.log(NO_PLAN_ODDS))
+    sweeps = sweep_plans(plans, vehicle)
     return Memory(
         class_name=class_name,
         vehicle=vehicle,
         plans=tuple(plans),
-        sweeps=sweep_plans(plans, vehicle),
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
         centroids=centroids,
         vectors=vectors,
         biases=biases,
         objective=trained.settings.objective,
-        encoder=encoder,
+        weights=trained.weights,
         metadata=metadata or {},
     )

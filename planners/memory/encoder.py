@@ -108,7 +108,7 @@ def to_onnx(weights: Weights) -> bytes:
         [helper.make_tensor_value_info("embedding", TensorProto.FLOAT, ["n", dimensions])],
         [
             numpy_helper.from_array(np.array([-1, 1, GRID, GRID], np.int64), "image_shape"),
-            *(numpy_helper.from_array(np.asarray(weights[name]), name) for name in weights),
+            *(numpy_helper.from_array(np.asarray(weights[name]), name) for name in sorted(weights)),
         ],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)

@@ -7,13 +7,16 @@ learned vector and bias. Row 0 stands for "no stored plan is free": where it sco
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from planners.memory.encoder import Encoder, Floats32
+from planners.memory.encoder import Encoder, Floats32, Weights, to_onnx
 from planners.memory.labels import PlanSweeps
+from planners.memory.masks import Masks
 from planners.world.occupancy import Grid
 from planners.world.problem import Integers, Plan
 from planners.world.vehicle import Vehicle
@@ -21,27 +24,38 @@ from planners.world.vehicle import Vehicle
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """Stored plans and what finds them: encoder, centroids, readout. Plan ``i`` is row ``i + 1``."""
+    """Stored plans and what finds them: masks, encoder, centroids, readout. Plan ``i`` is row ``i + 1``."""
 
     class_name: str
     vehicle: Vehicle
-    plans: tuple[Plan, ...]  # N plans in the canonical frame
+    plans: Sequence[Plan]  # N plans in the canonical frame
     sweeps: PlanSweeps  # the same plans' swept boxes
+    masks: Masks  # [N, 64] and the cells of the occupancy grid that these meet, a bit each
     centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of the S_0 problems
     vectors: Floats32  # [N + 1, D] readout
     biases: Floats32  # [N + 1] readout
     objective: str  # what the encoder was trained for: "triplet" or "labels"
-    encoder: Encoder
+    weights: Weights  # of the encoder
     metadata: dict[str, Any] = field(default_factory=dict)  # JSON values only
 
     def __post_init__(self) -> None:
         rows = len(self.plans) + 1
+        if len(self.masks) != len(self.plans):
+            raise ValueError(
+                f"Memory has masks of {len(self.masks)} plans, {len(self.plans)} are stored. Were they built "
+                "together?"
+            )
         for name in ("centroids", "vectors", "biases"):
             if len(getattr(self, name)) != rows:
                 raise ValueError(
                     f"Memory has {len(getattr(self, name))} rows of {name}, {len(self.plans)} plans need "
                     f"{rows} (row 0 is 'no plan'). Were they built together?"
                 )
+
+    @functools.cached_property
+    def encoder(self) -> Encoder:
+        """What runs the encoder."""
+        return Encoder(to_onnx(self.weights))
 
 
 def scores(memory: Memory, embedding: Floats32) -> Floats32:

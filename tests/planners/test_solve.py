@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
+from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.labels import free_plans, sweep_plans
+from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
@@ -24,6 +25,7 @@ PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "
 def memory_that_prefers(biases):
     """Five plans through strewn boxes, ranked by ``biases`` whatever the problem; row 0 is "no plan"."""
     plans = tuple(plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5))
+    sweeps = sweep_plans(plans)
     network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
     weights = initial_weights(network, generator(0))
     zeros = np.zeros((6, 3), np.float32)
@@ -31,12 +33,13 @@ def memory_that_prefers(biases):
         class_name="test",
         vehicle=CAR,
         plans=plans,
-        sweeps=sweep_plans(plans),
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
         centroids=zeros,
         vectors=zeros,
         biases=np.array(biases, np.float32),
         objective="labels",
-        encoder=Encoder(to_onnx(weights)),
+        weights=weights,
     )
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
+from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.memory.training import Epoch, TrainedEncoder, TrainingSettings
 from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES, Vehicle
@@ -27,17 +28,19 @@ GRID = (np.random.default_rng(1).random((64, 64)) < 0.2).astype(np.uint8)
 def a_memory(plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR) -> Memory:
     rng = np.random.default_rng(seed)
     stored = tuple(plan(5 + i, seed + i, vehicle) for i in range(plans))
+    sweeps = sweep_plans(stored, vehicle)
     rows = (plans + 1, ARCHITECTURE.dimensions)
     return Memory(
         class_name="trap",
         vehicle=vehicle,
         plans=stored,
-        sweeps=sweep_plans(stored, vehicle),
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
         centroids=rng.normal(size=rows).astype(np.float32),
         vectors=rng.normal(size=rows).astype(np.float32),
         biases=np.array([-np.inf, *rng.normal(size=plans)], np.float32),
         objective="labels",
-        encoder=Encoder(to_onnx(WEIGHTS)),
+        weights=WEIGHTS,
         metadata={"run": "one", "problems": 120, "über": [1.5, None]},
     )
 
@@ -53,7 +56,7 @@ def test_a_memory_comes_back_exactly_and_gives_the_same_bytes(tmp_path: Path, pl
     loaded = load_memory(tmp_path / "one")
     for name in ("class_name", "vehicle", "objective", "metadata", "encoder"):
         assert getattr(loaded, name) == getattr(memory, name)
-    for name in ("centroids", "vectors", "biases"):
+    for name in ("centroids", "vectors", "biases", "masks"):
         assert np.array_equal(getattr(loaded, name), getattr(memory, name))
     assert all(map(same_plan, memory.plans, loaded.plans))
     assert all(np.array_equal(a, b) for a, b in zip(memory.sweeps, loaded.sweeps, strict=True))

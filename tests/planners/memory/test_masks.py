@@ -1,0 +1,71 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planners.memory.labels import free_plans, sweep_plans
+from planners.memory.masks import mask_of, masks_of
+from planners.world.bodies import swept_boxes
+from planners.world.collision import scene_of
+from planners.world.occupancy import occupancy_of
+from planners.world.problem import Plan
+from planners.world.randomness import generator
+from tests.worlds import strewn
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def wandering(seed: int) -> Plan:
+    """A plan that nobody could drive, 40 m in a few turns from somewhere in the window."""
+    rng = generator(seed, "masks")
+    headings = np.cumsum(rng.normal(0.0, 0.2, 100)) + rng.uniform(-math.pi, math.pi)
+    speeds = np.full(100, rng.uniform(-1.0, 4.0))
+    places = rng.uniform(0.0, 50.0, 2) + np.cumsum(
+        0.1 * speeds[:, None] * np.column_stack((np.cos(headings), np.sin(headings))), axis=0
+    )
+    return Plan(np.column_stack((places, headings, speeds, np.zeros(100))), np.zeros((99, 2)))
+
+
+def cells(mask):
+    return np.array([[bool(int(word) >> column & 1) for column in range(64)] for word in mask])
+
+
+@given(seed=SEEDS)
+def test_a_mask_is_the_grid_bit_by_bit(seed):
+    grid = (generator(seed).random((64, 64)) < 0.3).astype(np.uint8)
+    assert np.array_equal(cells(mask_of(grid)), grid)
+
+
+@given(seed=SEEDS)
+def test_masks_are_the_cells_that_the_sweep_meets(seed):
+    plan = wandering(seed)
+    boxes = swept_boxes(plan.states)
+    along, across = boxes[:, 2:4], boxes[:, 3:1:-1] * [-1.0, 1.0]
+    half_long, half_wide = boxes[:, 4:5] * along, boxes[:, 5:6] * across
+    corners = boxes[:, None, :2] + np.stack(
+        (-half_long - half_wide, half_long - half_wide, half_long + half_wide, half_wide - half_long), 1
+    )
+    sweep = shapely.union_all(shapely.polygons(corners))
+    left, bottom = np.meshgrid(np.arange(-7.0, 57.0), np.arange(-7.0, 57.0))
+    inside = bool(np.all((corners > -7.0) & (corners < 57.0)))
+    drawn = cells(masks_of(sweep_plans([plan]))[0])
+    if not inside:
+        assert drawn.all()
+        return
+    shared = shapely.area(shapely.intersection(shapely.box(left, bottom, left + 1, bottom + 1), sweep))
+    apart = shapely.distance(shapely.box(left, bottom, left + 1, bottom + 1), sweep)
+    assert drawn[shared > 1e-6].all()
+    assert not drawn[apart > 1e-5].any()
+
+
+@given(seed=SEEDS, count=st.integers(0, 40))
+def test_a_plan_whose_cells_no_obstacle_meets_is_free(seed, count):
+    problem = strewn(seed, count)
+    sweeps = sweep_plans([wandering(seed + i) for i in range(6)])
+    masks = masks_of(sweeps)
+    unmet = ~(masks & mask_of(occupancy_of(problem))).any(axis=1) & (masks != ~np.uint64(0)).any(axis=1)
+    assert free_plans(sweeps, scene_of(problem))[unmet].all()
