@@ -12,11 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.bodies import body_count, swept_boxes
+from planners.memory.stored_plans import Offsets, store_plans
+from planners.world.bodies import body_count
 from planners.world.collision import Scene, box_is_free
+from planners.world.dynamics import load, swept_bodies
 from planners.world.jit import inlined, jit
 from planners.world.problem import Floats, Integers, Plan
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicle import CAR, Vehicle, state_size
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -53,21 +55,26 @@ def coarse_to_fine(count: int) -> Integers:
     return order
 
 
+@jit
+def _fill_sweeps(states: Floats, starts: Offsets, vehicle: Vehicle, boxes: Floats) -> None:
+    filled = 0
+    for i in range(starts.shape[0] - 1):
+        for t in coarse_to_fine(starts[i + 1] - starts[i]):
+            for box in swept_bodies(load(states, starts[i] + t, vehicle), vehicle):
+                for k in range(6):
+                    boxes[filled, k] = box[k]
+                filled += 1
+
+
 def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
     """Pack the swept boxes of ``plans``."""
     each = body_count(vehicle)
-    boxes = [
-        swept_boxes(plan.states, vehicle)
-        .reshape(-1, each, 6)[coarse_to_fine(len(plan.states))]
-        .reshape(-1, 6)
-        for plan in plans
-    ]
-    return PlanSweeps(
-        np.concatenate(boxes) if boxes else np.empty((0, 6)),
-        np.cumsum([0] + [each * len(plan.states) for plan in plans], dtype=np.int32),
-        np.array([plan.states[0, :3] for plan in plans]).reshape(-1, 3),
-        np.array([plan.states[-1, :2] for plan in plans]).reshape(-1, 2),
-    )
+    stored = store_plans(plans, state_size(vehicle))
+    states, starts = stored.states, stored.starts
+    boxes = np.empty((each * len(states), 6))
+    _fill_sweeps(states, starts, vehicle, boxes)
+    first, last = states[starts[:-1]], states[starts[1:] - 1]
+    return PlanSweeps(boxes, (each * starts).astype(np.int32), first[:, :3].copy(), last[:, :2].copy())
 
 
 @inlined
