@@ -41,7 +41,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
-        tensors = load(files[_TENSORS])
+        tensors = load(bytes(files[_TENSORS]))
         sizes = header["settings"].pop("architecture")
         architecture = Architecture(tuple(sizes["channels"]), tuple(sizes["hidden"]), sizes["dimensions"])
         return TrainedEncoder(

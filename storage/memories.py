@@ -1,88 +1,129 @@
-"""Memories on disk: weights, plans and centroids as safetensors, the encoder as ONNX, the rest as JSON."""
+"""Memories on disk: an archive of the encoder, of what reads it out, and of the plans as plain arrays.
+
+Small things are safetensors; what grows with the plans lies in ``.npy`` files that stay on the disk until
+they are used. ``encoder.onnx`` is the same network for other programs; recall makes its own from the weights.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from planners.memory.encoder import Architecture, Floats32, Weights, architecture_of, to_onnx
 from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
-from planners.world.problem import Plan
+from planners.memory.stored_plans import StoredPlans, store_plans
+from planners.world.occupancy import GRID
 from planners.world.vehicle import CAR, Vehicle, state_size
-from storage.archives import read_archive, write_archive
-from storage.columns import Array
+from storage.archives import Contents, Files, read_archive, write_archive
+from storage.arrays import array_of
 from storage.errors import StorageError
 
 _KIND: Final = "memory"
-_TENSORS: Final = "tensors.safetensors"
-_ENCODER: Final = "encoder.safetensors"
-_ONNX: Final = "encoder.onnx"  # the same network for other programs
+_WEIGHTS: Final = "encoder.safetensors"
+_ONNX: Final = "encoder.onnx"
+_READOUT: Final = "readout.safetensors"
+_FILES: Final = {
+    _WEIGHTS, _ONNX, _READOUT, "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy"
+}  # fmt: skip
 
 
 def save_memory(folder: Path, memory: Memory) -> None:
     """Write a memory as a folder, whole or not at all; the same memory gives the same bytes."""
-    header = {"class": memory.class_name, "objective": memory.objective, "metadata": memory.metadata}
-    tensors = {
-        "centroids": memory.centroids,
-        "vectors": memory.vectors,
-        "biases": memory.biases,
-        **_plan_tensors(memory.plans, state_size(memory.vehicle)),
+    plans = store_plans(memory.plans, state_size(memory.vehicle))
+    header = {
+        "class": memory.class_name,
+        "objective": memory.objective,
+        "architecture": _sizes(architecture_of(memory.weights)),
+        "metadata": memory.metadata,
     }
-    files = {
-        _TENSORS: save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()}),
-        _ENCODER: save({name: np.ascontiguousarray(tensor) for name, tensor in memory.weights.items()}),
-        _ONNX: memory.encoder.model,
+    files: Files = {
+        _WEIGHTS: _tensors(memory.weights),
+        _ONNX: to_onnx(memory.weights),
+        _READOUT: _tensors(
+            {"centroids": memory.centroids, "vectors": memory.vectors, "biases": memory.biases}
+        ),
+        "states.npy": plans.states,
+        "controls.npy": plans.controls,
+        "plan_starts.npy": plans.starts,
+        "dt.npy": plans.dt,
+        "masks.npy": memory.masks,
     }
     write_archive(folder, _KIND, memory.vehicle, header, files)
 
 
 def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
-    """The memory in a folder.
+    """The memory in a folder; its plans and masks are read from the disk as they are used.
 
-    StorageError: missing, damaged, of a newer version, for another vehicle or another grid.
+    StorageError: missing, damaged, not as long as it says, of another version, for another vehicle or grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
-        tensors = load(files[_TENSORS])
-        plans = _plans(tensors)
-        sweeps = sweep_plans(plans, vehicle)
+        if files.keys() != _FILES:
+            odd = ", ".join(sorted(files.keys() ^ _FILES))
+            raise ValueError(f"it lacks or has too much of: {odd}")
+        weights, readout = load(bytes(files[_WEIGHTS])), load(bytes(files[_READOUT]))
+        sizes = _sizes(architecture_of(weights))
+        plans = _plans(files, state_size(vehicle))
+        rows = (len(plans) + 1, sizes["dimensions"])
+        shapes = {"centroids": rows, "vectors": rows, "biases": rows[:1]}
+        fitting = {name: tensor.shape for name, tensor in readout.items()} == shapes
+        if header["architecture"] != sizes or not fitting:
+            raise ValueError("its encoder, readout and plans do not fit each other")
+        _check_numbers(weights | readout)
         return Memory(
-            class_name=header["class"],
+            class_name=_text(header["class"]),
             vehicle=vehicle,
             plans=plans,
-            sweeps=sweeps,
-            masks=masks_of(sweeps),
-            centroids=tensors["centroids"],
-            vectors=tensors["vectors"],
-            biases=tensors["biases"],
-            objective=header["objective"],
-            weights=load(files[_ENCODER]),
-            metadata=header["metadata"],
+            sweeps=sweep_plans(plans, vehicle),
+            masks=array_of(files["masks.npy"], "<u8", (GRID,)),
+            **readout,
+            objective=_text(header["objective"]),
+            weights=weights,
+            metadata=dict(header["metadata"]),
         )
-    except (KeyError, ValueError, SafetensorError) as error:
+    except (KeyError, TypeError, ValueError, SafetensorError) as error:
         raise StorageError(f"{folder} is no whole memory ({error}); build it again.") from None
 
 
-def _plan_tensors(plans: Sequence[Plan], size: int) -> dict[str, Array]:
-    """All plans end to end; ``plan_starts [N + 1]`` says where each plan's states begin."""
+def _plans(files: Mapping[str, Contents], size: int) -> StoredPlans:
+    plans = StoredPlans(
+        array_of(files["states.npy"], "<f8", (size,)),
+        array_of(files["controls.npy"], "<f8", (2,)),
+        array_of(files["plan_starts.npy"], "<i8"),
+        array_of(files["dt.npy"], "<f8"),
+    )
+    for numbers in (plans.states, plans.controls, plans.dt):
+        if not (np.isfinite(numbers.min(initial=0.0)) and np.isfinite(numbers.max(initial=0.0))):
+            raise ValueError("its plans have numbers that are not finite")
+    return plans
+
+
+def _check_numbers(tensors: Mapping[str, Floats32]) -> None:
+    """Infinitely far centroids and impossible rows are fine; what is no number would compare as anything."""
+    for name, tensor in tensors.items():
+        if tensor.dtype != np.float32 or np.isnan(tensor).any():
+            raise ValueError(f"{name} is no array of float32 numbers")
+
+
+def _tensors(tensors: Weights) -> bytes:
+    return save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()})
+
+
+def _sizes(architecture: Architecture) -> dict[str, Any]:
+    """The architecture as JSON values."""
     return {
-        "states": np.concatenate([np.empty((0, size)), *(plan.states for plan in plans)]),
-        "controls": np.concatenate([np.empty((0, 2)), *(plan.controls for plan in plans)]),
-        "plan_starts": np.cumsum([0] + [len(plan.states) for plan in plans], dtype=np.int64),
-        "dt": np.array([plan.dt for plan in plans]),
+        name: list(size) if isinstance(size, tuple) else size for name, size in asdict(architecture).items()
     }
 
 
-def _plans(tensors: dict[str, Array]) -> tuple[Plan, ...]:
-    starts = tensors["plan_starts"][1:-1]
-    before = np.arange(1, len(starts) + 1)  # each plan has one control fewer than states
-    states = np.split(tensors["states"], starts)
-    controls = np.split(tensors["controls"], starts - before)
-    durations = tensors["dt"].tolist()
-    return tuple(Plan(*parts) for parts in zip(states, controls, durations, strict=False))
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{value!r:.40} is no text")
+    return value

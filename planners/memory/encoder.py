@@ -40,29 +40,55 @@ class Architecture:
             raise ValueError(f"{self} is no network: give a convolution, and sizes of at least 1")
 
 
-def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
-    """Weights to begin training with: normal, scaled for PReLU (He et al. 2015); biases zero."""
-    weights: Weights = {}
-
-    def add(name: str, shape: tuple[int, ...], slope_shape: tuple[int, ...] | None) -> None:
-        fan_in = float(np.prod(shape[1:]))
-        gain = 1.0 if slope_shape is None else 2.0 / (1.0 + PRELU_SLOPE**2)
-        weights[f"{name}.weight"] = rng.normal(0.0, np.sqrt(gain / fan_in), shape).astype(np.float32)
-        weights[f"{name}.bias"] = np.zeros(shape[0], np.float32)
-        if slope_shape is not None:
-            weights[f"{name}.slope"] = np.full(slope_shape, PRELU_SLOPE, np.float32)
-
+def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of the weights, layer by layer."""
+    shapes: dict[str, tuple[int, ...]] = {}
     inputs = 1
     for i, outputs in enumerate(architecture.channels):
         kernel = PATCH if i == 0 else 3
-        add(f"convolution.{i}", (outputs, inputs, kernel, kernel), (outputs, 1, 1))
+        shapes[f"convolution.{i}.weight"] = (outputs, inputs, kernel, kernel)
+        shapes[f"convolution.{i}.bias"] = (outputs,)
+        shapes[f"convolution.{i}.slope"] = (outputs, 1, 1)
         inputs = outputs
     width = inputs * (GRID // PATCH) ** 2
     for i, outputs in enumerate((*architecture.hidden, architecture.dimensions)):
-        last = i == len(architecture.hidden)
-        add(f"linear.{i}", (outputs, width), None if last else (outputs,))
+        shapes[f"linear.{i}.weight"] = (outputs, width)
+        shapes[f"linear.{i}.bias"] = (outputs,)
+        if i < len(architecture.hidden):
+            shapes[f"linear.{i}.slope"] = (outputs,)
         width = outputs
+    return shapes
+
+
+def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
+    """Weights to begin training with: normal, scaled for PReLU (He et al. 2015); biases zero."""
+    last = f"linear.{len(architecture.hidden)}.weight"
+    weights: Weights = {}
+    for name, shape in weight_shapes(architecture).items():
+        if name.endswith(".weight"):
+            gain = 1.0 if name == last else 2.0 / (1.0 + PRELU_SLOPE**2)
+            fan_in = float(np.prod(shape[1:]))
+            weights[name] = rng.normal(0.0, np.sqrt(gain / fan_in), shape).astype(np.float32)
+        else:
+            weights[name] = np.full(shape, 0.0 if name.endswith(".bias") else PRELU_SLOPE, np.float32)
     return weights
+
+
+def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
+    """The sizes of the network that has these weights; ValueError where they are none."""
+    try:
+        convolutions, linears = layer_counts(weights)
+        widths = [len(weights[f"linear.{i}.bias"]) for i in range(linears)]
+        architecture = Architecture(
+            tuple(len(weights[f"convolution.{i}.bias"]) for i in range(convolutions)),
+            tuple(widths[:-1]),
+            widths[-1],
+        )
+    except (KeyError, IndexError, TypeError, ValueError):
+        raise ValueError("these are no weights of an encoder: a layer is missing") from None
+    if {name: tensor.shape for name, tensor in weights.items()} != weight_shapes(architecture):
+        raise ValueError("these are no weights of an encoder: its layers do not fit each other")
+    return architecture
 
 
 def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:

@@ -8,7 +8,11 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
+from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.experience import Experience
+from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
+from planners.memory.recall import Memory
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
@@ -62,6 +66,31 @@ def plan(length: int, seed: int = 0, vehicle: Vehicle = CAR) -> Plan:
     """Some plan; it need not be driveable to be stored."""
     rng = np.random.default_rng(seed)
     return Plan(rng.normal(size=(length, state_size(vehicle))), rng.normal(size=(length - 1, 2)))
+
+
+ARCHITECTURE = Architecture(channels=(2, 3), hidden=(8,), dimensions=4)
+WEIGHTS = initial_weights(ARCHITECTURE, np.random.default_rng(0))
+
+
+def a_memory(plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR) -> Memory:
+    """Some memory; its readout means nothing."""
+    rng = np.random.default_rng(seed)
+    stored = tuple(plan(5 + i, seed + i, vehicle) for i in range(plans))
+    sweeps = sweep_plans(stored, vehicle)
+    rows = (plans + 1, ARCHITECTURE.dimensions)
+    return Memory(
+        class_name="trap",
+        vehicle=vehicle,
+        plans=stored,
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
+        centroids=rng.normal(size=rows).astype(np.float32),
+        vectors=rng.normal(size=rows).astype(np.float32),
+        biases=np.array([-np.inf, *rng.normal(size=plans)], np.float32),
+        objective="labels",
+        weights=WEIGHTS,
+        metadata={"run": "one", "problems": 120, "über": [1.5, None]},
+    )
 
 
 experiences = st.builds(Experience, problems(), st.builds(plan, st.integers(2, 20), st.integers(0, 99)))
