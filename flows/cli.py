@@ -100,7 +100,7 @@ def plan(
     planner: str = "gust",
     assist: str = "none",
     top_k: int = 5,
-    memory: Path | None = None,
+    memory: str | None = None,
     vehicle: str = "car",
     seed: int = 1,
     improve_seconds: float = 0.0,
@@ -120,7 +120,7 @@ def plan(
     top_k
         How many plans are recalled.
     memory
-        Folder of a run, or of one memory; built for the same vehicle.
+        Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
@@ -189,7 +189,7 @@ def solve(
     planner: str = "gust",
     assist: str = "none",
     top_k: int = 5,
-    memory: Path | None = None,
+    memory: str | None = None,
     vehicle: str = "car",
     seed: int = 1,
     improve_seconds: float = 0.0,
@@ -209,7 +209,7 @@ def solve(
     top_k
         How many plans are recalled.
     memory
-        Folder of a run, or of one memory; built for the same vehicle.
+        Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed

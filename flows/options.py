@@ -60,7 +60,9 @@ class Options:
     @property
     def folder(self) -> Path:
         """The data folder, given or by default."""
-        return self.data or Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
+        from tasks.settings import default_data
+
+        return self.data or default_data()
 
 
 def worker_count(asked: int | None) -> int:

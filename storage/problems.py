@@ -59,7 +59,7 @@ def write_problems(path: Path, problems: Sequence[Problem]) -> None:
     Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Reading gives the
     same problems back, exactly.
     """
-    rows = [_fields(problem) for problem in problems]
+    rows = [fields_of(problem) for problem in problems]
     match _format(path):
         case ".json":
             if len(rows) != 1:
@@ -192,7 +192,8 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _fields(problem: Problem) -> dict[str, Any]:
+def fields_of(problem: Problem) -> dict[str, Any]:
+    """The contract's object that describes a problem (``problem_of``)."""
     obstacles = problem.obstacles
     groups = np.diff(obstacles.obstacle_starts).tolist()
     fields: dict[str, Any] = {

@@ -17,8 +17,9 @@ from storage.memories import save_memory
 from storage.recalls import write_recalls
 from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done
-from tasks.settings import RunSettings
+from tasks.settings import COMBINED, RunSettings
 from tasks.train import problems_of_memory, train_chunks
+from tasks.worlds import class_settings
 
 HELD_OUT_SHARD: Final = 9999  # after all shards of fresh problems
 HELD_OUT_PROBLEMS: Final = 2_000  # enough for a share within 2 %
@@ -32,7 +33,12 @@ def build_chunk(chunk: Chunk) -> dict[str, Any]:
     problems = problems_of_memory(chunk.data, chunk.settings, name)
     seen = np.delete(np.arange(len(problems.plan_index)), trained.validation)
     plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
-    metadata = {"run": chunk.settings.run_name, "problems": len(seen)}
+    classes = chunk.settings.class_names if name == COMBINED else (name,)
+    metadata = {
+        "run": chunk.settings.run_name,
+        "problems": len(seen),
+        "classes": {each: class_settings(chunk.settings, each) for each in classes},
+    }
     memory = build_memory(
         trained, problems.grids[seen], problems.plan_index[seen], plans, name, vehicle, metadata
     )

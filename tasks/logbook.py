@@ -55,12 +55,12 @@ def log_training(
 
 
 def log_memories(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
-    """Each memory as an artifact of its training."""
+    """Each memory as a model, the archive in it, that its training brought forth."""
     log, run = tracker(data), run_folder(data, settings)
     for chunk in chunks:
         with _child(data, settings, f"train {chunk.class_name}") as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
-                log.artifacts(run_id, run.memory(chunk.class_name), "memory")
+                log.memory(run_id, "memory", run.memory(chunk.class_name), settings.vehicle)
                 log.mark_logged(run_id, chunk.key, "memory")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -117,6 +118,11 @@ class RunSettings:
         for name in ("classes", "worlds", "planners"):
             values[name] = tuple(values[name])
         return cls(**values)
+
+
+def default_data() -> Path:
+    """The data folder of a command that was given none: $MOTION_MEMORY_DATA or ./data."""
+    return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
 
 
 def world_class(folder: str) -> str:

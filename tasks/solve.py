@@ -16,11 +16,11 @@ from planners.world.problem import Plan, Problem
 from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.errors import StorageError
 from storage.files import whole_file
-from storage.memories import load_memory
 from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
 from storage.results import write_attempts
 from tasks.attempts import attempt_row, check_attempt
+from tasks.model_registry import is_model_uri, load_from
 from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known
 
 PICTURES: Final = (".png", ".svg", ".pdf")
@@ -34,7 +34,7 @@ class Assistant:
         planner: str,
         assist: str,
         top_k: int,
-        memory: Path | None,
+        memory: str | Path | None,
         seed: int,
         vehicle: str = DEFAULT_VEHICLE,
         improve_seconds: float = 0.0,
@@ -48,31 +48,22 @@ class Assistant:
         if seed < 0:
             raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
         if assist not in WITHOUT_MEMORY and memory is None:
-            raise UsageError(f"Assist {assist!r} needs --memory: the folder of a run, or of one memory.")
+            raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:
             raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
         self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
         self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
-        self._place = None if assist in WITHOUT_MEMORY else memory
-        self._memories: dict[Path, Memory] = {}
+        self._place = None if assist in WITHOUT_MEMORY or memory is None else str(memory)
+        self._memories: dict[str, Memory] = {}
 
     def memory_of(self, class_name: str) -> Memory | None:
         """The memory for problems of a class: its own, else the combined, else the only one there is."""
         if self._place is None:
             return None
-        memories = self._place / "memories"
-        candidates = [memories / class_name, memories / COMBINED, *memories.glob("[!.]*/")]
-        found = [folder for folder in candidates if (folder / "memory.json").is_file()]
-        several = len({folder.name for folder in found}) > 1 and found[0].name not in (class_name, COMBINED)
-        if several:
-            names = ", ".join(sorted(folder.name for folder in found))
-            raise RunError(
-                f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}."
-            )
-        folder = found[0] if found else self._place
-        if folder not in self._memories:
-            self._memories[folder] = load_memory(folder, self.vehicle)
-        return self._memories[folder]
+        place = self._place if is_model_uri(self._place) else _folder_of(class_name, Path(self._place))
+        if place not in self._memories:
+            self._memories[place] = load_from(place, self.vehicle)
+        return self._memories[place]
 
     def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
         """The attempt, its plan and the recalled plans, these in the frame of the problem."""
@@ -133,6 +124,18 @@ def solve_many(assistant: Assistant, problems: Path, out: Path, plans: Path | No
     write_attempts(out, rows)
     solved = sum(row["solved"] for row in rows)
     print(f"{solved} of {len(rows)} solved, rows in {out}")
+
+
+def _folder_of(class_name: str, place: Path) -> str:
+    """The folder of the memory for problems of a class: ``place`` itself, or one of the run's there."""
+    memories = place / "memories"
+    candidates = [memories / class_name, memories / COMBINED, *memories.glob("[!.]*/")]
+    found = [folder for folder in candidates if (folder / "memory.json").is_file()]
+    several = len({folder.name for folder in found}) > 1 and found[0].name not in (class_name, COMBINED)
+    if several:
+        names = ", ".join(sorted(folder.name for folder in found))
+        raise RunError(f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}.")
+    return str(found[0] if found else place)
 
 
 def _record(problem: Problem, attempt: Attempt, plan: Plan | None, vehicle: Vehicle) -> PlanRecord:

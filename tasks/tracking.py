@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.layout import DataFolder
@@ -26,12 +27,17 @@ KEY_TAG: Final = "motion_memory.key"  # what the logged content depends on
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
+def tracking_uri(data: DataFolder) -> str:
+    """Where MLflow is: as the user says, else a database in the data folder."""
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{data.mlflow_database}"
+
+
 class Tracker:
     """The runs of one data folder in MLflow."""
 
     def __init__(self, data: DataFolder) -> None:
         """Begin to connect; whatever is asked first waits for it."""
-        self.uri = os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{data.mlflow_database}"
+        self.uri = tracking_uri(data)
         self._artifacts = None if os.environ.get("MLFLOW_TRACKING_URI") else data.mlflow_artifacts.as_uri()
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._connect, name="mlflow", daemon=True)
@@ -122,6 +128,24 @@ class Tracker:
             self._client.log_artifacts(run_id, str(place), under)
         elif place.exists():
             self._client.log_artifact(run_id, str(place), under)
+
+    def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
+        """Log an archive as the model ``name`` that the run brought forth; the id of the model."""
+        from mlflow.entities import LoggedModelOutput
+        from mlflow.models.model import Model
+
+        from tasks.memory_model import save_memory_model
+
+        made = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
+        self._client.log_outputs(run_id, [LoggedModelOutput(made.model_id, step=0)])
+        with TemporaryDirectory(prefix="motion-memory-") as scratch:
+            folder = Path(scratch) / name
+            model = Model(made.artifact_location, run_id)
+            model.model_id = model.model_uuid = made.model_id
+            save_memory_model(folder, archive, vehicle, model)
+            self._client.log_model_artifacts(made.model_id, str(folder))
+        self._client.finalize_logged_model(made.model_id, "READY")
+        return str(made.model_id)
 
     def dataset(self, run_id: str, name: str, place: Path, digest: str, context: str) -> None:
         """Log which data went in (``context``: "training", "benchmark")."""

@@ -92,6 +92,19 @@ def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
     return [*drawn, settings.vehicle]
 
 
+def class_settings(settings: RunSettings, class_name: str) -> dict[str, Any]:
+    """What a memory says of the class it was made for: how problems are placed, or which worlds they are."""
+    if class_name not in settings.classes:
+        return {"worlds": class_name, "digest": source_key(settings, class_name)[0]}
+    drawn = problem_class(class_name, settings.difficulty)
+    return {"difficulty": drawn.difficulty, "seed": settings.seed, "layout": _named(drawn.layout)}
+
+
+def _named(value: Any) -> Any:
+    """Settings tuples as JSON objects."""
+    return {k: _named(v) for k, v in value._asdict().items()} if hasattr(value, "_asdict") else value
+
+
 def _part(folder: Path, purpose: Purpose) -> Path:
     return folder / f"{PARTS[purpose]}.parquet"
 

@@ -89,6 +89,7 @@ class ProblemClass:
 
     name: str
     difficulty: str
+    layout: Curves | Random | Trap
     draw_obstacles: Callable[[np.random.Generator], Obstacles]
 
     def draw(self, seed: int, index: int) -> Problem:
@@ -114,16 +115,20 @@ def problem_class(name: str, difficulty: str = "standard", vehicle: Vehicle = CA
         raise ValueError(f"Unknown problem class {name!r}; choose one of {', '.join(CLASSES)}.")
     if difficulty not in DIFFICULTIES:
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
+    layout: Curves | Random | Trap
     draw: Callable[[np.random.Generator], Obstacles]
     if name == "curves":
-        draw = partial(draw_curves, _CURVES[difficulty])
+        layout = _CURVES[difficulty]
+        draw = partial(draw_curves, layout)
     elif name == "random":
-        draw = partial(draw_random, _RANDOM[difficulty])
+        layout = _RANDOM[difficulty]
+        draw = partial(draw_random, layout)
     else:
-        draw = partial(draw_trap, _TRAP[difficulty])
+        layout = _TRAP[difficulty]
+        draw = partial(draw_trap, layout)
     if isinstance(vehicle, CarWithTrailers):
         draw = partial(_draw_with_room, draw, _trailer_rooms(vehicle))
-    return ProblemClass(name, difficulty, draw)
+    return ProblemClass(name, difficulty, layout, draw)
 
 
 def _draw_with_room(

@@ -1,0 +1,116 @@
+"""A memory as an MLflow model: problem JSON in, ranked plans out, checked and in the problem's own frame.
+
+The model is saved *from code*: it is the archive and ``memory_model_code.py``, three lines that import this
+file from the installed package. Nothing of it is pickled, and the archive is checked as any other.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+from mlflow.exceptions import MlflowException
+from mlflow.models import ModelSignature
+from mlflow.models.model import Model
+from mlflow.protos.databricks_pb2 import INVALID_PARAMETER_VALUE
+from mlflow.pyfunc import save_model
+from mlflow.pyfunc.model import PythonModel, PythonModelContext
+from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
+from mlflow.types.schema import Array
+
+from planners.memory.labels import plan_answers
+from planners.memory.recall import Memory, nearest, scores
+from planners.solve import turned
+from planners.world.alignment import from_canonical, to_canonical
+from planners.world.classes import problem_class
+from planners.world.collision import scene_of
+from planners.world.occupancy import occupancy_of
+from planners.world.problem import Problem
+from planners.world.vehicle import vehicle_named
+from storage.errors import StorageError
+from storage.files import parse_json
+from storage.memories import load_memory
+from storage.problems import fields_of, problem_of
+
+CODE: Final = Path(__file__).with_name("memory_model_code.py")
+ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
+REQUIREMENTS: Final = ("motion-memory",)  # given, so that MLflow infers none, which takes seconds
+TOP_K: Final = 5
+_ROWS: Final = Array(Array(DataType.double))
+SIGNATURE: Final = ModelSignature(
+    inputs=Schema([ColSpec(DataType.string, "problem")]),
+    outputs=Schema(
+        [
+            ColSpec(DataType.string, "problem_id"),
+            ColSpec(DataType.long, "rank"),  # from 1
+            ColSpec(DataType.long, "plan"),  # its number in the memory
+            ColSpec(DataType.boolean, "free"),  # it answers the problem: checked exactly
+            ColSpec(DataType.double, "score"),  # the encoder's, higher is better
+            ColSpec(DataType.double, "dt"),  # seconds
+            ColSpec(_ROWS, "states"),  # [T, S] in the problem's own frame
+            ColSpec(_ROWS, "controls"),  # [T - 1, 2]
+        ]
+    ),
+    params=ParamSchema([ParamSpec("top_k", DataType.long, TOP_K)]),
+)
+
+
+class MemoryModel(PythonModel):
+    """Recalls plans; a row of input is a problem as JSON text, a row of output is a plan."""
+
+    def load_context(self, context: PythonModelContext) -> None:
+        """Load and check the archive; a StorageError where it is not as it was written."""
+        self.vehicle = vehicle_named(context.model_config["vehicle"])
+        self.memory: Memory = load_memory(Path(context.artifacts[ARTIFACT]), self.vehicle)
+
+    def predict(
+        self,
+        context: PythonModelContext,
+        model_input: pd.DataFrame,
+        params: dict[str, Any] | None = None,
+    ) -> pd.DataFrame:
+        """The ``top_k`` best plans of each problem, best first; none where the memory says that none fits.
+
+        MlflowException: a problem is malformed or impossible; its message is one line.
+        """
+        top_k = (params or {}).get("top_k", TOP_K)
+        rows = [
+            row
+            for number, text in enumerate(model_input["problem"], start=1)
+            for row in self._ranked(self._problem(text, number), top_k)
+        ]
+        return pd.DataFrame(rows, columns=SIGNATURE.outputs.input_names())
+
+    def _problem(self, text: str, number: int) -> Problem:
+        try:
+            return problem_of(parse_json(text, "it"), f"problem-{number}", self.vehicle)
+        except (StorageError, ValueError) as error:
+            raise MlflowException(f"Problem {number}: {error}", INVALID_PARAMETER_VALUE) from None
+
+    def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
+        asked, alignment = to_canonical(problem)
+        embedding = self.memory.encoder(occupancy_of(asked))
+        known, scene = scores(self.memory, embedding)[1:], scene_of(asked)
+        rows = []
+        for rank, i in enumerate(nearest(self.memory, embedding, top_k), start=1):
+            free, _ = plan_answers(self.memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
+            plan = from_canonical(turned(self.memory.plans[i], asked.start[2]), alignment)
+            row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
+            rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
+        return rows
+
+
+def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:
+    """Write an archive and all that MLflow wants to load it as a model into a new folder."""
+    save_model(
+        folder,
+        python_model=str(CODE),
+        artifacts={ARTIFACT: str(archive)},
+        model_config={"vehicle": vehicle},
+        signature=SIGNATURE,
+        input_example=pd.DataFrame({"problem": [json.dumps(fields_of(problem_class("trap").draw(0, 0)))]}),
+        pip_requirements=list(REQUIREMENTS),
+        mlflow_model=model,
+    )
