@@ -85,7 +85,8 @@ def retrieval_curves(curve: pd.DataFrame) -> Figure:
     """
     title = "How often a recalled plan is free"
     if curve.empty:
-        return message_figure(title, "No recall to show: build a memory and run the benchmark first.")
+        return message_figure(title, "No recall to show: build a memory first.")
+    curve = curve[curve["recall"] == "centroid"]
     panels = list(curve[["panel", "memory"]].drop_duplicates().itertuples(index=False, name=None))
     note = (
         "fresh: new draws of the class; held-out: hallucinated problems kept from training.\n"

@@ -21,9 +21,17 @@ _HEADINGS: Final = (
     "checks",
 )  # fmt: skip
 _RETRIEVAL_HEADINGS: Final = (
-    "class", "memory", "protocol", "hit@1", "hit@5", "random@1", "random@5", "oracle", "abstains", "problems",
+    "class", "memory", "protocol", "recall", "origin@1", "origin@5", "hit@1", "hit@5", "oracle", "none",
+    "count",
 )  # fmt: skip
-_NAMES: Final = {"planner", "assist", "class", "memory", "protocol"}  # columns of words, set to the left
+_NAMES: Final = {
+    "planner",
+    "assist",
+    "class",
+    "memory",
+    "protocol",
+    "recall",
+}  # words, set to the left
 
 _Rows = list[list[str]]
 
@@ -48,16 +56,13 @@ def summary_markdown(summary: pd.DataFrame) -> str:
 
 def retrieval_table(retrieval: pd.DataFrame) -> Table:
     """Retrieval (``retrieval.summarise_retrieval``) for a terminal, in per cent of the problems."""
-    groups = [
-        [_retrieval_cells(row) for _, row in rows.iterrows()]
-        for _, rows in retrieval.groupby(["panel", "memory"], sort=False)
-    ]
-    return _rich("Retrieval, % of problems", _RETRIEVAL_HEADINGS, groups)
+    return _rich("Retrieval, % of problems", _RETRIEVAL_HEADINGS, _retrieval_groups(retrieval))
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
     """Retrieval as a Markdown table, in per cent of the problems."""
-    return _markdown(_RETRIEVAL_HEADINGS, [_retrieval_cells(row) for _, row in retrieval.iterrows()])
+    lines = [cells for group in _retrieval_groups(retrieval) for cells in group]
+    return _markdown(_RETRIEVAL_HEADINGS, lines)
 
 
 def as_csv(table: pd.DataFrame) -> str:
@@ -108,10 +113,41 @@ def _cells(row: pd.Series[Any] | None, decimals: int) -> list[str]:
     ]
 
 
+def _retrieval_groups(retrieval: pd.DataFrame) -> list[_Rows]:
+    """Lines of a class and memory; under the ways to recall, what plans picked blindly reach."""
+    groups = []
+    for _, of_memory in retrieval.groupby(["panel", "memory"], sort=False):
+        lines = []
+        for _, rows in of_memory.groupby("protocol", sort=False):
+            blind = rows.iloc[0].copy()
+            origin = [math.nan if math.isnan(blind["origin@1"]) else k / blind["plans"] for k in (1, 5)]
+            blind[["origin@1", "origin@5"]] = origin
+            blind[["hit@1", "hit@5"]] = blind[["random@1", "random@5"]].to_numpy()
+            blind[[f"{name}_sd@{k}" for name in ("origin", "hit") for k in (1, 5)]] = math.nan
+            blind[["recall", "nothing_recalled"]] = "random", 0.0
+            lines += [_retrieval_cells(row) for _, row in rows.iterrows()] + [_retrieval_cells(blind)]
+        groups.append(lines)
+    return groups
+
+
 def _retrieval_cells(row: pd.Series[Any]) -> list[str]:
-    shares = ("hit@1", "hit@5", "random@1", "random@5", "oracle", "nothing_recalled")
-    names = [str(row[column]) for column in ("panel", "memory", "protocol")]
-    return [*names, *[_percent(row[column]) for column in shares], f"{row['problems']:,}"]
+    names = [str(row[column]) for column in ("panel", "memory", "protocol", "recall")]
+    names[1] = "own" if names[0] == names[1] else names[1]
+    shares = [
+        _with_deviation(row[f"{name}@{k}"], row[f"{name}_sd@{k}"])
+        for name in ("origin", "hit")
+        for k in (1, 5)
+    ]
+    rest = [_percent(row["oracle"]), _percent(row["nothing_recalled"]), f"{row['problems']:,}"]
+    return [*names, *shares, *rest]
+
+
+def _with_deviation(share: float, deviation: float) -> str:
+    """A share in per cent, and its standard deviation over training seeds where there are several."""
+    if math.isnan(share):
+        return NOTHING
+    digits = 1 if deviation < 0.0995 else 0
+    return _percent(share) + ("" if math.isnan(deviation) else f"±{100.0 * deviation:.{digits}f}")
 
 
 def _percent(fraction: float) -> str:

@@ -1,4 +1,4 @@
-"""Build memories from encoders and experiences."""
+"""Build memories from encoders and experiences, and see what they recall."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from prefect import flow
 from tasks.build_memory import build_one_memory, is_built, memory_chunks
 from tasks.engine import fan_out, task_runner
 from tasks.logbook import log_memories
+from tasks.recalls import is_recalled, recall_chunks, recall_problems
+from tasks.report import report_retrieval, show_retrieval
 from tasks.settings import RunSettings
 
 
 @flow(name="build-memory", task_runner=task_runner())
 def build_memory(settings: RunSettings, data: str) -> None:
-    """Join encoder, centroids and plans into one archive a memory, and see what it recalls."""
+    """Join encoder, centroids and plans into one archive a memory, and measure what it recalls."""
     chunks = memory_chunks(data, settings)
-    fan_out(build_one_memory, chunks, "build memories", is_built)
-    log_memories(data, settings, chunks)
+    built = fan_out(build_one_memory, chunks, "build memories", is_built)
+    fan_out(recall_problems, recall_chunks(data, settings), "recall", is_recalled)
+    found = report_retrieval(data, settings)
+    log_memories(data, settings, chunks, built, found)
+    show_retrieval(found)

@@ -242,6 +242,11 @@ def _do(stage: str, options: Options) -> None:
         strict=options.strict,
         vehicle=options.vehicle,
         optimised=options.optimised,
+        experiences=options.experiences,
+        problems_per_experience=options.problems_per_experience,
+        test_problems=options.test_problems,
+        epochs=options.epochs,
+        learning=options.learning,
     )
     run_stage(
         f"flows.{stage}",

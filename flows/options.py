@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 from cyclopts import Parameter
+
+_LEARNING: Final = (
+    "patience", "learning_rate", "origin_weight", "margin", "semi_hard", "channels", "hidden", "dimensions",
+)  # fmt: skip
 
 
 @Parameter(name="*")
@@ -41,6 +45,32 @@ class Options:
         Stop at a bad world instead of skipping it.
     optimised
         Make collected plans shorter and clearer before they are kept: about a second each.
+    experiences
+        Solved problems kept a class; default by preset, as the next three.
+    problems_per_experience
+        Problems hallucinated for each of them.
+    test_problems
+        New problems a class to measure with.
+    epochs
+        Epochs of training, at most.
+    training_seeds
+        Encoders trained a memory, each from a seed of its own; the best on validation problems is kept.
+    patience
+        Epochs without improvement after which a training ends.
+    learning_rate
+        The highest of its schedule.
+    origin_weight
+        Objective labels: how much the plan a problem was made for should come before others that are free.
+    margin
+        Objective triplet: how much farther a dissimilar problem should be than a similar one.
+    semi_hard
+        Objective triplet: learn only from triplets within the margin.
+    channels
+        Widths of the encoder's convolutions.
+    hidden
+        Widths of its fully connected layers.
+    dimensions
+        Of the embedding.
 
     """
 
@@ -56,6 +86,19 @@ class Options:
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
     optimised: Annotated[bool, Parameter(negative=())] = False
+    experiences: int | None = None
+    problems_per_experience: int | None = None
+    test_problems: int | None = None
+    epochs: int | None = None
+    training_seeds: int | None = None
+    patience: int | None = None
+    learning_rate: float | None = None
+    origin_weight: float | None = None
+    margin: float | None = None
+    semi_hard: Annotated[bool | None, Parameter(negative=())] = None
+    channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
+    hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
+    dimensions: int | None = None
 
     @property
     def folder(self) -> Path:
@@ -63,6 +106,12 @@ class Options:
         from tasks.settings import default_data
 
         return self.data or default_data()
+
+    @property
+    def learning(self) -> dict[str, Any]:
+        """What was asked for of the fields of ``tasks.learning.Learning``."""
+        asked = {name: getattr(self, name) for name in _LEARNING} | {"seeds": self.training_seeds}
+        return {name: value for name, value in asked.items() if value is not None}
 
 
 def worker_count(asked: int | None) -> int:

@@ -19,18 +19,16 @@ from storage.errors import StorageError
 _KIND: Final = "encoder"
 _TENSORS: Final = "tensors.safetensors"
 _WEIGHT: Final = "weights."  # before the names of the network's own tensors
+_ARRAYS: Final = ("centroids", "vectors", "biases", "popularity", "held_out")
 
 
 def save_encoder(folder: Path, trained: TrainedEncoder, vehicle: Vehicle = CAR) -> None:
     """Write a trained encoder as a folder, whole or not at all; the same one gives the same bytes."""
-    tensors = {
-        **{_WEIGHT + name: tensor for name, tensor in trained.weights.items()},
-        "history": np.array(trained.history, np.float64).reshape(-1, len(Epoch._fields)),
-        "validation": trained.validation,
-    }
-    if trained.vectors is not None and trained.biases is not None:
-        tensors |= {"vectors": trained.vectors, "biases": trained.biases}
-    data = save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()})
+    tensors = {_WEIGHT + name: tensor for name, tensor in trained.weights.items()}
+    tensors |= {name: getattr(trained, name) for name in _ARRAYS}
+    history = np.array(trained.history, np.float64).reshape(-1, len(Epoch._fields))
+    arrays = {**tensors, "history": history}
+    data = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
     write_archive(folder, _KIND, vehicle, {"settings": asdict(trained.settings)}, {_TENSORS: data})
 
 
@@ -51,10 +49,8 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
                 for name, tensor in tensors.items()
                 if name.startswith(_WEIGHT)
             },
-            vectors=tensors.get("vectors"),
-            biases=tensors.get("biases"),
+            **{name: tensors[name] for name in _ARRAYS},
             history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in tensors["history"].tolist()),
-            validation=tensors["validation"],
         )
     except (KeyError, TypeError, ValueError, SafetensorError) as error:
         raise StorageError(f"{folder} is no whole encoder ({error}); train it again.") from None

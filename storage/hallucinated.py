@@ -20,7 +20,7 @@ class Labelled(NamedTuple):
     """What training needs of n problems; bits are packed most significant first, as ``np.packbits`` does."""
 
     grids: Bits  # uint8 [n, 512] occupancy 64 x 64, row by row
-    plan_index: Integers  # int32 [n] the plan a problem was made from; -1: no stored plan is free
+    plan_index: Integers  # int32 [n] the plan a problem was made for; -1: for none
     labels: Bits  # uint8 [n, ceil(N / 8)] which plans are free
     plans: int  # N
 
@@ -76,6 +76,12 @@ def read_hallucinated_problems(path: Path) -> list[Problem]:
     """The problems of one shard, without their labels."""
     table = read_table(path, hallucinated(plans_of(path)))
     return problems_of(table)
+
+
+def read_methods(path: Path) -> list[str]:
+    """By which method each problem of a shard was made."""
+    table = read_table(path, hallucinated(plans_of(path)), ["method"])
+    return [str(method) for method in table["method"].to_pylist()]
 
 
 def plans_of(path: Path) -> int:

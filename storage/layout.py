@@ -59,9 +59,9 @@ class RunFolder:
         """The experiences of a class once all are collected."""
         return self.path / "experiences" / f"{checked_name(class_name)}.parquet"
 
-    def model(self, class_name: str) -> Path:
-        """The folder of a class's trained encoder."""
-        return self.path / "models" / checked_name(class_name)
+    def model(self, class_name: str, seed: int = 0) -> Path:
+        """The folder of a class's encoder, trained with the seed of that number."""
+        return self.path / "models" / checked_name(class_name) / str(seed)
 
     def memory(self, class_name: str) -> Path:
         """The folder of a class's memory."""

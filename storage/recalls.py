@@ -8,26 +8,33 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 
-from storage.columns import bits_of, lists_of
+from storage.columns import bits_column, bits_of, list_column, lists_of
 from storage.hallucinated import plans_of
-from storage.results import tables_below
 from storage.schemas import recalls
-from storage.shards import read_table, table_of, write_table
+from storage.shards import read_table, write_table
 
 
 def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key: str = "") -> None:
-    """Write recall rows: ``problem_id, class, memory, protocol, order, free, nothing_recalled``.
+    """Write recall rows with the fields of ``storage.schemas.recalls``.
 
-    ``order``: the numbers of all plans, best first. ``free``: one truth value a plan.
+    ``order``: the numbers of all plans, best first. ``free``: one truth value a plan. KeyError where a row
+    lacks a field.
     """
-    packed = [{**row, "free": np.packbits(np.asarray(row["free"], bool)).tobytes()} for row in rows]
-    write_table(path, table_of(packed, recalls(plans), "recall"), key)
+    schema = recalls(plans)
+    columns = {name: [row[name] for row in rows] for name in schema.names}
+    free = np.array(columns["free"], bool).reshape(-1, plans)
+    arrays = {
+        "order": list_column(columns["order"], np.int16),
+        "free": bits_column(np.packbits(free, axis=1)),
+    }
+    write_table(path, pa.table(columns | arrays, schema=schema), key)
 
 
-def read_recalls(place: Path) -> pd.DataFrame:
-    """All recall rows of a file or below a folder; ``order`` holds int16 arrays, ``free`` bool arrays."""
-    return pd.concat([_read(path) for path in tables_below(place, "benchmark")], ignore_index=True)
+def read_recalls(paths: Sequence[Path]) -> pd.DataFrame:
+    """The recall rows of some shards; ``order`` holds int16 arrays, ``free`` bool arrays."""
+    return pd.concat([_read(path) for path in paths], ignore_index=True)
 
 
 def _read(path: Path) -> pd.DataFrame:

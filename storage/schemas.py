@@ -70,7 +70,7 @@ def hallucinated(plans: int) -> pa.Schema:
         [
             *_PROBLEM,
             *_GEOMETRY,
-            ("plan_index", pa.int32()),  # the plan it was made from; -1: no stored plan is free
+            ("plan_index", pa.int32()),  # the plan it was made for; -1: for none
             ("method", pa.string()),
             ("grid", pa.binary(GRID_BYTES)),  # occupancy, row by row, most significant bit first
             ("labels", pa.binary((plans + 7) // 8)),  # most significant bit first
@@ -130,6 +130,9 @@ def recalls(plans: int) -> pa.Schema:
             ("order", pa.list_(pa.int16())),  # all plans, the best first
             ("free", pa.binary((plans + 7) // 8)),  # which plans are free, most significant bit first
             ("nothing_recalled", pa.bool_()),
+            ("recall", pa.string()),  # what ranked the plans: centroid, or the control popularity
+            ("training_seed", pa.int32()),  # number of the seed that the encoder was trained with, from 0
+            ("made_for", pa.int32()),  # the plan that a held-out problem was made for; -1: none
         ],
         plans=str(plans),
     )

@@ -5,19 +5,14 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from planners.memory.labels import free_plans
-from planners.memory.recall import Memory, rank
+from planners.memory.recall import Memory
 from planners.solve import WITHOUT_MEMORY, Attempt, solve
-from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
 from storage.memories import load_memory
-from storage.recalls import write_recalls
 from storage.results import write_attempts
 from storage.shards import shard_is_done
 from tasks.attempts import attempt_row, check_attempt
@@ -28,7 +23,6 @@ from tasks.warm_up import compile_repair
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
-COMBINED_SHARDS: Final = 1000  # a class, in the folder of the combined memory's recall rows
 
 
 class Configuration(NamedTuple):
@@ -58,7 +52,7 @@ def memories_of(settings: RunSettings, class_name: str) -> list[str]:
 
 
 def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Solve a range of unseen problems in every way, check the plans, write attempts and recalls."""
+    """Solve a range of unseen problems in every way, check the plans, write the attempts."""
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
     vehicle = vehicle_named(settings.vehicle)
@@ -66,7 +60,6 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
     asked = configurations(settings, name)
     rows: list[dict[str, Any]] = []
-    recalls: dict[str, list[dict[str, Any]]] = {memory: [] for memory in memories}
     compile_repair(vehicle)
     for asked_first in asked:  # code and caches are warm before the first time counts
         _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
@@ -79,11 +72,7 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
             for i in range(len(asked)):
                 check_attempt(problem, attempts[i], checked, vehicle)
                 rows.append(attempt_row(attempts[i], asked[i].memory, settings.run_name, vehicle))
-            for memory, recalled in recalls.items():
-                recalled.append(_recall(problem, memories[memory], memory))
             gc.collect()
-    for memory, path in _recall_paths(chunk).items():
-        write_recalls(path, recalls[memory], plans=len(memories[memory].plans), key=chunk.key)
     write_attempts(chunk.run.shard("results", name, chunk.index), rows, key=chunk.key)
     return {"attempts": len(rows), "solved": sum(row["solved"] for row in rows)}
 
@@ -92,9 +81,8 @@ benchmark_problems = chunk_task(benchmark_chunk)
 
 
 def is_benchmarked(chunk: Chunk) -> bool:
-    """Whether the chunk's attempts and recalls are there."""
-    paths = [chunk.run.shard("results", chunk.class_name, chunk.index), *_recall_paths(chunk).values()]
-    return all(shard_is_done(path, chunk.key) for path in paths)
+    """Whether the chunk's attempts are there."""
+    return shard_is_done(chunk.run.shard("results", chunk.class_name, chunk.index), chunk.key)
 
 
 def benchmark_chunks(data: str, settings: RunSettings) -> list[Chunk]:
@@ -127,27 +115,6 @@ def _attempt(
     vehicle = vehicle_named(settings.vehicle)
     assist, top_k = asked.assist
     return solve(problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle)
-
-
-def _recall(problem: Problem, memory: Memory, name: str) -> dict[str, Any]:
-    order, nothing = rank(memory, occupancy_of(problem))
-    return {
-        "problem_id": problem.id,
-        "class": problem.class_name,
-        "memory": name,
-        "protocol": "fresh",
-        "order": order,
-        "free": free_plans(memory.sweeps, scene_of(problem)),
-        "nothing_recalled": nothing,
-    }
-
-
-def _recall_paths(chunk: Chunk) -> dict[str, Path]:
-    own = {chunk.class_name: chunk.run.shard("recalls", chunk.class_name, chunk.index)}
-    if not chunk.settings.combined:
-        return own
-    index = COMBINED_SHARDS * chunk.settings.class_names.index(chunk.class_name) + chunk.index
-    return own | {COMBINED: chunk.run.shard("recalls", COMBINED, index)}
 
 
 @contextmanager

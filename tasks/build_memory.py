@@ -1,85 +1,77 @@
-"""Build a memory: encoder, centroids and plans as one archive; and what it recalls on problems held out."""
+"""Build a memory: encoder, centroids and plans as one archive."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
-from planners.memory.centroids import build_memory
-from planners.memory.recall import Memory, rank
-from planners.world.occupancy import GRID
+from planners.memory.build_memory import build_memory
+from planners.memory.recall import Memory
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
 from storage.experiences import read_experiences
-from storage.hallucinated import Labelled
 from storage.memories import save_memory
-from storage.recalls import write_recalls
-from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done
 from tasks.settings import COMBINED, RunSettings
-from tasks.train import problems_of_memory, train_chunks
+from tasks.train import memory_names, train_chunks
 from tasks.worlds import class_settings
-
-HELD_OUT_SHARD: Final = 9999  # after all shards of fresh problems
-HELD_OUT_PROBLEMS: Final = 2_000  # enough for a share within 2 %
 
 
 def build_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Build one memory and write its recall of the problems that training did not see."""
-    name, run = chunk.class_name, chunk.run
+    """Build one memory, of the encoder that is best on the validation problems; the first of equals."""
+    built = memories_by_seed(chunk)
     vehicle = vehicle_named(chunk.settings.vehicle)
-    trained = load_encoder(run.model(name), vehicle)
-    problems = problems_of_memory(chunk.data, chunk.settings, name)
-    seen = np.delete(np.arange(len(problems.plan_index)), trained.validation)
-    plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
-    classes = chunk.settings.class_names if name == COMBINED else (name,)
-    metadata = {
-        "run": chunk.settings.run_name,
-        "problems": len(seen),
-        "classes": {each: class_settings(chunk.settings, each) for each in classes},
-    }
-    memory = build_memory(
-        trained, problems.grids[seen], problems.plan_index[seen], plans, name, vehicle, metadata
-    )
-    save_memory(run.memory(name), memory)
-    rows = _held_out(memory, name, problems, trained.validation.tolist())
-    write_recalls(run.shard("recalls", name, HELD_OUT_SHARD), rows, plans=len(plans), key=chunk.key)
-    mark_done(run.memory(name), chunk.key)
-    return {"plans": len(plans), "held_out": len(rows)}
+    scores = [
+        load_encoder(chunk.run.model(chunk.class_name, seed), vehicle).score for seed in range(len(built))
+    ]
+    best = scores.index(max(scores))
+    save_memory(chunk.run.memory(chunk.class_name), built[best])
+    mark_done(chunk.run.memory(chunk.class_name), chunk.key)
+    return {"plans": len(built[best].plans), "training_seed": best}
 
 
 build_one_memory = chunk_task(build_chunk)
 
 
 def is_built(chunk: Chunk) -> bool:
-    """Whether the memory and its recall rows are there."""
-    recalls = chunk.run.shard("recalls", chunk.class_name, HELD_OUT_SHARD)
-    return is_marked(chunk.run.memory(chunk.class_name), chunk.key) and shard_is_done(recalls, chunk.key)
+    """Whether the memory is there."""
+    return is_marked(chunk.run.memory(chunk.class_name), chunk.key)
 
 
 def memory_chunks(data: str, settings: RunSettings) -> list[Chunk]:
     """One chunk for each memory."""
+    parts = train_chunks(data, settings)
     return [
         chunk
-        for part in train_chunks(data, settings)
-        for chunk in chunks_of(data, settings, "build-memory", part.class_name, 1, 1, [part.key])
+        for name in memory_names(settings)
+        for chunk in chunks_of(
+            data,
+            settings,
+            "build-memory",
+            name,
+            1,
+            1,
+            [part.key for part in parts if part.class_name == name],
+        )
     ]
 
 
-def _held_out(memory: Memory, name: str, problems: Labelled, held_out: list[int]) -> list[dict[str, Any]]:
-    rows = []
-    for i in [i for i in held_out if problems.plan_index[i] >= 0][:HELD_OUT_PROBLEMS]:
-        order, nothing = rank(memory, np.unpackbits(problems.grids[i]).reshape(GRID, GRID))
-        rows.append(
-            {
-                "problem_id": f"{name}-held-out-{i}",
-                "class": name,
-                "memory": name,
-                "protocol": "held-out",
-                "order": order,
-                "free": np.unpackbits(problems.labels[i], count=problems.plans).astype(bool),
-                "nothing_recalled": nothing,
-            }
+def memories_by_seed(chunk: Chunk) -> list[Memory]:
+    """The memory of a chunk with the encoder of each training seed."""
+    name, run, settings = chunk.class_name, chunk.run, chunk.settings
+    vehicle = vehicle_named(settings.vehicle)
+    plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
+    classes = settings.class_names if name == COMBINED else (name,)
+    metadata = {
+        "run": settings.run_name,
+        "classes": {each: class_settings(settings, each) for each in classes},
+    }
+    return [
+        build_memory(
+            load_encoder(run.model(name, seed), vehicle),
+            plans,
+            name,
+            vehicle,
+            metadata | {"training_seed": seed},
         )
-    return rows
+        for seed in range(settings.learning.seeds)
+    ]

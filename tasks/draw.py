@@ -30,8 +30,9 @@ SHOWN_EACH: Final = 2
 def draw_chunk(chunk: Chunk) -> dict[str, Any]:
     """Draw the figures of one memory."""
     run, name = chunk.run, chunk.class_name
-    history = load_encoder(run.model(name), vehicle_named(chunk.settings.vehicle)).history
-    epochs = pd.DataFrame(epoch._asdict() for epoch in history)
+    vehicle = vehicle_named(chunk.settings.vehicle)
+    seed = load_memory(run.memory(name), vehicle).metadata["training_seed"]
+    epochs = pd.DataFrame(epoch._asdict() for epoch in load_encoder(run.model(name, seed), vehicle).history)
     drawn = save(training_curves(epochs), run.figures, f"training-{name}")
     if name in chunk.settings.class_names:
         drawn += save(

@@ -15,7 +15,12 @@ from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
 from storage.experiences import read_experiences
-from storage.hallucinated import read_hallucinated_problems, read_labelled, write_hallucinated
+from storage.hallucinated import (
+    read_hallucinated_problems,
+    read_labelled,
+    read_methods,
+    write_hallucinated,
+)
 from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.collect import experiences_key
@@ -25,11 +30,16 @@ from tasks.worlds import source_key, source_of
 CHUNK_PROBLEMS: Final = 5_000  # some 10 s of work
 METHOD: Final = "rearrange"
 NO_PLAN: Final = "no-plan"
-NO_PLAN_SHARE: Final = 0.05  # problems of S_0 for each one that some plan solves
+NO_PLAN_SHARE: Final = 0.05  # problems of S_0 for each one that is made for a plan
+DRAWN: Final = "drawn"
+DRAWN_SHARE: Final = 0.5  # likewise of problems as the class has them
 
 
 def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Make the problems of a range of experiences, and a share of problems that no stored plan solves."""
+    """Make the problems of a range of experiences, problems that no plan solves, and some as they come.
+
+    The last are what a robot meets: labelled like the others, they teach which plans are free there.
+    """
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
     vehicle = vehicle_named(settings.vehicle)
@@ -47,7 +57,12 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     for index in range(chunk.index * unsolved, (chunk.index + 1) * unsolved):
         rng = generator(settings.seed, NO_PLAN, name, index)
         problems.append(no_plan(sweeps, source.draw, rng, name, index, bounds))
-    _write(chunk, problems, plan_index + [-1] * unsolved, sweeps)
+    wanted = round(DRAWN_SHARE * settings.experiences * settings.problems_per_experience)
+    drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
+    first, last = (drawn * i // settings.experiences for i in (chunk.first, chunk.last))
+    problems += [source.problem("collect", index) for index in range(first, last)]
+    methods = [METHOD] * len(plan_index) + [NO_PLAN] * unsolved + [DRAWN] * (last - first)
+    _write(chunk, problems, plan_index + [-1] * (unsolved + last - first), methods, sweeps)
     return {"problems": len(problems)}
 
 
@@ -92,7 +107,7 @@ def relabel_chunk(chunk: Chunk) -> dict[str, Any]:
     vehicle = vehicle_named(settings.vehicle)
     experiences = read_experiences(run.experiences(COMBINED), vehicle)
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
-    _write(chunk, read_hallucinated_problems(place), plan_index, sweeps)
+    _write(chunk, read_hallucinated_problems(place), plan_index, read_methods(place), sweeps)
     return {"problems": len(plan_index)}
 
 
@@ -108,18 +123,21 @@ def relabel_chunks(data: str, settings: RunSettings) -> list[Chunk]:
     return chunks_of(data, settings, "relabel", COMBINED, len(keys), 1, inputs)
 
 
-def _write(chunk: Chunk, problems: Sequence[Problem], plan_index: Sequence[int], sweeps: PlanSweeps) -> None:
-    """Write problems, grids and labels; one made for no plan (-1) that some plan solves is that plan's."""
+def _write(
+    chunk: Chunk,
+    problems: Sequence[Problem],
+    plan_index: Sequence[int],
+    methods: Sequence[str],
+    sweeps: PlanSweeps,
+) -> None:
+    """Write problems, grids and labels; those made for no plan have plan index -1."""
     grids = np.stack([np.packbits(occupancy_of(problem)) for problem in problems])
     free = np.stack([free_plans(sweeps, scene_of(problem)) for problem in problems])
-    made_for = np.asarray(plan_index, np.int32)
     write_hallucinated(
         chunk.run.shard("hallucinated", chunk.class_name, chunk.index),
         problems,
-        plan_index=np.where((made_for < 0) & free.any(axis=1), free.argmax(axis=1), made_for).astype(
-            np.int32
-        ),
-        methods=[METHOD if i >= 0 else NO_PLAN for i in plan_index],
+        plan_index=plan_index,
+        methods=methods,
         grids=grids,
         labels=np.packbits(free, axis=1),
         plans=free.shape[1],

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
+import pandas as pd
+
 from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
@@ -42,11 +44,12 @@ def log_training(
     """One child run for each encoder: parameters, metrics of every epoch, the data it learned from."""
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in zip(chunks, results, strict=True):
-        with _child(data, settings, f"train {chunk.class_name}") as run_id:
+        with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
-            names = ("objective", "seed", "vehicle")
-            asked = {"class": chunk.class_name} | {name: getattr(settings, name) for name in names}
+            asked = {name: getattr(settings, name) for name in ("objective", "epochs", "vehicle")}
+            asked |= {"class": chunk.class_name, "seed": settings.seed + chunk.index}
+            asked |= asdict(settings.learning)
             log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
             log.metrics(run_id, result["epochs"], step="epoch")
             place = run.path / "hallucinated" / chunk.class_name
@@ -54,13 +57,22 @@ def log_training(
             log.mark_logged(run_id, chunk.key)
 
 
-def log_memories(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
-    """Each memory as a model, the archive in it, that its training brought forth."""
+def log_memories(
+    data: str,
+    settings: RunSettings,
+    chunks: Sequence[Chunk],
+    results: Sequence[dict[str, Any]],
+    retrieval: pd.DataFrame,
+) -> None:
+    """Each memory as a model that its training brought forth, what it recalls as metrics, and all curves."""
     log, run = tracker(data), run_folder(data, settings)
-    for chunk in chunks:
-        with _child(data, settings, f"train {chunk.class_name}") as run_id:
+    for chunk, result in zip(chunks, results, strict=True):
+        name = chunk.class_name
+        with _child(data, settings, _stage(settings, name, result["training_seed"])) as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
-                log.memory(run_id, "memory", run.memory(chunk.class_name), settings.vehicle)
+                log.memory(run_id, "memory", run.memory(name), settings.vehicle)
+                log.artifacts(run_id, run.figures / "retrieval.png", "figures")
+                log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
                 log.mark_logged(run_id, chunk.key, "memory")
 
 
@@ -75,16 +87,30 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
         for row in report.summary.to_dict("records"):
             place = f"{row['panel']}/{row['planner']}/{row['assist']}-{row['top_k']}"
             rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
-        for row in report.retrieval.to_dict("records"):
-            place = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}"
-            numbers = {name: value for name, value in row.items() if isinstance(value, float)}
-            rows |= {f"{place}/{str(name).replace('@', '-')}": value for name, value in numbers.items()}
+        rows |= _retrieval_metrics(report.retrieval)
         log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
         log.dataset(run_id, "attempts", run.results, key, "benchmark")
         log.artifacts(run_id, run.figures, "figures")
         for suffix in ("csv", "md"):
             log.artifacts(run_id, run.summary(suffix))
         log.mark_logged(run_id, key)
+
+
+def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
+    """Every figure of the retrieval table under a name of its own."""
+    rows: dict[str, float] = {}
+    for row in retrieval.to_dict("records"):
+        place = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}/{row['recall']}"
+        numbers = {
+            str(name).replace("@", "-"): value for name, value in row.items() if isinstance(value, float)
+        }
+        rows |= {f"{place}/{name}": value for name, value in numbers.items() if math.isfinite(value)}
+    return rows
+
+
+def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
+    """The name of a training: with several seeds it says which."""
+    return f"train {class_name}" + (f" seed {seed}" if settings.learning.seeds > 1 else "")
 
 
 @contextmanager

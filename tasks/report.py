@@ -17,6 +17,7 @@ from storage.files import whole_file
 from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.caching import run_folder
+from tasks.recalls import recall_chunks
 from tasks.settings import RunSettings
 
 COLUMNS = 110  # of the tables where there is no terminal
@@ -33,20 +34,37 @@ def report_run(data: str, settings: RunSettings) -> Report:
     """Write tables and charts into the run's folder; a StorageError where the run has no rows."""
     run = run_folder(data, settings)
     summary = summarise(read_attempts(run.results))
-    curve = retrieval_curve(read_recalls(run.recalls))
-    retrieval = summarise_retrieval(curve)
+    retrieval = report_retrieval(data, settings)
     _write(run.summary("csv"), as_csv(summary))
     _write(run.summary("md"), f"{summary_markdown(summary)}\n{retrieval_markdown(retrieval)}")
     save(planning_times(summary), run.figures, "planning-times")
-    save(retrieval_curves(curve), run.figures, "retrieval")
     return Report(summary, retrieval)
+
+
+def report_retrieval(data: str, settings: RunSettings) -> pd.DataFrame:
+    """Write the table and the chart of what the memories recall; gives the table."""
+    run = run_folder(data, settings)
+    shards = [run.shard("recalls", chunk.class_name, chunk.index) for chunk in recall_chunks(data, settings)]
+    curve = retrieval_curve(read_recalls(shards))
+    retrieval = summarise_retrieval(curve)
+    _write(run.path / "retrieval.csv", as_csv(retrieval))
+    save(retrieval_curves(curve), run.figures, "retrieval")
+    return retrieval
 
 
 def show(report: Report) -> None:
     """Print the tables."""
-    console = Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
-    console.print(summary_table(report.summary))
-    console.print(retrieval_table(report.retrieval))
+    _console().print(summary_table(report.summary))
+    show_retrieval(report.retrieval)
+
+
+def show_retrieval(retrieval: pd.DataFrame) -> None:
+    """Print what the memories recall."""
+    _console().print(retrieval_table(retrieval))
+
+
+def _console() -> Console:
+    return Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
 
 
 def _write(path: Path, text: str) -> None:

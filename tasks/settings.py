@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, get_args
 
 from planners.world.vehicle import VEHICLES
+from tasks.learning import Learning
 
 Objective = Literal["labels", "triplet"]
 
@@ -51,7 +52,11 @@ class RunError(RuntimeError):
     """A stage cannot go on; the message is one line that says why and what to do (exit code 1)."""
 
 
-_LATER: Final[dict[str, Any]] = {"vehicle": DEFAULT_VEHICLE, "optimised": False}  # fields that were added
+_LATER: Final[dict[str, Any]] = {  # fields that were added
+    "vehicle": DEFAULT_VEHICLE,
+    "optimised": False,
+    "learning": asdict(Learning()),
+}
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,7 @@ class RunSettings:
     strict: bool = False  # a bad world stops the run instead of being skipped
     vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicle``)
     optimised: bool = False  # collected plans are made shorter and clearer before they are kept
+    learning: Learning = field(default_factory=Learning)  # how encoders are trained
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -117,6 +123,7 @@ class RunSettings:
         values["assists"] = tuple(Assist(*assist) for assist in values["assists"])
         for name in ("classes", "worlds", "planners"):
             values[name] = tuple(values[name])
+        values["learning"] = Learning(**values["learning"])
         return cls(**values)
 
 
@@ -161,6 +168,7 @@ def for_preset(
     strict: bool = False,
     vehicle: str = DEFAULT_VEHICLE,
     optimised: bool = False,
+    learning: Mapping[str, Any] | None = None,
 ) -> RunSettings:
     """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
 
@@ -208,6 +216,7 @@ def for_preset(
         strict=strict,
         vehicle=vehicle,
         optimised=optimised,
+        learning=_learning(learning or {}),
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))
@@ -221,6 +230,13 @@ def check_known(kind: str, asked: Sequence[str], known: Sequence[str] | dict[str
     for name in asked:
         if name not in known:
             raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+
+
+def _learning(asked: Mapping[str, Any]) -> Learning:
+    try:
+        return Learning(**asked)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def _count(what: str, asked: int | None, otherwise: int) -> int:

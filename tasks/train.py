@@ -1,15 +1,17 @@
-"""Train: one encoder a class, on all its hallucinated problems but those held out."""
+"""Train: encoders of each memory, one a training seed, on all its problems but those held out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from planners.memory.training import Epoch, TrainingSettings, train
+from planners.memory.training import Checkpoint, train
 from planners.world.vehicle import vehicle_named
+from storage.checkpoints import load_checkpoint, save_checkpoint
 from storage.encoders import save_encoder
 from storage.hallucinated import Labelled, read_labelled
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
@@ -23,23 +25,22 @@ def memory_names(settings: RunSettings) -> tuple[str, ...]:
 
 
 def train_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Train the encoder of one memory; its epochs appear one by one in a file that the parent watches."""
-    problems = problems_of_memory(chunk.data, chunk.settings, chunk.class_name)
-    log = _epoch_log(chunk)
-    log.parent.mkdir(parents=True, exist_ok=True)
-    log.write_text(f"{chunk.key}\n")
-
-    def on_epoch(epoch: Epoch) -> None:
-        with log.open("a") as sink:
-            sink.write(f"{epoch.epoch} {epoch.loss:.6g}\n")
-
-    settings = TrainingSettings(
-        objective=chunk.settings.objective, epochs=chunk.settings.epochs, seed=chunk.settings.seed
-    )
+    """Train one encoder, from where it stood if it was interrupted."""
+    asked = chunk.settings
+    problems = problems_of_memory(chunk.data, asked, chunk.class_name)
+    settings = asked.learning.settings(asked.objective, asked.epochs, asked.seed + chunk.index)
     labels = np.unpackbits(problems.labels, axis=1, count=problems.plans).astype(bool)
-    trained = train(problems.grids, problems.plan_index, labels, settings, on_epoch)
-    save_encoder(chunk.run.model(chunk.class_name), trained, vehicle_named(chunk.settings.vehicle))
-    mark_done(chunk.run.model(chunk.class_name), chunk.key)
+    place = _checkpoint(chunk)
+
+    def on_epoch(checkpoint: Checkpoint) -> None:
+        save_checkpoint(place, checkpoint, chunk.key)
+
+    before = load_checkpoint(place, chunk.key)
+    trained = train(problems.grids, problems.plan_index, labels, settings, on_epoch, before)
+    model = chunk.run.model(chunk.class_name, chunk.index)
+    save_encoder(model, trained, vehicle_named(asked.vehicle))
+    mark_done(model, chunk.key)
+    place.unlink(missing_ok=True)
     return {
         "problems": len(problems.plan_index),
         "plans": problems.plans,
@@ -52,11 +53,11 @@ train_encoder = chunk_task(train_chunk)
 
 def is_trained(chunk: Chunk) -> bool:
     """Whether the encoder is there."""
-    return is_marked(chunk.run.model(chunk.class_name), chunk.key)
+    return is_marked(chunk.run.model(chunk.class_name, chunk.index), chunk.key)
 
 
 def train_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each memory; its units are epochs."""
+    """One chunk for each memory and training seed; its units are epochs."""
     made = [*hallucination_chunks(data, settings), *relabel_chunks(data, settings)]
     return [
         chunk
@@ -66,24 +67,28 @@ def train_chunks(data: str, settings: RunSettings) -> list[Chunk]:
             settings,
             "train",
             name,
+            settings.learning.seeds * settings.epochs,
             settings.epochs,
-            settings.epochs,
-            [settings.objective, settings.seed, *(part.key for part in made if part.class_name == name)],
+            [
+                settings.objective,
+                settings.seed,
+                asdict(settings.learning),
+                *(part.key for part in made if part.class_name == name),
+            ],
         )
     ]
 
 
 def epochs_done(chunks: Sequence[Chunk]) -> int:
     """How many epochs of these trainings are over."""
-    return sum(_epochs_logged(chunk) for chunk in chunks)
+    return sum(_epochs_done(chunk) for chunk in chunks)
 
 
-def _epochs_logged(chunk: Chunk) -> int:
-    try:
-        key, *epochs = _epoch_log(chunk).read_text().splitlines()
-    except (FileNotFoundError, ValueError):  # not begun
-        return 0
-    return len(epochs) if key == chunk.key else 0
+def _epochs_done(chunk: Chunk) -> int:
+    if is_trained(chunk):
+        return chunk.last - chunk.first
+    checkpoint = load_checkpoint(_checkpoint(chunk), chunk.key)
+    return len(checkpoint.history) if checkpoint else 0
 
 
 def problems_of_memory(data: str, settings: RunSettings, name: str) -> Labelled:
@@ -95,5 +100,6 @@ def problems_of_memory(data: str, settings: RunSettings, name: str) -> Labelled:
     )
 
 
-def _epoch_log(chunk: Chunk) -> Path:
-    return chunk.run.path / "models" / f"{chunk.class_name}.epochs"
+def _checkpoint(chunk: Chunk) -> Path:
+    model = chunk.run.model(chunk.class_name, chunk.index)
+    return model.with_name(f"{model.name}.checkpoint.safetensors")

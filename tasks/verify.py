@@ -88,8 +88,9 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
             yield partial(_hallucinated, run, name, path, vehicle)
         for path in run.shards("recalls", name):
             yield partial(_recalls, path)
-        if run.model(name).exists():
-            yield partial(_encoder, run, name, vehicle)
+        for seed in range(settings.learning.seeds):
+            if run.model(name, seed).exists():
+                yield partial(_encoder, run.model(name, seed), vehicle)
         if run.memory(name).exists():
             yield partial(_memory, run, name, vehicle)
         for path in run.shards("results", name):
@@ -113,7 +114,7 @@ def _hallucinated(run: RunFolder, name: str, path: Path, vehicle: Vehicle) -> Fi
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     made_for = labelled.plan_index
     rows = np.arange(len(made_for))
-    solved = np.where(made_for >= 0, free[rows, np.maximum(made_for, 0)], ~free.any(axis=1))
+    solved = (made_for < 0) | free[rows, np.maximum(made_for, 0)]
     wrong = [f"{path}: {problems[i].id} has a label that denies what it was made for" for i in rows[~solved]]
     again = range(0, len(problems), LABELS_EVERY)
     for i in again:
@@ -126,7 +127,7 @@ def _hallucinated(run: RunFolder, name: str, path: Path, vehicle: Vehicle) -> Fi
 
 
 def _recalls(path: Path) -> Findings:
-    rows: list[dict[str, Any]] = _records(read_recalls(path))
+    rows: list[dict[str, Any]] = _records(read_recalls([path]))
     wrong = [
         f"{path}: {row['problem_id']} ranks {len(row['order'])} of {len(row['free'])} plans, or some twice"
         for row in rows
@@ -135,8 +136,8 @@ def _recalls(path: Path) -> Findings:
     return Counter({"recalls read": len(rows)}), wrong
 
 
-def _encoder(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
-    load_encoder(run.model(name), vehicle)
+def _encoder(folder: Path, vehicle: Vehicle) -> Findings:
+    load_encoder(folder, vehicle)
     return Counter({"encoders read": 1}), []
 
 

@@ -35,9 +35,11 @@ class Architecture:
     dimensions: int = 30  # of the embedding
 
     def __post_init__(self) -> None:
-        smallest = min((*self.channels, *self.hidden, self.dimensions))
-        if not self.channels or smallest < 1:
-            raise ValueError(f"{self} is no network: give a convolution, and sizes of at least 1")
+        if not self.channels:
+            raise ValueError("The encoder has no convolution: give the channels of one or more.")
+        if min((*self.channels, *self.hidden, self.dimensions)) < 1:
+            sizes = f"{self.channels}, {self.hidden}, {self.dimensions}"
+            raise ValueError(f"Sizes of the encoder are {sizes}: give 1 or more.")
 
 
 def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
@@ -94,8 +96,10 @@ def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
 def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
     """How many convolutions and how many fully connected layers ``weights`` has."""
     names = {name.rsplit(".", 1)[0] for name in weights}
-    convolutions = sum(name.startswith("convolution.") for name in names)
-    return convolutions, len(names) - convolutions
+    convolutions, linears = (
+        sum(name.startswith(kind) for name in names) for kind in ("convolution.", "linear.")
+    )
+    return convolutions, linears
 
 
 def to_onnx(weights: Weights) -> bytes:

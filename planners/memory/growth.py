@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.centroids import NO_PLAN_ODDS, nearest_readout
 from planners.memory.encoder import Floats32
 from planners.memory.labels import Flags, free_plans, sweep_plans
 from planners.memory.masks import masks_of
+from planners.memory.readout import NO_PLAN_ODDS, nearest_readout
 from planners.memory.recall import Memory
 from planners.world.collision import scene_of
 from planners.world.jit import lean
@@ -54,8 +54,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
     )
     centroids = mean_embeddings(moments)
     if memory.objective == "triplet":
-        vectors, biases = nearest_readout(centroids)
-        biases[0] -= np.float32(scatter(moments, centroids))
+        vectors, biases = nearest_readout(centroids, scatter(moments, centroids))
     else:
         vectors, biases = ridge_readout(embeddings, moments)
     return replace(

@@ -1,25 +1,28 @@
-"""Training the encoder, deterministic for a seed; torch is imported when training begins."""
+"""Training the encoder, deterministic for a seed, from any checkpoint; torch is imported when it begins."""
 
 from __future__ import annotations
 
-import os
+import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from planners.memory.encoder import Architecture, Floats32, Weights, initial_weights
 from planners.memory.labels import Flags
+from planners.memory.readout import centroids_of, label_readout, nearest_readout
+from planners.memory.splits import first_of_each, split
 from planners.world.occupancy import Grid
 from planners.world.problem import Integers
 from planners.world.randomness import generator
 
+if TYPE_CHECKING:
+    from planners.memory.objectives import Objective
+
 OBJECTIVES: Final = ("labels", "triplet")
 CENTROID_SAMPLE = 50  # training problems a plan, for the centroids of an epoch's metrics
-WARM_UP = 0.3  # share of the steps in which the learning rate rises (Smith and Topin 2018)
 
 
 @dataclass(frozen=True)
@@ -27,44 +30,79 @@ class TrainingSettings:
     """How to train."""
 
     objective: str = "labels"
-    epochs: int = 12
+    epochs: int = 12  # at most
+    patience: int = 4  # epochs without a better hit@1 on the validation problems, then training ends
     batch: int = 128  # problems
     learning_rate: float = 3e-3  # the highest of a one-cycle schedule
     weight_decay: float = 0.1  # decoupled, AdamW
+    first_weight: float = 1.0  # of the label objective: that a free plan comes first
+    origin_weight: float = 1.0  # of the label objective: that the plan a problem was made for does
     margin: float = 1.0  # of the triplet objective
+    semi_hard: bool = False  # of the triplet objective: which triplets count
     architecture: Architecture = field(default_factory=Architecture)
-    validation_share: float = 0.1  # of the problems, held out
+    held_out_share: float = 0.1  # of the problems, to measure recall with: training never sees them
+    validation_share: float = 0.05  # of the problems, to choose the best epoch and the best seed with
     seed: int = 0
     threads: int = 1  # results are the same for the same number
 
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
             raise ValueError(f"Unknown objective {self.objective!r}; choose one of {', '.join(OBJECTIVES)}.")
-        if self.epochs < 1 or self.batch < 2 or self.threads < 1 or not 0.0 < self.validation_share < 1.0:
-            raise ValueError(f"{self} cannot be trained with: it takes an epoch, pairs, a thread, two splits")
+        counts = {"epochs": 1, "patience": 1, "batch": 2, "threads": 1}
+        for name, least in counts.items():
+            if getattr(self, name) < least:
+                raise ValueError(f"{getattr(self, name)} {name}: give {least} or more.")
+        for name in ("learning_rate", "margin"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}: give a number above 0.")
+        for name in ("first_weight", "origin_weight", "weight_decay"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}: give 0 or more.")
+        shares = (self.held_out_share, self.validation_share)
+        if min(shares) <= 0.0 or sum(shares) >= 1.0:
+            raise ValueError(
+                f"shares held out and to validate with are {shares}: leave problems to train with."
+            )
 
 
 class Epoch(NamedTuple):
-    """Metrics after one epoch, on the held-out problems; hit@k: one of the first k plans is free."""
+    """Metrics after one epoch, on the validation problems; hit@k: one of the first k plans is free."""
 
     epoch: int  # from 1
     loss: float  # mean over the epoch's batches
     hit_1: float
     hit_5: float
-    oracle: float  # share of held-out problems in which any stored plan is free
-    seconds: float  # since training began
+    oracle: float  # share of validation problems in which any stored plan is free
+    seconds: float  # of training until then
+
+
+class Checkpoint(NamedTuple):
+    """Where training stands after an epoch: what it takes to go on as if it had never stopped."""
+
+    history: tuple[Epoch, ...]
+    values: Floats32  # [P] all parameters, the objective's own after the encoder's
+    mean: Floats32  # [P] of the gradients (``optimiser.AdamW``)
+    square: Floats32  # [P] of the gradients' squares
+    best: Floats32  # [P] the parameters after the best epoch so far
 
 
 @dataclass(frozen=True, eq=False)
 class TrainedEncoder:
-    """What training leaves."""
+    """What training leaves: the parameters after the best epoch, and what they say of the problems."""
 
     settings: TrainingSettings
     weights: Weights
-    vectors: Floats32 | None  # [N + 1, D] learned readout; None for the triplet objective
-    biases: Floats32 | None  # [N + 1]
+    centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of those no plan solves
+    vectors: Floats32  # [N + 1, D] readout
+    biases: Floats32  # [N + 1] readout; row 0 says when to recall nothing (``readout.py``)
+    popularity: Floats32  # [N] share of the training problems in which each plan is free
     history: tuple[Epoch, ...]
-    validation: Integers  # [v] indices of the problems that were held out
+    held_out: Integers  # [h] indices of the problems that training did not see
+
+    @property
+    def score(self) -> float:
+        """What trainings are compared by: the best epoch's hit@1 on the validation problems."""
+        return max(epoch.hit_1 for epoch in self.history)
 
 
 def train(
@@ -72,99 +110,66 @@ def train(
     plan_index: Integers,
     labels: Flags,
     settings: TrainingSettings,
-    on_epoch: Callable[[Epoch], None] | None = None,
+    on_epoch: Callable[[Checkpoint], None] | None = None,
+    checkpoint: Checkpoint | None = None,
 ) -> TrainedEncoder:
     """Train on n problems: grids as bits uint8 ``[n, 512]``, and which of N plans are free bool ``[n, N]``.
 
-    ``plan_index [n]`` is the plan that each problem was made for, -1 for ``S_0``. Calls ``on_epoch`` after
-    each epoch. Uses a GPU where torch sees one.
+    ``plan_index [n]`` is the plan that each problem was made for, -1 where it was made for none. Calls
+    ``on_epoch`` after each epoch; given what that got, training goes on from there to the same end. Uses a
+    GPU where torch sees one. ValueError: not one of each for every problem, or a plan without problems.
     """
-    import torch
+    from planners.memory.device import deterministic
+    from planners.memory.learner import Learner
 
-    from planners.memory.network import embed, embed_all
-    from planners.memory.objectives import Labels, Objective, Triplet
-
-    if not len(grids_packed) == len(plan_index) == len(labels) or len(labels) < 2:
+    if not len(grids_packed) == len(plan_index) == len(labels):
         raise ValueError(
             f"{len(grids_packed)} grids, {len(plan_index)} plan indices and {len(labels)} label vectors: "
-            "training needs one of each for every problem, and two problems at least"
+            "training needs one of each for every problem"
         )
-    began = time.perf_counter()
-    order = generator(settings.seed, "split").permutation(len(labels)).astype(np.int32)
-    held_out = max(1, round(settings.validation_share * len(labels)))
-    validation, training = np.sort(order[:held_out]), np.sort(order[held_out:])
-    free_rows = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    objective: Objective = Triplet(settings.margin)
-    if settings.objective == "labels":
-        rng = generator(settings.seed, "readout")
-        objective = Labels(free_rows.shape[1], settings.architecture.dimensions, rng, device)
-    orders = [generator(settings.seed, "epoch", i).permutation(training) for i in range(settings.epochs)]
-    sample = orders[0][_first_of_each(plan_index[orders[0]], CENTROID_SAMPLE)]
-    history: list[Epoch] = []
-    with _deterministic(settings.threads):
-        bits = torch.from_numpy(np.ascontiguousarray(grids_packed)).to(device)
-        rows = torch.from_numpy(plan_index.astype(np.int64) + 1).to(device)
-        targets = torch.from_numpy(free_rows).to(device)
-        weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
-        parameters = {name: torch.from_numpy(value).to(device) for name, value in weights.items()}
-        trained = [*parameters.values(), *objective.parameters]
-        for parameter in trained:
-            parameter.requires_grad_(True)
-        optimiser = torch.optim.AdamW(trained, lr=settings.learning_rate, weight_decay=settings.weight_decay)
-        steps = sum(-(-len(each) // settings.batch) for each in orders)
-        schedule = torch.optim.lr_scheduler.OneCycleLR(
-            optimiser, settings.learning_rate, total_steps=steps, pct_start=WARM_UP
-        )
-        for i in range(settings.epochs):
-            losses = []
-            for batch in torch.split(torch.from_numpy(orders[i]).to(device), settings.batch):
-                loss = objective.loss(embed(parameters, bits[batch]), rows[batch], targets[batch])
-                optimiser.zero_grad()
-                torch.autograd.backward(loss)
-                optimiser.step()
-                schedule.step()
-                losses.append(loss.detach())
-            with torch.no_grad():
-                embeddings = embed_all(parameters, bits[sample])
-                vectors, biases = objective.readout(embeddings, rows[sample], free_rows.shape[1])
-                scores = (embed_all(parameters, bits[validation]) @ vectors.T + biases)[:, 1:].cpu().numpy()
-            epoch = Epoch(
-                epoch=i + 1,
-                loss=float(torch.stack(losses).mean()),
-                hit_1=hit_rate(scores, labels[validation], 1),
-                hit_5=hit_rate(scores, labels[validation], 5),
-                oracle=float(labels[validation].any(1).mean()),
-                seconds=time.perf_counter() - began,
-            )
-            history.append(epoch)
+    parts = split(plan_index, labels, settings.validation_share, settings.held_out_share)
+    free = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
+    rows = np.where(plan_index >= 0, plan_index + 1, np.where(free[:, 0], 0, -1)).astype(np.int32)
+    sample = parts.training[first_of_each(rows[parts.training], CENTROID_SAMPLE)]
+    steps = -(-len(parts.training) // settings.batch)  # an epoch
+    objective = _objective(settings)
+    weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
+    dimensions = settings.architecture.dimensions
+    own = objective.initial(free.shape[1], dimensions, generator(settings.seed, "readout"))
+    history = list(checkpoint.history) if checkpoint else []
+    began = time.perf_counter() - (history[-1].seconds if history else 0.0)
+    with deterministic(settings.threads) as device:
+        problems = (grids_packed, rows, free)
+        learner = Learner(problems, weights, own, objective, settings.weight_decay, device)
+        if checkpoint is not None:
+            learner.restore(checkpoint[1:], len(history) * steps)
+        while len(history) < settings.epochs and not _is_tired(history, settings.patience):
+            order = generator(settings.seed, "epoch", len(history)).permutation(parts.training)
+            loss = learner.epoch(order, settings.batch, settings.epochs * steps, settings.learning_rate)
+            scores = learner.scores(parts.validation, sample)
+            known = labels[parts.validation]
+            hits = (hit_rate(scores, known, 1), hit_rate(scores, known, 5), float(known.any(1).mean()))
+            if hits[0] >= max((epoch.hit_1 for epoch in history), default=0.0):
+                learner.keep()
+            history.append(Epoch(len(history) + 1, loss, *hits, time.perf_counter() - began))
             if on_epoch is not None:
-                on_epoch(epoch)
-    learned = bool(objective.parameters)
+                on_epoch(Checkpoint(tuple(history), *learner.state()))
+        learned, embeddings = learner.best(), learner.best_embeddings(parts.training)
+    centroids, scatter = centroids_of(embeddings, rows[parts.training], free.shape[1])
+    if own:
+        vectors, biases = label_readout(*(learned[name] for name in own))
+    else:
+        vectors, biases = nearest_readout(centroids, scatter)
     return TrainedEncoder(
-        settings,
-        {name: value.detach().cpu().numpy() for name, value in parameters.items()},
-        vectors.cpu().numpy() if learned else None,
-        biases.cpu().numpy() if learned else None,
-        tuple(history),
-        validation,
+        settings=settings,
+        weights={name: learned[name] for name in weights},
+        centroids=centroids,
+        vectors=vectors,
+        biases=biases,
+        popularity=labels[parts.training].mean(0, dtype=np.float32),
+        history=tuple(history),
+        held_out=parts.held_out,
     )
-
-
-@contextmanager
-def _deterministic(threads: int) -> Iterator[None]:
-    """Torch on that many threads, with deterministic kernels only; as it was before, afterwards."""
-    import torch
-
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS is not deterministic
-    before, deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
-    torch.set_num_threads(threads)
-    torch.use_deterministic_algorithms(True)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-        torch.use_deterministic_algorithms(deterministic)
 
 
 def hit_rate(plan_scores: Floats32, labels: Flags, k: int) -> float:
@@ -173,9 +178,15 @@ def hit_rate(plan_scores: Floats32, labels: Flags, k: int) -> float:
     return float(np.take_along_axis(labels, best, axis=1).any(1).mean())
 
 
-def _first_of_each(values: Integers, count: int) -> Integers:
-    """Indices of the first ``count`` occurrences of each value, in order."""
-    order = np.argsort(values, kind="stable")
-    begins = np.flatnonzero(np.diff(values[order], prepend=values[order[0]] - 1))
-    rank = np.arange(len(values)) - np.repeat(begins, np.diff(begins, append=len(values)))
-    return np.sort(order[rank < count]).astype(np.int32)
+def _objective(settings: TrainingSettings) -> Objective:
+    from planners.memory.objectives import Labels, Triplet
+
+    if settings.objective == "labels":
+        return Labels(settings.first_weight, settings.origin_weight)
+    return Triplet(settings.margin, settings.semi_hard)
+
+
+def _is_tired(history: list[Epoch], patience: int) -> bool:
+    """Whether the last ``patience`` epochs brought nothing better than those before."""
+    hits = [epoch.hit_1 for epoch in history]
+    return len(hits) > patience and max(hits[-patience:]) < max(hits[:-patience])

@@ -55,12 +55,15 @@ def recalls(
     plans: int = 30,
     protocols: tuple[str, ...] = ("held-out", "fresh"),
     seed: int = 0,
+    seeds: int = 2,
 ) -> pd.DataFrame:
-    """Recall rows of a ranking better than chance."""
+    """Recall rows of rankings better than chance."""
     rng = np.random.default_rng(seed)
     rows: list[dict[str, Any]] = []
-    for name, protocol, i in product(classes, protocols, range(problems)):
+    ways = [("popularity", 0), *(("centroid", training_seed) for training_seed in range(seeds))]
+    for name, protocol, (recall, training_seed), i in product(classes, protocols, ways, range(problems)):
         free = rng.random(plans) < 0.1
+        held_out = protocol == "held-out" and free.any()
         score = free + rng.normal(size=plans)
         rows.append(
             {
@@ -71,6 +74,9 @@ def recalls(
                 "order": np.argsort(-score).astype(np.int16),
                 "free": free,
                 "nothing_recalled": bool(rng.random() < 0.1),
+                "recall": recall,
+                "training_seed": training_seed,
+                "made_for": int(rng.choice(np.flatnonzero(free))) if held_out else -1,
             }
         )
     return pd.DataFrame(rows)

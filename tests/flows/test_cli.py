@@ -30,6 +30,8 @@ COMMANDS = (
         (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
         (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
         (["train", "--objective", "luck"], 2, "Unknown objective 'luck'"),
+        (["train", "--epochs", "0"], 2, "0 epochs: give 1 or more."),
+        (["train", "--hidden", "64", "0"], 2, "give 1 or more."),
         (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
         (["collect", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'. Known: car, differential-drive"),
         (["plan", "p.json", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from planners.memory.centroids import build_memory
+from planners.memory.build_memory import build_memory
 from planners.memory.experience import Experience
 from planners.memory.hallucination import hallucinate, no_plan
 from planners.memory.labels import free_plans, sweep_plans
@@ -96,7 +96,7 @@ def _made(name: str) -> Memory:
         labels += [free_plans(sweeps, scene_of(problem)) for problem in problems]
     packed, index_of = np.stack(grids), np.array(made_for, np.int32)
     trained = train(packed, index_of, np.stack(labels), TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
-    return build_memory(trained, packed, index_of, plans, name)
+    return build_memory(trained, plans, name)
 
 
 def hard_for(memory: Memory, name: str, k: int) -> tuple[list[Problem], int]:

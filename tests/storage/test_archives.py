@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners.memory.training import Epoch, TrainedEncoder, TrainingSettings
+from planners.memory.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
 from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES
+from storage.checkpoints import load_checkpoint, save_checkpoint
 from storage.encoders import load_encoder, save_encoder
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
@@ -38,26 +39,48 @@ def test_a_memory_comes_back_exactly_and_gives_the_same_bytes(tmp_path: Path, pl
     assert contents(tmp_path / "one") == contents(tmp_path / "two")
 
 
-@pytest.mark.parametrize("learned", [True, False])
-def test_a_trained_encoder_comes_back_exactly(tmp_path: Path, learned: bool) -> None:
-    settings = TrainingSettings(objective="labels" if learned else "triplet", architecture=ARCHITECTURE)
-    trained = TrainedEncoder(
-        settings,
-        WEIGHTS,
-        np.ones((4, 4), np.float32) if learned else None,
-        np.zeros(4, np.float32) if learned else None,
-        (Epoch(1, float("nan"), 0.25, 0.5, 0.75, 1.5), Epoch(2, 0.1, 0.25, 0.5, 0.75, 3.0)),
-        np.array([1, 5, 9], np.int32),
+def trained_encoder() -> TrainedEncoder:
+    rng = np.random.default_rng(2)
+    rows = (4, ARCHITECTURE.dimensions)
+    return TrainedEncoder(
+        settings=TrainingSettings(semi_hard=True, architecture=ARCHITECTURE),
+        weights=WEIGHTS,
+        centroids=rng.normal(size=rows).astype(np.float32),
+        vectors=rng.normal(size=rows).astype(np.float32),
+        biases=np.array([-np.inf, *rng.normal(size=3)], np.float32),
+        popularity=rng.random(3).astype(np.float32),
+        history=(Epoch(1, float("nan"), 0.25, 0.5, 0.75, 1.5), Epoch(2, 0.1, 0.25, 0.5, 0.75, 3.0)),
+        held_out=np.array([1, 5, 9], np.int32),
     )
+
+
+def test_a_trained_encoder_comes_back_exactly(tmp_path: Path) -> None:
+    trained = trained_encoder()
     save_encoder(tmp_path / "model", trained)
     loaded = load_encoder(tmp_path / "model")
-    assert loaded.settings == settings
+    assert loaded.settings == trained.settings
     assert loaded.weights.keys() == WEIGHTS.keys()
     assert all(np.array_equal(loaded.weights[name], WEIGHTS[name]) for name in WEIGHTS)
-    assert (loaded.vectors is None) == (loaded.biases is None) == (not learned)
+    for name in ("centroids", "vectors", "biases", "popularity", "held_out"):
+        assert np.array_equal(getattr(loaded, name), getattr(trained, name))
     assert loaded.history[1] == trained.history[1]
     assert np.array_equal(loaded.history, trained.history, equal_nan=True)
-    assert np.array_equal(loaded.validation, trained.validation)
+    assert loaded.score == 0.25
+
+
+def test_a_checkpoint_comes_back_for_its_own_training_only(tmp_path: Path) -> None:
+    states = [np.arange(5, dtype=np.float32) * i for i in range(4)]
+    checkpoint = Checkpoint((Epoch(1, 0.5, 0.25, 0.5, 0.75, 1.5),), *states)
+    path = tmp_path / "0.checkpoint.safetensors"
+    assert load_checkpoint(path, "a") is None
+    save_checkpoint(path, checkpoint, "a")
+    loaded = load_checkpoint(path, "a")
+    assert loaded is not None
+    assert loaded.history == checkpoint.history
+    assert all(map(np.array_equal, loaded[1:], checkpoint[1:]))
+    assert load_checkpoint(path, "b") is None
+    path.write_bytes(path.read_bytes()[:-1])
+    assert load_checkpoint(path, "a") is None
 
 
 @pytest.mark.parametrize("name", VEHICLES)
@@ -73,9 +96,7 @@ def test_a_memory_is_only_loaded_for_its_vehicle(tmp_path: Path, name: str) -> N
 
 
 def test_an_encoder_is_only_loaded_for_its_vehicle(tmp_path: Path) -> None:
-    trained = TrainedEncoder(
-        TrainingSettings(architecture=ARCHITECTURE), WEIGHTS, None, None, (), np.array([], np.int32)
-    )
+    trained = trained_encoder()
     save_encoder(tmp_path / "model", trained, CAR_1_TRAILER)
     assert load_encoder(tmp_path / "model", CAR_1_TRAILER).settings == trained.settings
     with pytest.raises(StorageError, match="made for vehicle car-1-trailer, wanted was car;"):

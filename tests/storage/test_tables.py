@@ -249,13 +249,16 @@ def test_recalls_come_back_exactly(
             "order": rng.permutation(plans),
             "free": rng.random(plans) < 0.5,
             "nothing_recalled": bool(i % 2),
+            "recall": "centroid",
+            "training_seed": i % 3,
+            "made_for": i - 1,
         }
         for i in range(count)
     ]
     write_recalls(path, rows, plans=plans)
-    frame = read_recalls(path)
+    frame = read_recalls([path])
     assert set(frame.columns) == set(rows[0])
-    for name in ("problem_id", "class", "memory", "protocol", "nothing_recalled"):
+    for name in set(rows[0]) - {"order", "free"}:
         assert frame[name].tolist() == [row[name] for row in rows]
     assert np.array_equal(np.stack(list(frame["order"])), [row["order"] for row in rows])
     assert np.array_equal(np.stack(list(frame["free"])), [row["free"] for row in rows])

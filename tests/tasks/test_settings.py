@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tasks.learning import Learning
 from tasks.settings import PRESETS, Assist, RunSettings, UsageError, for_preset
 
 SETTINGS = st.builds(
@@ -32,6 +33,12 @@ SETTINGS = st.builds(
     strict=st.booleans(),
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
     optimised=st.booleans(),
+    learning=st.builds(
+        Learning,
+        seeds=st.integers(1, 3),
+        semi_hard=st.booleans(),
+        hidden=st.lists(st.integers(1, 200), max_size=2).map(tuple),
+    ),
 )
 
 
@@ -70,7 +77,7 @@ def test_a_run_of_another_vehicle_says_its_name() -> None:
 def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
     settings = for_preset("smoke")
     values = json.loads(settings.to_json())
-    del values["vehicle"], values["optimised"]
+    del values["vehicle"], values["optimised"], values["learning"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
@@ -104,6 +111,9 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
             "Unknown vehicle 'tram'. Known: car, differential-drive, car-1-trailer, car-2-trailers.",
         ),
         ({"seed": -1}, "Seed -1 is negative. Give 0 or more."),
+        ({"learning": {"seeds": 0}}, "0 training seeds: give 1 or more."),
+        ({"learning": {"learning_rate": -1.0}}, "learning_rate is -1.0: give a number above 0."),
+        ({"learning": {"dimensions": 0}}, "Sizes of the encoder are (16,), (128,), 0: give 1 or more."),
         ({"worlds": ["/nowhere"]}, "/nowhere is no folder of worlds: it has no train in it."),
     ],
 )

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from planners.memory.centroids import build_memory
+from planners.memory.build_memory import build_memory
 from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.growth import RIDGE, grow, mean_embeddings, moments_of, ridge_readout, scatter
 from planners.memory.labels import free_plans
@@ -79,10 +79,10 @@ def memory(experiences):
     rng = generator(1, "readout")
     vectors, biases = rng.standard_normal((4, 4)).astype(np.float32), np.zeros(4, np.float32)
     settings = TrainingSettings(architecture=ARCHITECTURE)
-    trained = TrainedEncoder(settings, weights, vectors, biases, (), np.empty(0, np.int32))
-    bits = np.packbits(rng.random((9, 4096)) < 0.2, axis=1)
-    plans = [each.plan for each in experiences[:3]]
-    return build_memory(trained, bits, np.repeat(np.arange(3), 3).astype(np.int32), plans, "boxes")
+    trained = TrainedEncoder(
+        settings, weights, vectors, vectors, biases, np.zeros(3, np.float32), (), np.empty(0, np.int32)
+    )
+    return build_memory(trained, [each.plan for each in experiences[:3]], "boxes")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,37 @@
+"""From a trained encoder and the plans to a memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
+from planners.memory.recall import Memory
+from planners.memory.training import TrainedEncoder
+from planners.world.problem import Plan
+from planners.world.vehicle import CAR, Vehicle
+
+
+def build_memory(
+    trained: TrainedEncoder,
+    plans: Sequence[Plan],
+    class_name: str,
+    vehicle: Vehicle = CAR,
+    metadata: dict[str, Any] | None = None,
+) -> Memory:
+    """Memory of the N ``plans`` that the encoder was trained for, in the same order."""
+    sweeps = sweep_plans(plans, vehicle)
+    return Memory(
+        class_name=class_name,
+        vehicle=vehicle,
+        plans=tuple(plans),
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
+        centroids=trained.centroids,
+        vectors=trained.vectors,
+        biases=trained.biases,
+        objective=trained.settings.objective,
+        weights=trained.weights,
+        metadata=metadata or {},
+    )
