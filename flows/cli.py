@@ -247,6 +247,7 @@ def _do(stage: str, options: Options) -> None:
         test_problems=options.test_problems,
         epochs=options.epochs,
         learning=options.learning,
+        hallucination=options.hallucination,
     )
     run_stage(
         f"flows.{stage}",

@@ -71,6 +71,9 @@ class Options:
         Widths of its fully connected layers.
     dimensions
         Of the embedding.
+    hallucination
+        Methods that make problems around a plan, with weights, like rearrange=0.7 minimal=0.3; of rearrange,
+        maximal, minimal and learned.
 
     """
 
@@ -99,6 +102,7 @@ class Options:
     channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     dimensions: int | None = None
+    hallucination: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
 
     @property
     def folder(self) -> Path:

@@ -59,6 +59,10 @@ class RunFolder:
         """The experiences of a class once all are collected."""
         return self.path / "experiences" / f"{checked_name(class_name)}.parquet"
 
+    def hallucinator(self, class_name: str) -> Path:
+        """The folder of a class's network for learned hallucination."""
+        return self.path / "hallucinators" / checked_name(class_name)
+
     def model(self, class_name: str, seed: int = 0) -> Path:
         """The folder of a class's encoder, trained with the seed of that number."""
         return self.path / "models" / checked_name(class_name) / str(seed)

@@ -71,7 +71,7 @@ def hallucinated(plans: int) -> pa.Schema:
             *_PROBLEM,
             *_GEOMETRY,
             ("plan_index", pa.int32()),  # the plan it was made for; -1: for none
-            ("method", pa.string()),
+            ("method", pa.string()),  # rearrange, maximal, minimal, learned, origin, no-plan, drawn
             ("grid", pa.binary(GRID_BYTES)),  # occupancy, row by row, most significant bit first
             ("labels", pa.binary((plans + 7) // 8)),  # most significant bit first
         ],

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import islice
 from typing import Any, Final
 
 import numpy as np
 
-from planners.memory.hallucination import hallucinate, no_plan
-from planners.memory.labels import PlanSweeps, free_plans, sweep_plans
-from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
-from planners.world.problem import Problem
+from planners.memory.hallucination.mixture import LEARNED, hallucinate
+from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.labelling import label_problems
+from planners.memory.labels import PlanSweeps, sweep_plans
+from planners.world.problem import Integers, Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
 from storage.experiences import read_experiences
@@ -21,18 +22,19 @@ from storage.hallucinated import (
     read_methods,
     write_hallucinated,
 )
+from storage.hallucinators import load_hallucinator
 from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.collect import experiences_key
 from tasks.settings import COMBINED, RunSettings
 from tasks.worlds import source_key, source_of
 
-CHUNK_PROBLEMS: Final = 5_000  # some 10 s of work
-METHOD: Final = "rearrange"
+CHUNK_PROBLEMS: Final = 5_000  # some seconds of work
 NO_PLAN: Final = "no-plan"
 NO_PLAN_SHARE: Final = 0.05  # problems of S_0 for each one that is made for a plan
 DRAWN: Final = "drawn"
 DRAWN_SHARE: Final = 0.5  # likewise of problems as the class has them
+ORIGIN: Final = "origin"  # a problem that was collected
 
 
 def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
@@ -45,24 +47,32 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     vehicle = vehicle_named(settings.vehicle)
     experiences = read_experiences(chunk.run.experiences(name), vehicle)
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
-    problems, plan_index = [], []
+    mixture = dict(settings.hallucination)
+    weights = load_hallucinator(chunk.run.hallucinator(name), vehicle) if LEARNED in mixture else None
+    problems: list[Problem] = []
+    methods: list[str] = []
     for i in range(chunk.first, chunk.last):
+        rng = generator(settings.seed, "hallucinate", name, i)
         problems.append(experiences[i].problem)
-        for index in range(1, settings.problems_per_experience):
-            rng = generator(settings.seed, "hallucinate", name, i, index)
-            problems.append(hallucinate(METHOD, experiences[i], source.draw, rng, index))
-        plan_index += [i] * settings.problems_per_experience
-    unsolved = max(1, round(NO_PLAN_SHARE * len(problems)))
-    bounds = experiences[0].problem.bounds
-    for index in range(chunk.index * unsolved, (chunk.index + 1) * unsolved):
+        methods.append(ORIGIN)
+        made = hallucinate(experiences[i], mixture, source.draw, rng, weights)
+        for problem, method in islice(made, settings.problems_per_experience - 1):
+            problems.append(problem)
+            methods.append(method)
+    made_for = np.repeat(np.arange(chunk.first, chunk.last), settings.problems_per_experience)
+    share = NO_PLAN_SHARE * settings.problems_per_experience
+    first, last = round(share * chunk.first), round(share * chunk.last)
+    for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
-        problems.append(no_plan(sweeps, source.draw, rng, name, index, bounds))
+        problems.append(no_plan(sweeps, source.draw, rng, name, index, experiences[0].problem.bounds))
+        methods.append(NO_PLAN)
     wanted = round(DRAWN_SHARE * settings.experiences * settings.problems_per_experience)
     drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
     first, last = (drawn * i // settings.experiences for i in (chunk.first, chunk.last))
     problems += [source.problem("collect", index) for index in range(first, last)]
-    methods = [METHOD] * len(plan_index) + [NO_PLAN] * unsolved + [DRAWN] * (last - first)
-    _write(chunk, problems, plan_index + [-1] * (unsolved + last - first), methods, sweeps)
+    methods += [DRAWN] * (last - first)
+    for_none = np.full(len(problems) - len(made_for), -1)
+    _write(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), methods, sweeps)
     return {"problems": len(problems)}
 
 
@@ -90,6 +100,7 @@ def hallucination_chunks(data: str, settings: RunSettings) -> list[Chunk]:
             [
                 settings.seed,
                 settings.problems_per_experience,
+                settings.hallucination,
                 experiences_key(data, settings, name),
                 *source_key(settings, name),
             ],
@@ -103,12 +114,14 @@ def relabel_chunk(chunk: Chunk) -> dict[str, Any]:
     origin = hallucination_chunks(chunk.data, settings)[chunk.index]
     place = run.shard("hallucinated", origin.class_name, origin.index)
     offset = settings.class_names.index(origin.class_name) * settings.experiences
-    plan_index = [i + offset if i >= 0 else i for i in read_labelled([place]).plan_index.tolist()]
+    made_for = read_labelled([place]).plan_index
     vehicle = vehicle_named(settings.vehicle)
     experiences = read_experiences(run.experiences(COMBINED), vehicle)
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
-    _write(chunk, read_hallucinated_problems(place), plan_index, read_methods(place), sweeps)
-    return {"problems": len(plan_index)}
+    problems = read_hallucinated_problems(place)
+    offsets = np.where(made_for >= 0, np.int32(offset), np.int32(0))
+    _write(chunk, problems, made_for + offsets, read_methods(place), sweeps)
+    return {"problems": len(problems)}
 
 
 relabel_problems = chunk_task(relabel_chunk)
@@ -126,17 +139,22 @@ def relabel_chunks(data: str, settings: RunSettings) -> list[Chunk]:
 def _write(
     chunk: Chunk,
     problems: Sequence[Problem],
-    plan_index: Sequence[int],
+    made_for: Integers,
     methods: Sequence[str],
     sweeps: PlanSweeps,
 ) -> None:
-    """Write problems, grids and labels; those made for no plan have plan index -1."""
-    grids = np.stack([np.packbits(occupancy_of(problem)) for problem in problems])
-    free = np.stack([free_plans(sweeps, scene_of(problem)) for problem in problems])
+    """Write problems, grids and labels; ``made_for`` is -1 for those made for no plan.
+
+    RuntimeError: a plan does not solve a problem that was made for it.
+    """
+    grids, free = label_problems(problems, sweeps)
+    denied = np.flatnonzero((made_for >= 0) & ~free[np.arange(len(problems)), made_for])
+    if len(denied):
+        raise RuntimeError(f"{problems[denied[0]].id} is not solved by the plan that it was made for")
     write_hallucinated(
         chunk.run.shard("hallucinated", chunk.class_name, chunk.index),
         problems,
-        plan_index=plan_index,
+        plan_index=made_for,
         methods=methods,
         grids=grids,
         labels=np.packbits(free, axis=1),

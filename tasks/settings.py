@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -52,10 +53,15 @@ class RunError(RuntimeError):
     """A stage cannot go on; the message is one line that says why and what to do (exit code 1)."""
 
 
+Mixture = tuple[tuple[str, float], ...]  # methods of hallucination with their shares, which sum to 1
+LARGEST_WEIGHT: Final = 1e9  # so that their sum is a number
+DEFAULT_MIXTURE: Final[Mixture] = (("rearrange", 1.0),)
+
 _LATER: Final[dict[str, Any]] = {  # fields that were added
     "vehicle": DEFAULT_VEHICLE,
     "optimised": False,
     "learning": asdict(Learning()),
+    "hallucination": DEFAULT_MIXTURE,
 }
 
 
@@ -81,6 +87,7 @@ class RunSettings:
     vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicle``)
     optimised: bool = False  # collected plans are made shorter and clearer before they are kept
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
+    hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -121,6 +128,7 @@ class RunSettings:
                 f"Settings of another version: {odd} missing or unknown. Start a new data folder."
             )
         values["assists"] = tuple(Assist(*assist) for assist in values["assists"])
+        values["hallucination"] = tuple((name, float(share)) for name, share in values["hallucination"])
         for name in ("classes", "worlds", "planners"):
             values[name] = tuple(values[name])
         values["learning"] = Learning(**values["learning"])
@@ -169,6 +177,7 @@ def for_preset(
     vehicle: str = DEFAULT_VEHICLE,
     optimised: bool = False,
     learning: Mapping[str, Any] | None = None,
+    hallucination: Sequence[str] | None = None,
 ) -> RunSettings:
     """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
 
@@ -217,6 +226,7 @@ def for_preset(
         vehicle=vehicle,
         optimised=optimised,
         learning=_learning(learning or {}),
+        hallucination=DEFAULT_MIXTURE if hallucination is None else mixture_of(hallucination),
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))
@@ -225,7 +235,33 @@ def for_preset(
     return settings
 
 
-def check_known(kind: str, asked: Sequence[str], known: Sequence[str] | dict[str, Any]) -> None:
+def mixture_of(asked: Sequence[str]) -> Mixture:
+    """The shares of hallucination methods asked for like ``rearrange=0.7``; a name alone weighs 1.
+
+    UsageError with one line for an unknown or repeated name, or a weight that is no number above 0.
+    """
+    from planners.memory.hallucination.mixture import METHODS  # imported late: Numba costs half a second
+
+    weights: dict[str, float] = {}
+    for each in asked:
+        name, equals, weight = each.partition("=")
+        check_known("hallucination method", [name], METHODS)
+        try:
+            value = float(weight) if equals else 1.0
+        except ValueError:
+            value = math.nan
+        if not 0.0 < value <= LARGEST_WEIGHT:
+            raise UsageError(f"Hallucination {each!r}: give a weight above 0, like {name}=0.5.")
+        if name in weights:
+            raise UsageError(f"Hallucination method {name} is given twice. Give each once.")
+        weights[name] = value
+    if not weights:
+        raise UsageError(f"No hallucination method. Name some of: {', '.join(METHODS)}.")
+    whole = math.fsum(weights.values())
+    return tuple((name, weights[name] / whole) for name in METHODS if name in weights)
+
+
+def check_known(kind: str, asked: Sequence[str], known: Sequence[str] | Mapping[str, Any]) -> None:
     """UsageError with the known names where one that was asked for is not among them."""
     for name in asked:
         if name not in known:

@@ -28,6 +28,7 @@ from storage.errors import StorageError
 from storage.experiences import read_experiences
 from storage.files import read_text
 from storage.hallucinated import read_hallucinated_problems, read_labelled
+from storage.hallucinators import load_hallucinator
 from storage.layout import RunFolder, open_data_folder
 from storage.memories import load_memory
 from storage.recalls import read_recalls
@@ -86,6 +87,8 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
             yield partial(_experiences, run.experiences(name), vehicle)
         for path in run.shards("hallucinated", name):
             yield partial(_hallucinated, run, name, path, vehicle)
+        if run.hallucinator(name).exists():
+            yield partial(_hallucinator, run, name, vehicle)
         for path in run.shards("recalls", name):
             yield partial(_recalls, path)
         for seed in range(settings.learning.seeds):
@@ -124,6 +127,11 @@ def _hallucinated(run: RunFolder, name: str, path: Path, vehicle: Vehicle) -> Fi
             wrong.append(f"{path}: {problems[i].id} has another grid than its obstacles say")
     read = {"hallucinated problems read": len(problems), "of these, grids and labels drawn again": len(again)}
     return Counter(read), wrong
+
+
+def _hallucinator(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
+    load_hallucinator(run.hallucinator(name), vehicle)
+    return Counter({"networks of learned hallucination read": 1}), []
 
 
 def _recalls(path: Path) -> Findings:

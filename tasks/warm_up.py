@@ -10,8 +10,9 @@ from typing import Final
 import numpy as np
 
 from planners.memory.experience import Experience
-from planners.memory.hallucination import METHODS, hallucinate, no_plan
-from planners.memory.labels import free_plans
+from planners.memory.hallucination.mixture import hallucinate
+from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.labelling import label_problems
 from planners.search.registry import PLANNERS
 from planners.search.repair import blocked_states, repair
 from planners.solve import solve
@@ -61,10 +62,9 @@ def _compile_hallucination(vehicle: Vehicle) -> None:
     experience = Experience(replace(EMPTY, goal=end), plan, vehicle)
     for name in CLASSES:
         draw = problem_class(name, vehicle=vehicle).draw_obstacles
-        for method in METHODS:
-            made = hallucinate(method, experience, draw, generator(0), 0)
-            free_plans(experience.sweep, scene_of(made))
-            occupancy_of(made)
+        for method in ("rearrange", "maximal", "minimal"):
+            made = next(hallucinate(experience, {method: 1.0}, draw, generator(0)))
+            label_problems([made.problem], experience.sweep)
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 

@@ -78,7 +78,8 @@ def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
 
 
 @inlined
-def _sweep_is_free(sweeps: PlanSweeps, i: int, scene: Scene) -> tuple[bool, int]:
+def sweep_is_free(sweeps: PlanSweeps, i: int, scene: Scene) -> tuple[bool, int]:
+    """Whether plan ``i``'s sweep is free in a scene, and how many boxes were checked to know."""
     boxes = sweeps.boxes
     for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
         if not box_is_free(
@@ -93,7 +94,7 @@ def free_plans(sweeps: PlanSweeps, scene: Scene) -> Flags:
     """Label vector ``[N]``: which plans' sweeps are free in a scene of the canonical frame."""
     free = np.empty(sweeps.starts.shape[0] - 1, np.bool_)
     for i in range(free.shape[0]):
-        free[i], _ = _sweep_is_free(sweeps, i, scene)
+        free[i], _ = sweep_is_free(sweeps, i, scene)
     return free
 
 
@@ -119,7 +120,7 @@ def plan_is_free(
         return False, 0
     if math.hypot(sweeps.last_positions[i, 0] - goal[0], sweeps.last_positions[i, 1] - goal[1]) > goal_radius:
         return False, 0
-    return _sweep_is_free(sweeps, i, scene)
+    return sweep_is_free(sweeps, i, scene)
 
 
 @jit

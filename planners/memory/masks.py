@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from planners.memory.labels import PlanSweeps
+from planners.world.bodies import box_corners
 from planners.world.occupancy import GRID, Grid, draw_occupancy
-from planners.world.problem import BOUNDS, Floats
+from planners.world.problem import BOUNDS
 
 Masks = np.ndarray[tuple[int, ...], np.dtype[np.uint64]]
 
 ROUNDING_M = 1e-6  # boxes are drawn that much larger, so that rounding never loses a cell
 _EVERYWHERE = np.array([-np.inf, -np.inf, np.inf, np.inf])
-_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 def mask_of(grid: Grid) -> Masks:
@@ -32,16 +32,8 @@ def masks_of(sweeps: PlanSweeps) -> Masks:
     """
     masks = np.empty((len(sweeps.starts) - 1, GRID), np.uint64)
     for i in range(len(masks)):
-        corners = _corners(sweeps.boxes[sweeps.starts[i] : sweeps.starts[i + 1]])
+        corners = box_corners(sweeps.boxes[sweeps.starts[i] : sweeps.starts[i + 1]], ROUNDING_M)
         inside = np.all((corners > BOUNDS[:2]) & (corners < BOUNDS[2:]))
         starts = np.arange(0, len(corners) + 1, 4, dtype=np.int32)
         masks[i] = mask_of(draw_occupancy(corners, starts, _EVERYWHERE)) if inside else ~np.uint64(0)
     return masks
-
-
-def _corners(boxes: Floats) -> Floats:
-    """Corners ``[4 S, 2]`` of swept boxes ``[S, 6]``, four after four."""
-    centre, (cos, sin), half = boxes[:, :2], boxes[:, 2:4].T, boxes[:, 4:] + ROUNDING_M
-    turns = np.stack((np.stack((cos, sin), -1), np.stack((-sin, cos), -1)), 1)  # [S, 2, 2]
-    corners: Floats = (_CORNERS * half[:, None]) @ turns + centre[:, None]
-    return np.ascontiguousarray(corners.reshape(-1, 2))

@@ -35,6 +35,17 @@ def swept_boxes(states: Floats, vehicle: Vehicle = CAR) -> Floats:
     return boxes
 
 
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def box_corners(boxes: Floats, widened_m: float = 0.0) -> Floats:
+    """Corners ``[4 S, 2]`` of boxes ``[S, 6]`` as ``swept_boxes`` gives them, widened on every side."""
+    centre, (cos, sin), half = boxes[:, :2], boxes[:, 2:4].T, boxes[:, 4:] + widened_m
+    turns = np.stack((np.stack((cos, sin), -1), np.stack((-sin, cos), -1)), 1)  # [S, 2, 2]
+    corners: Floats = (_CORNERS * half[:, None]) @ turns + centre[:, None]
+    return np.ascontiguousarray(corners.reshape(-1, 2))
+
+
 def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
     """Corners ``[T, B, 4, 2]`` in metres of every body at every one of ``states [T, S]``, without margin."""
     bodies = [(states[:, :3], vehicle.front, vehicle.rear, vehicle.width)]

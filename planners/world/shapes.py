@@ -178,7 +178,7 @@ def add_shape(
 
 
 @jit
-def _distance(vertices: Floats, first: int, last: int, x: float, y: float) -> float:
+def distance_to_piece(vertices: Floats, first: int, last: int, x: float, y: float) -> float:
     """Distance in metres from a point to a convex counter-clockwise piece; 0 inside."""
     nearest = math.inf
     inside = True
@@ -209,7 +209,7 @@ def without_those_near(obstacles: Obstacles, rooms: Floats) -> Obstacles:
             first = obstacles.piece_starts[p]
             last = obstacles.piece_starts[p + 1]
             for r in range(rooms.shape[0]):
-                distance = _distance(obstacles.vertices, first, last, rooms[r, 0], rooms[r, 1])
+                distance = distance_to_piece(obstacles.vertices, first, last, rooms[r, 0], rooms[r, 1])
                 near = near or distance <= rooms[r, 2]
             end = piece_starts[pieces]
             for i in range(first, last):
@@ -242,7 +242,7 @@ def end_obstacle(canvas: Canvas) -> bool:
         first = canvas.piece_starts[p]
         last = canvas.piece_starts[p + 1]
         for x, y, room in (START_ROOM, GOAL_ROOM):
-            if _distance(vertices, first, last, x, y) <= room:
+            if distance_to_piece(vertices, first, last, x, y) <= room:
                 canvas.counts[0] = begin
                 return False
         for i in range(first, last):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,9 @@ from rich.table import Table
 
 from planners.memory.build_memory import build_memory
 from planners.memory.experience import Experience
-from planners.memory.hallucination import hallucinate, no_plan
+from planners.memory.hallucination.mixture import hallucinate
+from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.labelling import label_problems
 from planners.memory.labels import free_plans, sweep_plans
 from planners.memory.recall import Memory, nearest
 from planners.memory.training import TrainingSettings, train
@@ -83,19 +86,18 @@ def _made(name: str) -> Memory:
             experiences.append(Experience(problem, plan))
     plans = [experience.plan for experience in experiences]
     sweeps = sweep_plans(plans)
-    grids, made_for, labels = [], [], []
+    problems: list[Problem] = []
+    made_for: list[int] = []
     for i, experience in enumerate(track(experiences, description=f"memory of {name}", transient=True)):
-        problems = [
-            hallucinate("rearrange", experience, source.draw_obstacles, generator(COLLECTING, name, i, j), j)
-            for j in range(HALLUCINATED)
-        ]
+        rng = generator(COLLECTING, name, i)
+        made = hallucinate(experience, {"rearrange": 1.0}, source.draw_obstacles, rng)
+        problems += [problem for problem, _ in islice(made, HALLUCINATED)]
         rng = generator(COLLECTING, "no-plan", name, i)
         problems += [no_plan(sweeps, source.draw_obstacles, rng, name, j) for j in range(HALLUCINATED // 20)]
         made_for += [i] * HALLUCINATED + [-1] * (HALLUCINATED // 20)
-        grids += [np.packbits(occupancy_of(problem)) for problem in problems]
-        labels += [free_plans(sweeps, scene_of(problem)) for problem in problems]
-    packed, index_of = np.stack(grids), np.array(made_for, np.int32)
-    trained = train(packed, index_of, np.stack(labels), TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
+    packed, free = label_problems(problems, sweeps)
+    index_of = np.array(made_for, np.int32)
+    trained = train(packed, index_of, free, TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
     return build_memory(trained, plans, name)
 
 

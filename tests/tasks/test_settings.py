@@ -39,6 +39,9 @@ SETTINGS = st.builds(
         semi_hard=st.booleans(),
         hidden=st.lists(st.integers(1, 200), max_size=2).map(tuple),
     ),
+    hallucination=st.dictionaries(st.sampled_from(["minimal", "maximal"]), st.floats(0.1, 1.0)).map(
+        lambda shares: tuple(shares.items())
+    ),
 )
 
 
@@ -77,7 +80,7 @@ def test_a_run_of_another_vehicle_says_its_name() -> None:
 def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
     settings = for_preset("smoke")
     values = json.loads(settings.to_json())
-    del values["vehicle"], values["optimised"], values["learning"]
+    del values["vehicle"], values["optimised"], values["learning"], values["hallucination"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
@@ -110,6 +113,18 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
             {"vehicle": "tram"},
             "Unknown vehicle 'tram'. Known: car, differential-drive, car-1-trailer, car-2-trailers.",
         ),
+        (
+            {"hallucination": ["dream"]},
+            "Unknown hallucination method 'dream'. Known: rearrange, maximal, minimal, learned.",
+        ),
+        (
+            {"hallucination": []},
+            "No hallucination method. Name some of: rearrange, maximal, minimal, learned.",
+        ),
+        (
+            {"hallucination": ["minimal=0.3", "minimal"]},
+            "Hallucination method minimal is given twice. Give each once.",
+        ),
         ({"seed": -1}, "Seed -1 is negative. Give 0 or more."),
         ({"learning": {"seeds": 0}}, "0 training seeds: give 1 or more."),
         ({"learning": {"learning_rate": -1.0}}, "learning_rate is -1.0: give a number above 0."),
@@ -121,6 +136,20 @@ def test_what_cannot_be_done_is_refused_in_one_line(wrong: dict[str, object], to
     with pytest.raises(UsageError) as refused:
         for_preset(**wrong)  # type: ignore[arg-type]
     assert str(refused.value) == told
+
+
+@pytest.mark.parametrize("weight", ["", "0", "-1", "nan", "inf", "-inf", "1e300", "much", "0.5=0.5"])
+def test_a_share_that_is_no_weight_is_refused_in_one_line(weight: str) -> None:
+    with pytest.raises(UsageError, match=f"'minimal={weight}': give a weight above 0, like minimal=0.5."):
+        for_preset(hallucination=[f"minimal={weight}"])
+
+
+def test_shares_are_weights_and_their_order_says_nothing() -> None:
+    mixture = for_preset(hallucination=["minimal=3", "rearrange=7"]).hallucination
+    assert mixture == (("rearrange", 0.7), ("minimal", 0.3))
+    alone = for_preset("smoke", hallucination=["rearrange=5"])
+    assert alone.run_name == for_preset("smoke", hallucination=["rearrange"]).run_name
+    assert alone == for_preset("smoke")
 
 
 def test_settings_of_another_version_say_so() -> None:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -8,36 +10,52 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.memory.experience import Experience
-from planners.memory.hallucination import METHODS, Rearrange, _rearranged, hallucinate, no_plan
+from planners.memory.hallucination.learned_training import LearnedTraining, train_learned
+from planners.memory.hallucination.mixture import METHODS, hallucinate
+from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.hallucination.placing import corridor_of, largest_stride, obstacle_meets
+from planners.memory.hallucination.rearrange import Rearrange, _rearranged
 from planners.memory.labels import free_plans, sweep_plans
-from planners.memory.placing import largest_stride, obstacle_meets
 from planners.world.collision import count_free_prefix, scene_of
 from planners.world.dynamics import simulate
 from planners.world.problem import CAR, Plan, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicle import CAR_2_TRAILERS
+from tests.planners.memory.conftest import make_experiences
 
 SEEDS = st.integers(0, 2**32 - 1)
+
+
+@cache
+def learned():
+    return train_learned(make_experiences(8), 1, LearnedTraining(steps=20))
+
+
+def first_problems(method, experience, draw, seed, count):
+    made = hallucinate(experience, {method: 1.0}, draw, generator(seed), learned())
+    return [problem for problem, _ in islice(made, count)]
 
 
 @pytest.mark.parametrize("method", METHODS)
 @given(seed=SEEDS, which=st.integers(0, 7))
 def test_a_hallucinated_problem_is_solved_by_its_own_plan(experiences, draw, method, seed, which):
     experience = experiences[which]
-    problem = hallucinate(method, experience, draw, generator(seed), 3)
     states = experience.plan.states
-    assert count_free_prefix(states, CAR, scene_of(problem)) == len(states)
-    assert problem.id == f"{experience.problem.id}~{method}-3"
-    vertices = problem.obstacles.vertices
-    assert (vertices == vertices.astype(np.float32)).all()
+    for index, problem in enumerate(first_problems(method, experience, draw, seed, 2), start=1):
+        assert count_free_prefix(states, CAR, scene_of(problem)) == len(states)
+        assert problem.id == f"{experience.problem.id}~{method}-{index}"
+        vertices = problem.obstacles.vertices
+        assert (vertices == vertices.astype(np.float32)).all()
 
 
+@pytest.mark.parametrize("method", METHODS)
 @given(seed=SEEDS)
-@settings(max_examples=20)
-def test_the_same_generator_hallucinates_the_same_problem(experiences, draw, seed):
-    first, second = (hallucinate("rearrange", experiences[0], draw, generator(seed), 0) for _ in range(2))
-    for a, b in zip(first.obstacles, second.obstacles, strict=True):
-        assert (a == b).all()
+@settings(max_examples=10)
+def test_the_same_generator_hallucinates_the_same_problems(experiences, draw, method, seed):
+    first, second = (first_problems(method, experiences[0], draw, seed, 2) for _ in range(2))
+    for one, other in zip(first, second, strict=True):
+        for a, b in zip(one.obstacles, other.obstacles, strict=True):
+            assert (a == b).all()
 
 
 @given(seed=SEEDS, which=st.integers(0, 7))
@@ -45,7 +63,7 @@ def test_the_same_generator_hallucinates_the_same_problem(experiences, draw, see
 def test_rearranging_keeps_the_near_obstacles_and_draws_the_far_ones_anew(experiences, draw, seed, which):
     experience = experiences[which]
     fresh = draw(generator(seed, "fresh"))
-    obstacles = Rearrange(near_m=3.0)(experience, lambda _: fresh, generator(seed))
+    obstacles = Rearrange(near_m=3.0).around(experience, generator(seed))(lambda _: fresh, generator(seed))
     origin = experience.problem.obstacles
     stride = largest_stride(experience.boxes)
     obstacle_count = len(origin.obstacle_starts) - 1
@@ -89,8 +107,9 @@ def test_neither_does_it_with_trailers_and_they_meet_more_than_the_car(experienc
 def test_jitted_rearranging_equals_interpreted(experiences, draw):
     experience = experiences[0]
     fresh = draw(generator(5), 4)
-    goal_box = np.array([[[*experience.problem.goal, 1.0, 0.0, 2.0, 2.0]]])
-    arguments = (experience.problem.obstacles, fresh, experience.boxes[::8], goal_box, 3.0, 0.3, 0.05, 5)
+    corridor = corridor_of(experience)
+    corridor = corridor._replace(boxes=corridor.boxes[::8], stride_m=8.0 * corridor.stride_m)
+    arguments = (experience.problem.obstacles, fresh, corridor, 3.0, 0.3, 0.05, 5)
     jitted = _rearranged(*arguments, generator(9))
     interpreted = _rearranged.py_func(*arguments, generator(9))
     for a, b in zip(jitted, interpreted, strict=True):
@@ -115,15 +134,10 @@ def test_a_class_that_cannot_block_a_plan_is_reported(experiences):
 
 def test_an_experience_that_its_plan_does_not_solve_is_refused(experiences, draw):
     wrong = dataclasses.replace(experiences[0].problem, goal=(20.0, -6.0))
-    with pytest.raises(RuntimeError, match="does not solve it"):
-        hallucinate("rearrange", Experience(wrong, experiences[0].plan), draw, generator(0), 0)
-
-
-def test_an_unknown_method_is_refused_by_name(experiences, draw):
-    with pytest.raises(ValueError, match="'dream'; choose one of rearrange"):
-        hallucinate("dream", experiences[0], draw, generator(0), 0)
+    with pytest.raises(RuntimeError, match="is not solved by its own plan"):
+        first_problems("rearrange", Experience(wrong, experiences[0].plan), draw, 0, 1)
 
 
 def test_a_worlds_empty_draw_is_fine(experiences):
-    problem = hallucinate("rearrange", experiences[0], lambda _: obstacles_of([]), generator(0), 0)
+    (problem,) = first_problems("rearrange", experiences[0], lambda _: obstacles_of([]), 0, 1)
     assert free_plans(experiences[0].sweep, scene_of(problem))[0]

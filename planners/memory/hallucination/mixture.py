@@ -1,0 +1,80 @@
+"""The methods by name, and problems made by a mix of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.memory.encoder import Weights
+from planners.memory.experience import Experience
+from planners.memory.hallucination.learned import Learned
+from planners.memory.hallucination.maximal import Maximal
+from planners.memory.hallucination.method import DrawObstacles, Method
+from planners.memory.hallucination.minimal import Minimal
+from planners.memory.hallucination.rearrange import Rearrange
+from planners.memory.labels import plan_is_free
+from planners.world.collision import scene_of
+from planners.world.problem import Problem
+
+METHODS: Final = ("rearrange", "maximal", "minimal", "learned")
+LEARNED: Final = "learned"  # the one that needs weights
+
+
+class Hallucination(NamedTuple):
+    """A problem that was made for a plan."""
+
+    problem: Problem
+    method: str
+
+
+def method_named(name: str, weights: Weights | None = None) -> Method:
+    """A method with its default settings; ``weights`` are those of ``learned``, which the others ignore.
+
+    ValueError: it is not known, or its weights are missing.
+    """
+    if name == LEARNED:
+        if weights is None:
+            raise ValueError("Learned hallucination needs weights: train some with learned_training.")
+        return Learned(weights)
+    plain: dict[str, Method] = {"rearrange": Rearrange(), "maximal": Maximal(), "minimal": Minimal()}
+    if name not in plain:
+        raise ValueError(f"Unknown hallucination method {name!r}; choose one of {', '.join(METHODS)}.")
+    return plain[name]
+
+
+def hallucinate(
+    experience: Experience,
+    mixture: Mapping[str, float],
+    draw: DrawObstacles,
+    rng: np.random.Generator,
+    weights: Weights | None = None,
+) -> Iterator[Hallucination]:
+    """Problems without end for an experience's plan, each by a method drawn with its share of ``mixture``.
+
+    ``draw`` gives fresh obstacles of the class, ``weights`` are those of ``learned``.
+    RuntimeError: the plan does not solve its own problem.
+    """
+    origin = experience.problem
+    free, _ = plan_is_free(
+        experience.sweep, 0, scene_of(origin), origin.start, origin.goal, origin.goal_radius
+    )
+    if not free:
+        raise RuntimeError(f"{origin.id} is not solved by its own plan; collect it again")
+    samplers = [method_named(name, weights).around(experience, rng) for name in mixture]
+    names, limits = list(mixture), np.cumsum(list(mixture.values()))
+    index = 0
+    while True:
+        index += 1
+        which = int(np.searchsorted(limits[:-1], limits[-1] * rng.random(), side="right"))
+        problem = Problem(
+            id=f"{origin.id}~{names[which]}-{index}",
+            class_name=origin.class_name,
+            start=origin.start,
+            goal=origin.goal,
+            goal_radius=origin.goal_radius,
+            bounds=origin.bounds,
+            obstacles=samplers[which](draw, rng),
+        )
+        yield Hallucination(problem, names[which])

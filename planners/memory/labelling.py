@@ -1,0 +1,65 @@
+"""Occupancy grids and exact label vectors of many problems at once: what an encoder learns from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.memory.labels import Flags, PlanSweeps, free_plans
+from planners.world.collision import build_scene
+from planners.world.jit import jit
+from planners.world.occupancy import GRID, Grid, draw_occupancy
+from planners.world.problem import Floats, Integers, Problem
+
+
+class Labelled(NamedTuple):
+    """What is seen of n problems, and which of N plans are free in them."""
+
+    grids: Grid  # uint8 [n, 512] occupancy 64 x 64 as bits, as ``occupancy.pack`` has them
+    free: Flags  # [n, N]
+
+
+def label_problems(problems: Sequence[Problem], sweeps: PlanSweeps) -> Labelled:
+    """Grid and label vector of each of n canonical problems."""
+    corners = np.cumsum([0] + [len(problem.obstacles.vertices) for problem in problems], dtype=np.int32)
+    pieces = np.cumsum([0] + [len(problem.obstacles.piece_starts) for problem in problems], dtype=np.int32)
+    grids = np.empty((len(problems), GRID, GRID), np.uint8)
+    free = np.empty((len(problems), len(sweeps.starts) - 1), np.bool_)
+    if problems:
+        _label(
+            np.concatenate([problem.obstacles.vertices for problem in problems]),
+            corners,
+            np.concatenate([problem.obstacles.piece_starts for problem in problems]),
+            pieces,
+            np.array([problem.bounds for problem in problems]),
+            sweeps,
+            grids,
+            free,
+        )
+    return Labelled(np.packbits(grids.reshape(len(problems), GRID * GRID), axis=1), free)
+
+
+@jit
+def _label(
+    vertices: Floats,
+    corners: Integers,
+    piece_starts: Integers,
+    pieces: Integers,
+    bounds: Floats,
+    sweeps: PlanSweeps,
+    grids: Grid,
+    free: Flags,
+) -> None:
+    """Fill in ``grids`` and ``free``; problem i owns vertices corners[i] : corners[i + 1], and so on."""
+    for i in range(bounds.shape[0]):
+        shape = vertices[corners[i] : corners[i + 1]]
+        starts = piece_starts[pieces[i] : pieces[i + 1]]
+        grid = draw_occupancy(shape, starts, bounds[i])
+        for row in range(GRID):
+            for column in range(GRID):
+                grids[i, row, column] = grid[row, column]
+        labels = free_plans(sweeps, build_scene(shape, starts, bounds[i]))
+        for j in range(labels.shape[0]):
+            free[i, j] = labels[j]
