@@ -63,6 +63,18 @@ def build_memory(options: Options = NO_OPTIONS) -> None:
 
 
 @app.command
+def sweep(options: Options = NO_OPTIONS) -> None:
+    """Compare sizes of the encoder and learning rates on the hallucinated problems."""
+    _do("sweep", options)
+
+
+@app.command
+def experience_curve(options: Options = NO_OPTIONS) -> None:
+    """Make memories of 20, 40 ... 100 % of the experiences, and compare what they recall."""
+    _do("experience_curve", options)
+
+
+@app.command
 def benchmark(options: Options = NO_OPTIONS) -> None:
     """Solve unseen problems with and without memory: one row an attempt."""
     _do("benchmark", options)

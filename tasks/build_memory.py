@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
+import numpy as np
+import pandas as pd
+
+from dashboards.charts import training_curves
+from dashboards.embeddings import embedding_map
+from dashboards.style import save
 from planners.memory.build_memory import build_memory
 from planners.memory.recall import Memory
+from planners.world.occupancy import GRID
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
 from storage.experiences import read_experiences
 from storage.memories import save_memory
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done
 from tasks.settings import COMBINED, RunSettings
-from tasks.train import memory_names, train_chunks
+from tasks.train import memory_names, problems_of_memory, train_chunks
 from tasks.worlds import class_settings
+
+SHOWN_PROBLEMS: Final = 4_000  # on an embedding map
 
 
 def build_chunk(chunk: Chunk) -> dict[str, Any]:
@@ -24,6 +33,7 @@ def build_chunk(chunk: Chunk) -> dict[str, Any]:
         load_encoder(chunk.run.model(chunk.class_name, seed), vehicle).score for seed in range(len(built))
     ]
     best = scores.index(max(scores))
+    _draw(chunk, best, built[best])
     save_memory(chunk.run.memory(chunk.class_name), built[best])
     mark_done(chunk.run.memory(chunk.class_name), chunk.key)
     return {"plans": len(built[best].plans), "training_seed": best}
@@ -53,6 +63,25 @@ def memory_chunks(data: str, settings: RunSettings) -> list[Chunk]:
             [part.key for part in parts if part.class_name == name],
         )
     ]
+
+
+def figure_names(class_name: str) -> tuple[str, str]:
+    """Names of what is drawn of a memory's training."""
+    return f"training-{class_name}", f"embeddings-{class_name}"
+
+
+def _draw(chunk: Chunk, seed: int, memory: Memory) -> None:
+    """Draw the epochs of the training that was chosen, and where its encoder places held-out problems."""
+    name, run = chunk.class_name, chunk.run
+    trained = load_encoder(run.model(name, seed), memory.vehicle)
+    problems = problems_of_memory(chunk.data, chunk.settings, name)
+    shown = trained.held_out[:: -(-len(trained.held_out) // SHOWN_PROBLEMS)]  # they are sorted by plan
+    grids = np.unpackbits(problems.grids[shown], axis=1).reshape(-1, GRID, GRID)
+    epochs = pd.DataFrame(epoch._asdict() for epoch in trained.history)
+    curves, places = figure_names(name)
+    save(training_curves(epochs), run.figures, curves)
+    made_for = problems.plan_index[shown]
+    save(embedding_map(memory.encoder(grids), made_for, memory.centroids), run.figures, places)
 
 
 def memories_by_seed(chunk: Chunk) -> list[Memory]:

@@ -1,24 +1,19 @@
-"""Draw: the training of each memory, and some problems of each class with what was recalled and found."""
+"""Draw: some problems of each class with what was recalled and found."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any, Final
 
-import pandas as pd
-
-from dashboards.charts import training_curves
 from dashboards.pictures import Example, gallery
 from dashboards.style import save
 from planners.solve import solve
 from planners.world.vehicle import vehicle_named
-from storage.encoders import load_encoder
 from storage.memories import load_memory
 from storage.results import read_attempts
 from tasks.benchmark import benchmark_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.settings import RunSettings
-from tasks.train import memory_names
 from tasks.worlds import source_of
 
 SHOWN_PLANNER: Final = "gust"
@@ -28,18 +23,8 @@ SHOWN_EACH: Final = 2
 
 
 def draw_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Draw the figures of one memory."""
-    run, name = chunk.run, chunk.class_name
-    vehicle = vehicle_named(chunk.settings.vehicle)
-    seed = load_memory(run.memory(name), vehicle).metadata["training_seed"]
-    epochs = pd.DataFrame(epoch._asdict() for epoch in load_encoder(run.model(name, seed), vehicle).history)
-    drawn = save(training_curves(epochs), run.figures, f"training-{name}")
-    if name in chunk.settings.class_names:
-        drawn += save(
-            gallery(list(_examples(chunk))),
-            run.figures,
-            f"problems-{name}",
-        )
+    """Draw the figures of one class."""
+    drawn = save(gallery(list(_examples(chunk))), chunk.run.figures, f"problems-{chunk.class_name}")
     return {"figures": [path.name for path in drawn]}
 
 
@@ -47,16 +32,16 @@ draw_figures = chunk_task(draw_chunk)
 
 
 def is_drawn(chunk: Chunk) -> bool:
-    """Whether the figures of a memory are there."""
-    return (chunk.run.figures / f"training-{chunk.class_name}.svg").exists()
+    """Whether the figures of a class are there."""
+    return (chunk.run.figures / f"problems-{chunk.class_name}.svg").exists()
 
 
 def figure_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each memory."""
+    """One chunk for each class."""
     rows = [chunk.key for chunk in benchmark_chunks(data, settings)]
     return [
         chunk
-        for name in memory_names(settings)
+        for name in settings.class_names
         for chunk in chunks_of(data, settings, "draw", name, 1, 1, rows)
     ]
 

@@ -15,9 +15,11 @@ import pandas as pd
 from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
+from tasks.build_memory import figure_names
 from tasks.caching import Chunk, key_of, run_folder
 from tasks.report import Report
 from tasks.settings import RunSettings
+from tasks.sweep import swept
 from tasks.tracking import Tracker
 
 _SHOWN = ("solved", "mean_ms", "median_ms", "p90_ms", "reduction", "recalled", "collision_checks")
@@ -71,7 +73,8 @@ def log_memories(
         with _child(data, settings, _stage(settings, name, result["training_seed"])) as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
                 log.memory(run_id, "memory", run.memory(name), settings.vehicle)
-                log.artifacts(run_id, run.figures / "retrieval.png", "figures")
+                for figure in ("retrieval", *figure_names(name)):
+                    log.artifacts(run_id, run.figures / f"{figure}.png", "figures")
                 log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
                 log.mark_logged(run_id, chunk.key, "memory")
 
@@ -111,6 +114,25 @@ def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
 def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
     """The name of a training: with several seeds it says which."""
     return f"train {class_name}" + (f" seed {seed}" if settings.learning.seeds > 1 else "")
+
+
+def log_sweep(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
+    """One run for the sweep, and in it a child for each variant: parameters, metrics of every epoch."""
+    log = tracker(data)
+    with _child(data, settings, "sweep") as parent:
+        for chunk in chunks:
+            row, epochs = swept(chunk)
+            stage = f"sweep {chunk.class_name} {chunk.index}"
+            with log.run(settings.run_name, stage, {}, parent=parent) as run_id:
+                if log.is_logged(run_id, chunk.key):
+                    continue
+                found = ("hit@1", "hit@5", "seconds")
+                log.parameters(run_id, {name: value for name, value in row.items() if name not in found})
+                log.metrics(run_id, epochs, step="epoch")
+                log.metrics(
+                    run_id, [{f"of_oracle_{name.replace('@', '_')}": row[name] for name in found[:2]}]
+                )
+                log.mark_logged(run_id, chunk.key)
 
 
 @contextmanager

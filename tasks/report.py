@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,13 +13,15 @@ from dashboards.charts import planning_times, retrieval_curves
 from dashboards.retrieval import retrieval_curve, summarise_retrieval
 from dashboards.statistics import summarise
 from dashboards.style import save
+from dashboards.sweep import sweep_table
 from dashboards.tables import as_csv, retrieval_markdown, retrieval_table, summary_markdown, summary_table
 from storage.files import whole_file
 from storage.recalls import read_recalls
 from storage.results import read_attempts
-from tasks.caching import run_folder
+from tasks.caching import Chunk, run_folder
 from tasks.recalls import recall_chunks
 from tasks.settings import RunSettings
+from tasks.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
 
@@ -61,6 +64,11 @@ def show(report: Report) -> None:
 def show_retrieval(retrieval: pd.DataFrame) -> None:
     """Print what the memories recall."""
     _console().print(retrieval_table(retrieval))
+
+
+def show_sweep(chunks: Sequence[Chunk]) -> None:
+    """Print what the variants of a sweep came to."""
+    _console().print(sweep_table(sweep_rows(chunks)))
 
 
 def _console() -> Console:

@@ -55,7 +55,7 @@ def _workers_for(
     from tasks.warm_up import warm_up
 
     with ExitStack() as stack:
-        if name in ("run", "train", "build_memory", "report"):
+        if name not in ("collect", "hallucinate", "benchmark"):
             tracker(str(folder.path))
         address = stack.enter_context(cluster(workers, scheduler))
         local = scheduler is None and name != "report"

@@ -1,0 +1,26 @@
+"""How recall improves with experience."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from flows.build_memory import build_memory
+from flows.collect import collect
+from flows.hallucinate import hallucinate
+from flows.train import train
+from tasks.engine import cluster
+from tasks.experience_curve import report_curve, runs_of_curve
+from tasks.settings import RunSettings
+
+
+@flow(name="experience-curve")
+def experience_curve(settings: RunSettings, data: str) -> None:
+    """Make memories of more and more experiences, each from the first stage on, and compare their recall."""
+    runs = runs_of_curve(settings)
+    with cluster():
+        for run in runs:
+            collect(run, data)
+            hallucinate(run, data)
+            train(run, data)
+            build_memory(run, data)
+    report_curve(data, runs)

@@ -1,0 +1,20 @@
+"""Compare sizes of the encoder and learning rates."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from tasks.engine import fan_out, task_runner
+from tasks.logbook import log_sweep
+from tasks.report import show_sweep
+from tasks.settings import RunSettings
+from tasks.sweep import is_swept, sweep_chunks, sweep_variant
+
+
+@flow(name="sweep", task_runner=task_runner())
+def sweep(settings: RunSettings, data: str) -> None:
+    """Train each variant on the hallucinated problems, as children of one run, and print what came of it."""
+    chunks = sweep_chunks(data, settings)
+    fan_out(sweep_variant, chunks, "sweep, epochs", is_swept)
+    log_sweep(data, settings, chunks)
+    show_sweep(chunks)
