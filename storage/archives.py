@@ -27,7 +27,7 @@ VERSION: Final = 2  # one more whenever an older program could no longer read an
 LARGEST_HEADER_BYTES: Final = 1 << 24
 _NAME: Final = re.compile(r"[a-z0-9_]{1,40}\.[a-z]{1,20}")
 
-Contents = mmap.mmap  # a whole file, read-only
+Contents = mmap.mmap  # a whole file; kernels would be compiled anew for arrays that cannot be written to
 Files = Mapping[str, bytes | Array]
 
 
@@ -153,7 +153,7 @@ def _hashed(paths: list[Path]) -> dict[str, tuple[Contents, str]]:
     for path in paths:  # threads gain nothing: one file, the states, is most of an archive
         try:
             with path.open("rb") as file:
-                contents = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+                contents = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
         except OSError as error:
             raise StorageError(f"{path} cannot be read: {error.strerror}; copy or build it again.") from None
         found[path.name] = contents, hashlib.sha256(contents).hexdigest()

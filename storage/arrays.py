@@ -26,7 +26,7 @@ def write_array(file: BinaryIO, array: Array) -> None:
 
 
 def array_of(contents: mmap | bytes, dtype: str, columns: tuple[int, ...] = ()) -> Array:
-    """The array ``[n, *columns]`` of a type like ``"<f8"`` in a file's contents, read-only, not copied.
+    """The array ``[n, *columns]`` of a type like ``"<f8"`` in a file's contents, not copied.
 
     ValueError: the contents are anything else.
     """

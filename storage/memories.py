@@ -15,14 +15,17 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from planners.memory.encoder import Architecture, Floats32, Weights, architecture_of, to_onnx
-from planners.memory.labels import sweep_plans
+from planners.memory.encoder import Architecture, Floats32, architecture_of, to_onnx
+from planners.memory.inverted_lists import lists_with
+from planners.memory.labels import PlanSweeps, sweeps_with
 from planners.memory.recall import Memory
 from planners.memory.stored_plans import StoredPlans, store_plans
+from planners.world.bodies import body_count
 from planners.world.occupancy import GRID
 from planners.world.vehicle import CAR, Vehicle, state_size
 from storage.archives import Contents, Files, read_archive, write_archive
 from storage.arrays import array_of
+from storage.columns import Array
 from storage.errors import StorageError
 
 _KIND: Final = "memory"
@@ -30,8 +33,10 @@ _WEIGHTS: Final = "encoder.safetensors"
 _ONNX: Final = "encoder.onnx"
 _READOUT: Final = "readout.safetensors"
 _FILES: Final = {
-    _WEIGHTS, _ONNX, _READOUT, "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy"
+    _WEIGHTS, _ONNX, _READOUT,
+    "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy", "boxes.npy",
 }  # fmt: skip
+_LISTS: Final = "lists.safetensors"  # of very many plans only
 
 
 def save_memory(folder: Path, memory: Memory) -> None:
@@ -54,7 +59,11 @@ def save_memory(folder: Path, memory: Memory) -> None:
         "plan_starts.npy": plans.starts,
         "dt.npy": plans.dt,
         "masks.npy": memory.masks,
+        "boxes.npy": memory.sweeps.boxes,
     }
+    if memory.lists is not None:
+        kept = {name: getattr(memory.lists, name) for name in ("centres", "starts", "plans")}
+        files = {**files, _LISTS: _tensors(kept)}
     write_archive(folder, _KIND, memory.vehicle, header, files)
 
 
@@ -65,8 +74,8 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
-        if files.keys() != _FILES:
-            odd = ", ".join(sorted(files.keys() ^ _FILES))
+        if files.keys() - {_LISTS} != _FILES:
+            odd = ", ".join(sorted((files.keys() - {_LISTS}) ^ _FILES))
             raise ValueError(f"it lacks or has too much of: {odd}")
         weights, readout = load(bytes(files[_WEIGHTS])), load(bytes(files[_READOUT]))
         sizes = _sizes(architecture_of(weights))
@@ -81,12 +90,17 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
             class_name=_text(header["class"]),
             vehicle=vehicle,
             plans=plans,
-            sweeps=sweep_plans(plans, vehicle),
+            sweeps=_sweeps(files, plans, vehicle),
             masks=array_of(files["masks.npy"], "<u8", (GRID,)),
             **readout,
             objective=_text(header["objective"]),
             weights=weights,
             metadata=dict(header["metadata"]),
+            lists=(
+                lists_with(**load(bytes(files[_LISTS])), vectors=readout["vectors"], biases=readout["biases"])
+                if _LISTS in files
+                else None
+            ),
         )
     except (KeyError, TypeError, ValueError, SafetensorError) as error:
         raise StorageError(f"{folder} is no whole memory ({error}); build it again.") from None
@@ -100,9 +114,21 @@ def _plans(files: Mapping[str, Contents], size: int) -> StoredPlans:
         array_of(files["dt.npy"], "<f8"),
     )
     for numbers in (plans.states, plans.controls, plans.dt):
-        if not (np.isfinite(numbers.min(initial=0.0)) and np.isfinite(numbers.max(initial=0.0))):
-            raise ValueError("its plans have numbers that are not finite")
+        _check_finite(numbers)
     return plans
+
+
+def _sweeps(files: Mapping[str, Contents], plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
+    boxes = array_of(files["boxes.npy"], "<f8", (6,))
+    if len(boxes) != body_count(vehicle) * len(plans.states):
+        raise ValueError(f"it has {len(boxes)} swept boxes of {len(plans.states)} states")
+    _check_finite(boxes)
+    return sweeps_with(boxes, plans)
+
+
+def _check_finite(numbers: Array) -> None:
+    if not (np.isfinite(numbers.min(initial=0.0)) and np.isfinite(numbers.max(initial=0.0))):
+        raise ValueError("its plans have numbers that are not finite")
 
 
 def _check_numbers(tensors: Mapping[str, Floats32]) -> None:
@@ -112,7 +138,7 @@ def _check_numbers(tensors: Mapping[str, Floats32]) -> None:
             raise ValueError(f"{name} is no array of float32 numbers")
 
 
-def _tensors(tensors: Weights) -> bytes:
+def _tensors(tensors: Mapping[str, Array]) -> bytes:
     return save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()})
 
 

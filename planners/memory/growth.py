@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.memory.encoder import Floats32
+from planners.memory.inverted_lists import FROM_PLANS, list_readout
 from planners.memory.labels import Flags, free_plans, sweep_plans
 from planners.memory.masks import masks_of
 from planners.memory.readout import NO_PLAN_ODDS, nearest_readout
@@ -65,6 +66,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
         centroids=centroids,
         vectors=vectors,
         biases=biases,
+        lists=list_readout(vectors, biases) if len(plans) >= FROM_PLANS else None,
     )
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.stored_plans import Offsets, store_plans
+from planners.memory.stored_plans import Offsets, StoredPlans, store_plans
 from planners.world.bodies import body_count
 from planners.world.collision import Scene, box_is_free
 from planners.world.dynamics import load, swept_bodies
@@ -68,13 +68,20 @@ def _fill_sweeps(states: Floats, starts: Offsets, vehicle: Vehicle, boxes: Float
 
 def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
     """Pack the swept boxes of ``plans``."""
-    each = body_count(vehicle)
     stored = store_plans(plans, state_size(vehicle))
-    states, starts = stored.states, stored.starts
-    boxes = np.empty((each * len(states), 6))
-    _fill_sweeps(states, starts, vehicle, boxes)
-    first, last = states[starts[:-1]], states[starts[1:] - 1]
-    return PlanSweeps(boxes, (each * starts).astype(np.int32), first[:, :3].copy(), last[:, :2].copy())
+    boxes = np.empty((body_count(vehicle) * len(stored.states), 6))
+    _fill_sweeps(stored.states, stored.starts, vehicle, boxes)
+    return sweeps_with(boxes, stored)
+
+
+def sweeps_with(boxes: Floats, plans: StoredPlans) -> PlanSweeps:
+    """The sweeps of ``plans`` whose boxes were made before; ValueError where there are too few or many."""
+    bodies, rest = divmod(len(boxes), max(1, len(plans.states)))
+    if rest or (len(boxes) > 0) != (bodies > 0):
+        raise ValueError(f"{len(boxes)} swept boxes are none of {len(plans.states)} states")
+    first, last = plans.states[plans.starts[:-1]], plans.states[plans.starts[1:] - 1]
+    starts = (bodies * plans.starts).astype(np.int32)
+    return PlanSweeps(boxes, starts, first[:, :3].copy(), last[:, :2].copy())
 
 
 @inlined

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from planners.memory.encoder import Encoder, Floats32, Weights, to_onnx
+from planners.memory.inverted_lists import InvertedLists
 from planners.memory.labels import PlanSweeps
 from planners.memory.masks import Masks
 from planners.world.occupancy import Grid
@@ -37,6 +38,7 @@ class Memory:
     objective: str  # what the encoder was trained for: "triplet" or "labels"
     weights: Weights  # of the encoder
     metadata: dict[str, Any] = field(default_factory=dict)  # JSON values only
+    lists: InvertedLists | None = None  # over the readout of very many plans
 
     def __post_init__(self) -> None:
         rows = len(self.plans) + 1

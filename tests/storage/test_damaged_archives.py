@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from hashlib import sha256
 from itertools import combinations
 from pathlib import Path
@@ -19,6 +20,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from planners.memory.inverted_lists import list_readout
 from storage.archives import _signed
 from storage.arrays import HEADER_BYTES, array_of, write_array
 from storage.errors import StorageError
@@ -35,6 +37,8 @@ FILES = (
     "plan_starts.npy",
     "dt.npy",
     "masks.npy",
+    "boxes.npy",
+    "lists.safetensors",
 )
 many = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
@@ -42,7 +46,8 @@ many = settings(deadline=None, suppress_health_check=[HealthCheck.function_scope
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("archives") / "whole"
-    save_memory(folder, a_memory(2))
+    memory = a_memory(2)
+    save_memory(folder, replace(memory, lists=list_readout(memory.vectors, memory.biases)))
     assert {file.name for file in folder.iterdir()} == set(FILES)
     return folder
 
