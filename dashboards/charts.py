@@ -19,7 +19,6 @@ from dashboards.style import (
     INK,
     NOTE_SIZE,
     ORANGE,
-    PURPLE,
     SKY,
     VERMILLION,
     YELLOW,
@@ -34,25 +33,28 @@ PLANNING_TIME_NOTE: Final = (
     "one thread, compiled code warm. Failures keep their time."
 )
 CONTROLS_NOTE: Final = (
-    "closed, open, repair: with the best recalled plans (their number). Controls: all plans: every stored "
-    "plan is checked; fresh guide: no memory, the planner is led along a way over the occupancy grid."
+    "closed, open, repair: with the recall that is best for the memory, and as many plans as said. enc.: "
+    "with what the encoder recalls alone, as in the paper. fresh guide, a control: no memory, the planner is "
+    "led along a way over the occupancy grid."
 )
 PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
 
-_BARS: Final = {
-    ("none", 0): ("none", GREY),
-    ("closed", 1): ("closed\n1", SKY),
-    ("closed", 5): ("closed\n5", BLUE),
-    ("open", 1): ("open\n1", ORANGE),
-    ("open", 5): ("open\n5", VERMILLION),
-    ("repair", 5): ("repair\n5", GREEN),
-    ("exhaustive", 0): ("all\nplans", PURPLE),
-    ("fresh", 0): ("fresh\nguide", YELLOW),
+_ENCODER: Final = "centroid"
+_BARS: Final = {  # assist, whether the encoder alone recalled, top k
+    ("none", False, 0): ("none", GREY),
+    ("closed", False, 5): ("closed\n5", BLUE),
+    ("open", False, 5): ("open\n5", VERMILLION),
+    ("repair", False, 5): ("repair\n5", GREEN),
+    ("closed", True, 1): ("enc.\nclosed\n1", SKY),
+    ("closed", True, 5): ("enc.\nclosed\n5", SKY),
+    ("open", True, 1): ("enc.\nopen\n1", ORANGE),
+    ("open", True, 5): ("enc.\nopen\n5", ORANGE),
+    ("fresh", False, 0): ("fresh\nguide", YELLOW),
 }
 
 
 def planning_times(summary: pd.DataFrame) -> Figure:
-    """Mean planning time of the baseline, five uses of the memory, and two controls.
+    """Mean planning time alone, with the memory and its best recall, with the encoder's, and a control.
 
     A row a planner, a column a class.
     ``summary`` is ``statistics.summarise``'s. Whiskers are its 95 % intervals; each bar but the baseline's
@@ -175,7 +177,9 @@ def anytime_curves(history: pd.DataFrame) -> Figure:
 
 def _bars(axes: Axes, rows: pd.DataFrame) -> None:
     """The bars of one panel; a configuration without attempts is said to be missing."""
-    by_key = {(row["assist"], int(row["top_k"])): row for _, row in rows.iterrows()}
+    by_key = {
+        (row["assist"], row["recall"] == _ENCODER, int(row["top_k"])): row for _, row in rows.iterrows()
+    }
     top = max((by_key[key]["mean_high_ms"] for key in _BARS if key in by_key), default=1.0)
     axes.set_ylim(0.0, 1.22 * top)
     for x, (key, (_, colour)) in enumerate(_BARS.items()):
@@ -189,7 +193,7 @@ def _bars(axes: Axes, rows: pd.DataFrame) -> None:
         axes.bar(x, mean, width=0.72, color=colour)
         axes.errorbar(x, mean, [[mean - low], [high - mean]], color=INK, linewidth=1.0, capsize=2.5)
         axes.annotate(
-            _duration(mean) if key == ("none", 0) else _change(reduction),
+            _duration(mean) if key == ("none", False, 0) else _change(reduction),
             (x, high),
             (0, 4),
             textcoords="offset points",

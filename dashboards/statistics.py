@@ -6,7 +6,7 @@ Failures stay in every figure with the time they took; a mean over survivors is 
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -20,9 +20,9 @@ COMBINED: Final = "combined"  # the memory of all classes; its attempts form a p
 PANELS: Final = ("curves", "random", "trap")
 PLANNERS: Final = ("rrt", "gust", "follow")
 ASSISTS: Final = (
-    "none", "closed", "open", "repair", "exhaustive", "fresh",
-    "random-closed", "random-open", "random-repair",
+    "none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair",
 )  # fmt: skip
+RECALLS: Final = ("exhaustive", "hybrid", "mask", "centroid", "random")
 
 _CHUNK_VALUES: Final = 2_000_000  # resampled counts held at once: 16 MB
 
@@ -42,16 +42,17 @@ def panels(attempts: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def summarise(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
-    """One row per panel, planner, assist and top_k, in reading order.
+    """One row per panel, planner, assist, recall and top_k, in reading order.
 
-    Columns ``panel, planner, assist, top_k, problems, solved, mean_ms, mean_low_ms, mean_high_ms, median_ms,
-    p90_ms, reduction, reduction_low, reduction_high, recalled, collision_checks``. Shares and reductions are
-    fractions; ``reduction`` is that of mean planning time against the same planner's ``none`` on the problems
-    that both attempted (NaN where there are none), with a bootstrap interval that resamples problems.
+    Columns ``panel, planner, assist, recall, top_k, problems, solved, mean_ms, mean_low_ms, mean_high_ms,
+    median_ms, p90_ms, reduction, reduction_low, reduction_high, recalled, collision_checks``. Shares and
+    reductions are fractions; ``reduction`` is that of mean planning time against the same planner's ``none``
+    on the problems that both attempted (NaN where there are none), with a bootstrap interval that resamples
+    problems.
     """
     tables = [
         _summarise_panel(name, rows, seed, resamples)
-        for name, rows in panels(attempts.assign(top_k=_effective_top_k(attempts))).items()
+        for name, rows in panels(attempts.assign(**_asked(attempts))).items()
     ]
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(_COLUMNS))
 
@@ -93,19 +94,24 @@ def ranked(names: Iterable[Hashable], known: tuple[str, ...]) -> list[str]:
 
 
 _COLUMNS: Final = (
-    "panel", "planner", "assist", "top_k", "problems", "solved", "mean_ms", "mean_low_ms", "mean_high_ms",
-    "median_ms", "p90_ms", "reduction", "reduction_low", "reduction_high", "recalled", "collision_checks",
+    "panel", "planner", "assist", "recall", "top_k", "problems", "solved", "mean_ms", "mean_low_ms",
+    "mean_high_ms", "median_ms", "p90_ms", "reduction", "reduction_low", "reduction_high", "recalled",
+    "collision_checks",
 )  # fmt: skip
 
 
-def _effective_top_k(attempts: pd.DataFrame) -> pd.Series[int]:
-    """Nothing is recalled without assistance, whatever top_k was asked for: one baseline a planner."""
-    return attempts["top_k"].where(attempts["assist"] != "none", 0).astype(int)
+def _asked(attempts: pd.DataFrame) -> dict[str, pd.Series[Any]]:
+    """What was recalled, and how: nothing and not at all without assistance, so one baseline a planner."""
+    assisted = attempts["assist"] != "none"
+    return {
+        "top_k": attempts["top_k"].where(assisted, 0).astype(int),
+        "recall": attempts["recall"].where(assisted).fillna(""),
+    }
 
 
 def _summarise_panel(panel: str, rows: pd.DataFrame, seed: int, resamples: int) -> pd.DataFrame:
     """The summary of one panel: one row per planner and configuration."""
-    keys = ["planner", "assist", "top_k"]
+    keys = ["planner", "assist", "recall", "top_k"]
     rows = rows.assign(
         milliseconds=1e3 * rows["planning_seconds"],
         solved=rows["solved"].astype(float),
@@ -122,7 +128,11 @@ def _summarise_panel(panel: str, rows: pd.DataFrame, seed: int, resamples: int) 
     )
     planner_rank = {name: i for i, name in enumerate(ranked(rows["planner"], PLANNERS))}
     assist_rank = {name: i for i, name in enumerate(ranked(rows["assist"], ASSISTS))}
-    order = sorted(table.index, key=lambda key: (planner_rank[key[0]], assist_rank[key[1]], key[2]))
+    recall_rank = {name: i for i, name in enumerate(ranked(rows["recall"], RECALLS))}
+    order = sorted(
+        table.index,
+        key=lambda key: (planner_rank[key[0]], assist_rank[key[1]], recall_rank[key[2]], key[3]),
+    )
     table = table.loc[order]
 
     # Sorted by problem, so that the order of the rows cannot change the result.
@@ -133,7 +143,7 @@ def _summarise_panel(panel: str, rows: pd.DataFrame, seed: int, resamples: int) 
     nothing = np.full(len(times), np.nan)
     baseline = np.column_stack(
         [
-            times[key].to_numpy(float) if (key := (planner, "none", 0)) in table.index else nothing
+            times[key].to_numpy(float) if (key := (planner, "none", "", 0)) in table.index else nothing
             for planner, *_ in order
         ]
     )

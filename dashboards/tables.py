@@ -12,12 +12,12 @@ from rich import box
 from rich.console import Group
 from rich.table import Table
 
-from dashboards.statistics import ASSISTS, PLANNERS, ranked
+from dashboards.statistics import ASSISTS, PLANNERS, RECALLS, ranked
 from planners.world.problem import Floats
 
 NOTHING: Final = "–"
 _HEADINGS: Final = (
-    "planner", "assist", "solved %", "mean ms", "median ms", "90 % ms", "reduction % [95 %]", "recalled %",
+    "planner", "assist", "solved %", "mean ms", "median", "90 %", "reduction % [95 %]", "recalled",
     "checks",
 )  # fmt: skip
 _RETRIEVAL_HEADINGS: Final = (
@@ -36,9 +36,10 @@ _NAMES: Final = {
 _Rows = list[list[str]]
 
 
-def configuration(assist: str, top_k: int) -> str:
-    """The name of a configuration in tables and figures, as ``closed 5``, or ``none``."""
-    return f"{assist} {top_k}" if top_k else assist
+def configuration(assist: str, recall: str, top_k: int) -> str:
+    """The name of a configuration in tables, as ``closed 5 centroid``, ``random-open 5``, or ``none``."""
+    strategy = f" {recall}" if recall not in ("", "random") else ""  # the assist says that it is random
+    return f"{assist} {top_k}{strategy}" if top_k else assist
 
 
 def summary_table(summary: pd.DataFrame) -> Group:
@@ -80,19 +81,21 @@ def _panels(summary: pd.DataFrame) -> list[tuple[str, list[_Rows]]]:
     for panel in summary["panel"].unique():
         rows = summary[summary["panel"] == panel]
         decimals = _decimals(rows[["mean_ms", "median_ms"]].to_numpy(dtype=float))
-        by_key = {(row["planner"], row["assist"], row["top_k"]): row for _, row in rows.iterrows()}
+        by_key = {
+            (row["planner"], row["assist"], row["recall"], row["top_k"]): row for _, row in rows.iterrows()
+        }
         groups = []
         for planner in ranked(summary["planner"], PLANNERS):
             wanted = summary[summary["planner"] == planner]
-            assists = ranked(wanted["assist"], ASSISTS)
+            assists, recalls = ranked(wanted["assist"], ASSISTS), ranked(wanted["recall"], RECALLS)
             keys = {
-                (assists.index(assist), assist, k)
-                for assist, k in zip(wanted["assist"], wanted["top_k"], strict=True)
+                (assists.index(assist), recalls.index(recall), assist, recall, k)
+                for assist, recall, k in zip(wanted["assist"], wanted["recall"], wanted["top_k"], strict=True)
             }
             groups.append(
                 [
-                    [planner, configuration(assist, k), *_cells(by_key.get((planner, assist, k)), decimals)]
-                    for _, assist, k in sorted(keys)
+                    [planner, configuration(*key), *_cells(by_key.get((planner, *key)), decimals)]
+                    for _, _, *key in sorted(keys)
                 ]
             )
         titled.append((f"{panel}, {int(rows['problems'].max()):,} problems", groups))

@@ -112,6 +112,7 @@ def plan(
     planner: str = "gust",
     assist: str = "none",
     top_k: int = 5,
+    recall: str | None = None,
     memory: str | None = None,
     vehicle: str = "car",
     seed: int = 1,
@@ -128,9 +129,11 @@ def plan(
     planner
         rrt, gust or follow.
     assist
-        How the memory helps: none, closed, open, repair, exhaustive; or fresh, a guide without memory.
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
     top_k
         How many plans are recalled.
+    recall
+        How they are found: exhaustive, mask, hybrid, centroid, random; by default the best for the memory.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
@@ -147,7 +150,7 @@ def plan(
     """
     from tasks.solve import Assistant, plan_one
 
-    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
     plan_one(assistant, problem, out, picture)
 
 
@@ -201,6 +204,7 @@ def solve(
     planner: str = "gust",
     assist: str = "none",
     top_k: int = 5,
+    recall: str | None = None,
     memory: str | None = None,
     vehicle: str = "car",
     seed: int = 1,
@@ -217,9 +221,11 @@ def solve(
     planner
         rrt, gust or follow.
     assist
-        How the memory helps: none, closed, open, repair, exhaustive; or fresh, a guide without memory.
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
     top_k
         How many plans are recalled.
+    recall
+        How they are found: exhaustive, mask, hybrid, centroid, random; by default the best for the memory.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
@@ -236,7 +242,7 @@ def solve(
     """
     from tasks.solve import Assistant, solve_many
 
-    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds)
+    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
     solve_many(assistant, problems, out, plans)
 
 

@@ -85,7 +85,7 @@ ATTEMPTS: Final = _schema(
         ("problem_id", pa.string()),
         ("problem_class", pa.string()),
         ("planner", pa.string()),
-        ("assist", pa.string()),  # none, closed, open, repair, exhaustive, fresh, random-...
+        ("assist", pa.string()),  # none, closed, open, repair, fresh, random-...
         ("top_k", pa.int32()),
         ("memory", pa.string()),
         ("status", pa.string()),
@@ -113,8 +113,9 @@ ATTEMPTS: Final = _schema(
         ("repair_seconds", pa.float64()),  # repairing a recalled plan, in vain or not
         ("verified", pa.bool_()),  # an independent check agreed; null where none was made
         ("vehicle", pa.string()),  # its name
+        ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
     ],
-    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle"),
+    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall"),
 )
 
 
@@ -130,7 +131,7 @@ def recalls(plans: int) -> pa.Schema:
             ("order", pa.list_(pa.int16())),  # all plans, the best first
             ("free", pa.binary((plans + 7) // 8)),  # which plans are free, most significant bit first
             ("nothing_recalled", pa.bool_()),
-            ("recall", pa.string()),  # what ranked the plans: centroid, or the control popularity
+            ("recall", pa.string()),  # what ranked the plans: centroid, mask, or the control popularity
             ("training_seed", pa.int32()),  # number of the seed that the encoder was trained with, from 0
             ("made_for", pa.int32()),  # the plan that a held-out problem was made for; -1: none
         ],

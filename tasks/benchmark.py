@@ -113,8 +113,10 @@ def _attempt(
 ) -> Attempt:
     memory = memories[asked.memory] if asked.memory else None
     vehicle = vehicle_named(settings.vehicle)
-    assist, top_k = asked.assist
-    return solve(problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle)
+    assist, top_k, strategy = asked.assist
+    return solve(
+        problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle, strategy=strategy
+    )
 
 
 @contextmanager

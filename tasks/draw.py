@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from dashboards.pictures import Example, gallery
 from dashboards.style import save
+from planners.memory.recall import default_recall
 from planners.solve import solve
 from planners.world.vehicle import vehicle_named
 from storage.memories import load_memory
@@ -51,12 +52,13 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
     settings, name = chunk.settings, chunk.class_name
     planner = SHOWN_PLANNER if SHOWN_PLANNER in settings.planners else settings.planners[0]
     rows = read_attempts(chunk.run.results / name)
-    rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
-    rows = rows[(rows["assist"] == "open") & (rows["top_k"] == SHOWN_TOP_K)]
-    places = {identity: index for index, identity in enumerate(rows["problem_id"])}
-    source = source_of(chunk.data, settings, name)
     vehicle = vehicle_named(settings.vehicle)
     memory = load_memory(chunk.run.memory(name), vehicle)
+    rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
+    rows = rows[(rows["assist"] == "open") & (rows["top_k"] == SHOWN_TOP_K)]
+    rows = rows[rows["recall"] == default_recall(memory)]
+    places = {identity: index for index, identity in enumerate(rows["problem_id"])}
+    source = source_of(chunk.data, settings, name)
     for kind in SHOWN_SOURCES:
         shown = rows[rows["source"] == kind].head(SHOWN_EACH)
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):

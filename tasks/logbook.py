@@ -12,6 +12,7 @@ from typing import Any
 
 import pandas as pd
 
+from dashboards.tables import configuration
 from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
@@ -88,7 +89,8 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
             return
         rows: dict[str, float] = {}
         for row in report.summary.to_dict("records"):
-            place = f"{row['panel']}/{row['planner']}/{row['assist']}-{row['top_k']}"
+            asked = configuration(row["assist"], row["recall"], row["top_k"]).replace(" ", "-")
+            place = f"{row['panel']}/{row['planner']}/{asked}"
             rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
         rows |= _retrieval_metrics(report.retrieval)
         log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])

@@ -21,12 +21,13 @@ from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
 from planners.memory.labels import plan_answers
-from planners.memory.recall import Memory, nearest, scores
+from planners.memory.recall import Memory
+from planners.memory.scores import best_plans
 from planners.solve import turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.classes import problem_class
 from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
+from planners.world.occupancy import drawing_of
 from planners.world.problem import Problem
 from planners.world.vehicle import vehicle_named
 from storage.errors import StorageError
@@ -91,12 +92,14 @@ class MemoryModel(PythonModel):
 
     def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
         asked, alignment = to_canonical(problem)
-        embedding = self.memory.encoder(occupancy_of(asked))
-        known, scene = scores(self.memory, embedding)[1:], scene_of(asked)
+        memory, scene = self.memory, scene_of(asked)
+        embedding = memory.forward(drawing_of(asked).occupied)
+        known = memory.vectors[1:] @ embedding + memory.biases[1:]
         rows = []
-        for rank, i in enumerate(nearest(self.memory, embedding, top_k), start=1):
-            free, _ = plan_answers(self.memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
-            plan = from_canonical(turned(self.memory.plans[i], asked.start[2]), alignment)
+        best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
+        for rank, i in enumerate(best, start=1):
+            free, _ = plan_answers(memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
+            plan = from_canonical(turned(memory.plans[i], asked.start[2]), alignment)
             row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
             rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
         return rows

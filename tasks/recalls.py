@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from planners.memory.labels import Flags, free_plans
+from planners.memory.masks import rank_by_cells
 from planners.memory.recall import Memory, rank
 from planners.world.collision import scene_of
-from planners.world.occupancy import GRID, Grid, occupancy_of
+from planners.world.occupancy import GRID, Grid, bits_of, occupancy_of
 from planners.world.problem import Integers
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
@@ -51,6 +52,8 @@ def recall_chunk(chunk: Chunk) -> dict[str, Any]:
     problems = _held_out(chunk) if chunk.index == 0 else _fresh(chunk, memories[0])
     rows: list[dict[str, Any]] = []
     for asked in problems:
+        by_cells = rank_by_cells(memories[0].masks, bits_of(asked.grid)).order.copy()
+        rows.append(_row(chunk, protocol, asked, "mask", 0, by_cells, False))
         rows.append(_row(chunk, protocol, asked, "popularity", 0, by_popularity, False))
         for seed, memory in enumerate(memories):
             rows.append(_row(chunk, protocol, asked, "centroid", seed, *rank(memory, asked.grid)))

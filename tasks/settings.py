@@ -21,17 +21,19 @@ class Assist(NamedTuple):
     """How much of a memory an attempt may use."""
 
     name: str  # one of planners.solve.ASSISTS
-    top_k: int  # recalled plans; 0 where none is recalled by rank
+    top_k: int  # recalled plans; 0 without memory
+    recall: str | None = None  # a strategy of planners.memory.recall; None: the best for the memory's size
 
 
 UNASSISTED: Final = Assist("none", 0)
 ASSISTS: Final = (
-    Assist("closed", 1),
     Assist("closed", 5),
-    Assist("open", 1),
     Assist("open", 5),
     Assist("repair", 5),
-    Assist("exhaustive", 0),  # a control: every stored plan is checked
+    Assist("closed", 1, "centroid"),  # the paper's four: what the encoder recalls, and nothing else
+    Assist("closed", 5, "centroid"),
+    Assist("open", 1, "centroid"),
+    Assist("open", 5, "centroid"),
     Assist("fresh", 0),  # a control: no memory, a guide made on the spot
 )
 ABLATION: Final = (  # plans drawn blindly; the first two are the paper's

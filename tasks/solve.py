@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from dashboards.pictures import picture
-from planners.memory.recall import Memory
+from planners.memory.recall import RECALLS, Memory
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
@@ -38,11 +38,13 @@ class Assistant:
         seed: int,
         vehicle: str = DEFAULT_VEHICLE,
         improve_seconds: float = 0.0,
+        recall: str | None = None,
     ) -> None:
         """UsageError with one line for an unknown name, a top k below 1, a missing memory."""
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
         check_known("vehicle", [vehicle], VEHICLES)
+        check_known("recall", [] if recall is None else [recall], RECALLS)
         if top_k < 1:
             raise UsageError(f"Top k is {top_k}: give 1 or more.")
         if seed < 0:
@@ -55,6 +57,7 @@ class Assistant:
         self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
         self._place = None if assist in WITHOUT_MEMORY or memory is None else str(memory)
         self._memories: dict[str, Memory] = {}
+        self.recall = recall
 
     def memory_of(self, class_name: str) -> Memory | None:
         """The memory for problems of a class: its own, else the combined, else the only one there is."""
@@ -70,7 +73,14 @@ class Assistant:
         canonical, alignment = to_canonical(problem)
         memory = self.memory_of(problem.class_name)
         attempt = solve(
-            canonical, self.planner, self.assist, self.top_k, memory, self.seed, vehicle=self.vehicle
+            canonical,
+            self.planner,
+            self.assist,
+            self.top_k,
+            memory,
+            self.seed,
+            vehicle=self.vehicle,
+            strategy=self.recall,
         )
         if self.improve_seconds > 0.0:
             attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)

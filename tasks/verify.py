@@ -184,7 +184,14 @@ def _attempts(
         for row in attempts:
             memory = memories[row["memory"]] if row["memory"] else None
             attempt = solve(
-                problem, row["planner"], row["assist"], row["top_k"], memory, row["seed"], vehicle=vehicle
+                problem,
+                row["planner"],
+                row["assist"],
+                row["top_k"],
+                memory,
+                row["seed"],
+                vehicle=vehicle,
+                strategy=row["recall"],
             )
             check_attempt(problem, attempt, set(), vehicle)
             again += 1

@@ -1,8 +1,12 @@
-"""Recall: embed a problem's occupancy grid, and take the stored plans that score best.
+"""Recall: which stored plans to try on a problem, by one of five strategies (paper, III-C is ``centroid``).
 
-Both training objectives rank by an inner product and a bias, one row a plan: for the triplet objective
-``w = c, b = -|c|^2 / 2``, whose order is that of the distance to the centroids; for the label objective the
-learned vector and bias. Row 0 stands for "no stored plan is free": where it scores best, nothing is recalled.
+| strategy | who ranks | who decides |
+|---|---|---|
+| centroid | the encoder | exact checks of the first k |
+| mask | blocked cells | exact checks of the first k |
+| hybrid | the encoder some hundred, among these blocked cells | exact checks of them all |
+| exhaustive | blocked cells | exact checks of all N |
+| random | nobody | exact checks of k picked blindly |
 """
 
 from __future__ import annotations
@@ -10,17 +14,27 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from planners.memory.checking import first_free
 from planners.memory.encoder import Encoder, Floats32, Weights, to_onnx
-from planners.memory.inverted_lists import InvertedLists
-from planners.memory.labels import PlanSweeps
-from planners.memory.masks import Masks
-from planners.world.occupancy import Grid
+from planners.memory.forward import Forward, forward_of
+from planners.memory.inverted_lists import InvertedLists, best_listed
+from planners.memory.labels import START_TOLERANCE, PlanSweeps, first_answer
+from planners.memory.masks import rank_by_cells
+from planners.memory.scores import best_plans
+from planners.world.occupancy import Bits, Grid, bits_of
 from planners.world.problem import Integers, Plan
 from planners.world.vehicle import Vehicle
+from planners.world.view import View
+
+RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")
+CANDIDATES: Final = 256  # plans that hybrid has the encoder choose
+MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
+TRIED_DRAWN: Final = 8  # plans checked from the drawing; if all are blocked, a planner will need the scene
+WORTH_CELLS: Final = 40  # blocked cells: of plans with 30 or more none was free, in no class
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +45,7 @@ class Memory:
     vehicle: Vehicle
     plans: Sequence[Plan]  # N plans in the canonical frame
     sweeps: PlanSweeps  # the same plans' swept boxes
-    masks: Masks  # [N, 64] and the cells of the occupancy grid that these meet, a bit each
+    masks: Bits  # [N, 64] and the cells of the occupancy grid that these meet, a bit each
     centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of the S_0 problems
     vectors: Floats32  # [N + 1, D] readout
     biases: Floats32  # [N + 1] readout
@@ -56,37 +70,123 @@ class Memory:
 
     @functools.cached_property
     def encoder(self) -> Encoder:
-        """What runs the encoder."""
+        """The encoder for many grids at once."""
         return Encoder(to_onnx(self.weights))
 
+    @functools.cached_property
+    def forward(self) -> Forward:
+        """The encoder for the bits of one grid."""
+        return forward_of(self.weights)
 
-def scores(memory: Memory, embedding: Floats32) -> Floats32:
-    """Score ``[N + 1]`` of every row for one embedding ``[D]``; higher is better, row 0 is "no plan"."""
-    result: Floats32 = memory.vectors @ embedding + memory.biases
-    return result
-
-
-def nearest(memory: Memory, embedding: Floats32, k: int) -> tuple[int, ...]:
-    """The (at most) ``k`` best plans for an embedding ``[D]``, best first; none where row 0 scores best."""
-    if k < 1:
-        raise ValueError(f"top k is {k}, it must be at least 1")
-    row_scores = scores(memory, embedding)
-    plan_scores = row_scores[1:]
-    if plan_scores.size == 0 or row_scores[0] > plan_scores.max():
-        return ()
-    worst = max(plan_scores.size - k, 0)
-    best = np.flatnonzero(plan_scores >= np.partition(plan_scores, worst)[worst])
-    best = best[np.argsort(-plan_scores[best], kind="stable")]
-    return tuple(int(i) for i in best[:k])
+    @functools.cached_property
+    def heading(self) -> float | None:
+        """The heading (radians) that all stored plans begin with; None where they do not agree."""
+        headings = self.sweeps.first_poses[:, 2]
+        return float(headings[0]) if len(headings) and np.ptp(headings) <= START_TOLERANCE else None
 
 
-def recall(memory: Memory, grid: Grid, k: int) -> tuple[int, ...]:
-    """The (at most) ``k`` best plans for an occupancy grid ``[64, 64]``, best first."""
-    return nearest(memory, memory.encoder(grid), k)
+class Recalled(NamedTuple):
+    """What a memory has for a problem."""
+
+    plans: tuple[int, ...]  # at most k, best first
+    free: int  # one of these that answers the problem; -1: none of all that were checked does
+    checks: int  # collision checks to know
+
+
+def default_recall(memory: Memory) -> str:
+    """The strategy that measures best for the size of a memory (docs/method.md)."""
+    return "exhaustive" if len(memory.plans) <= MOST_EXHAUSTIVE else "hybrid"
+
+
+def recall(
+    memory: Memory,
+    view: View,
+    strategy: str,
+    k: int,
+    rng: np.random.Generator | None = None,
+    candidates: int = CANDIDATES,
+) -> Recalled:
+    """The (at most) ``k`` best plans for a problem and the first that is free, by a strategy of ``RECALLS``.
+
+    Few or none where the strategy holds that no plan fits: ``centroid`` where "no plan" scores best, the
+    others leave out plans with more blocked cells than ``WORTH_CELLS``. Cells hold only for plans as
+    they are stored: for a problem of another start heading the encoder ranks in their place. ``random``
+    needs an ``rng``; ``candidates`` are those of ``hybrid``. ValueError: an unknown strategy, k below 1.
+    """
+    if strategy not in RECALLS or k < 1:
+        raise ValueError(f"recall {k} plans by '{strategy}': give 1 or more, and one of {', '.join(RECALLS)}")
+    count = len(memory.plans)
+    stored = memory.heading is not None and abs(view.problem.start[2] - memory.heading) <= START_TOLERANCE
+    tried = {"mask": k, "hybrid": candidates, "exhaustive": count}.get(strategy, k)
+    worth = count  # how many of these may be recalled
+    if strategy == "random":
+        order = pick_blindly(count, k, rng)
+    elif strategy == "centroid":
+        order = by_encoder(memory, view, k)
+    elif not stored:
+        order = by_encoder(memory, view, tried, never_none=True)
+    else:
+        narrowed = strategy == "hybrid" and candidates < count
+        among = by_encoder(memory, view, candidates, never_none=True) if narrowed else None
+        order, worth = by_cells(memory, view, among)
+        order = order[: min(tried, worth) if strategy == "mask" else tried]
+    view.lap("recall")
+    free, checks = first_check(memory, view, order, stored)
+    head = order[: min(k, worth)].tolist()
+    if free >= 0 and free not in head:
+        head = [free, *head][:k]
+    return Recalled(tuple(head), free, checks)
+
+
+def pick_blindly(count: int, k: int, rng: np.random.Generator | None) -> Integers:
+    """(At most) ``k`` of ``count`` plans."""
+    if rng is None:
+        raise ValueError("plans are picked blindly, but by no generator: pass an rng")
+    return rng.choice(count, min(k, count), replace=False).astype(np.int32)
+
+
+def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> Integers:
+    """The (at most) ``k`` plans that score best, best first; none where "no plan" scores better."""
+    bits = view.bits
+    embedding = memory.forward(bits)
+    view.lap("encode")
+    if memory.lists is None:
+        return best_plans(memory.vectors, memory.biases, embedding, k, never_none)
+    best = best_listed(memory.lists, embedding, k)
+    rows = np.concatenate(([0], best[:1] + 1))
+    scores = memory.vectors[rows] @ embedding + memory.biases[rows]
+    return best if never_none or scores[0] <= scores[-1] else best[:0]
+
+
+def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, int]:
+    """All plans, or those ``among``, the least blocked first, and how many of these are worth recalling."""
+    bits = view.bits
+    ranking = rank_by_cells(memory.masks if among is None else memory.masks[among], bits)
+    order = ranking.order if among is None else among[ranking.order]
+    return order, int(ranking.places[WORTH_CELLS])
+
+
+def first_check(memory: Memory, view: View, order: Integers, stored: bool) -> tuple[int, int]:
+    """The first plan of ``order`` that answers the problem, -1 for none, and the collision checks to know.
+
+    ``stored``: it begins with the heading of the stored plans; otherwise they are turned.
+    """
+    problem = view.problem
+    found, checks = -1, 0
+    if stored:
+        found, checks = first_free(order[:TRIED_DRAWN], memory.sweeps, memory.masks, view.drawing, problem)
+        order = order[TRIED_DRAWN:]
+        view.lap("check")
+    if found < 0 and len(order):
+        ends = (problem.start, problem.goal, problem.goal_radius)
+        found, more = first_answer(memory.sweeps, order, view.scene, *ends)
+        checks += more
+        view.lap("check")
+    return int(found), int(checks)
 
 
 def rank(memory: Memory, grid: Grid) -> tuple[Integers, bool]:
-    """All plans ``[N]``, best first, and whether "no plan" scores better than each of them."""
-    row_scores = scores(memory, memory.encoder(grid))
-    order = np.argsort(-row_scores[1:], kind="stable").astype(np.int32)
-    return order, bool(order.size == 0 or row_scores[0] > row_scores[1:].max())
+    """All plans ``[N]`` in the encoder's order, best first, and whether "no plan" scores better than each."""
+    embedding = memory.forward(bits_of(grid))
+    order = best_plans(memory.vectors, memory.biases, embedding, len(memory.plans), never_none=True)
+    return order, len(best_plans(memory.vectors, memory.biases, embedding, 1)) == 0

@@ -8,16 +8,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-STANDARD = [
-    ("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("open", 5), ("repair", 5), ("exhaustive", 0),
-    ("fresh", 0),
+Asked = tuple[str, str, int]  # assist, recall, top k
+
+STANDARD: list[Asked] = [
+    ("none", "", 0), ("closed", "exhaustive", 5), ("open", "exhaustive", 5), ("repair", "exhaustive", 5),
+    ("closed", "centroid", 1), ("closed", "centroid", 5), ("open", "centroid", 1), ("open", "centroid", 5),
+    ("fresh", "", 0),
 ]  # fmt: skip
+BASELINE: Asked = ("none", "", 0)
+CLOSED: Asked = ("closed", "exhaustive", 1)
 
 
 def attempts(
     classes: tuple[str, ...] = ("curves", "random", "trap"),
     planners: tuple[str, ...] = ("rrt", "gust", "follow"),
-    configurations: list[tuple[str, int]] = STANDARD,
+    configurations: list[Asked] = STANDARD,
     problems: int = 40,
     speed_up: float = 4.0,
     seed: int = 0,
@@ -28,7 +33,7 @@ def attempts(
     rows: list[dict[str, Any]] = []
     for name, planner in product(classes, planners):
         hardness = rng.lognormal(0.0, 1.0, problems)
-        for (assist, top_k), i in product(configurations, range(problems)):
+        for (assist, recall, top_k), i in product(configurations, range(problems)):
             seconds = 1e-3 * hardness[i] * rng.lognormal(0.0, 0.3) / (1.0 if assist == "none" else speed_up)
             solved = bool(rng.random() < 0.95)
             recalled = assist not in ("none", "fresh") and rng.random() < 0.5
@@ -38,6 +43,7 @@ def attempts(
                     "problem_class": name,
                     "planner": planner,
                     "assist": assist,
+                    "recall": recall or None,
                     "top_k": top_k,
                     "memory": None if assist in ("none", "fresh") else memory or name,
                     "solved": solved,

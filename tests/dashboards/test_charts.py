@@ -14,7 +14,7 @@ from dashboards.charts import anytime_curves, planning_times, retrieval_curves, 
 from dashboards.retrieval import retrieval_curve
 from dashboards.statistics import summarise
 from dashboards.style import save
-from tests.dashboards.synthetic import STANDARD, attempts, recalls
+from tests.dashboards.synthetic import STANDARD, Asked, attempts, recalls
 
 
 def texts(figure: Figure) -> list[str]:
@@ -43,7 +43,7 @@ def test_slower_than_the_baseline_is_written_with_a_plus() -> None:
 
 
 @pytest.mark.parametrize("absent", STANDARD)
-def test_a_missing_configuration_is_said_to_be_missing(absent: tuple[str, int]) -> None:
+def test_a_missing_configuration_is_said_to_be_missing(absent: Asked) -> None:
     kept = [each for each in STANDARD if each != absent]
     figure = planning_times(summarise(attempts(("trap",), ("rrt",), kept), resamples=10))
     assert texts(figure).count("no attempts") == 1

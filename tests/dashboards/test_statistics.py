@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dashboards.statistics import COMBINED, bootstrap, panels, summarise
-from tests.dashboards.synthetic import STANDARD, attempts
+from tests.dashboards.synthetic import BASELINE, CLOSED, STANDARD, attempts
 
 
 def only(summary: pd.DataFrame, **wanted: object) -> pd.Series:
@@ -21,7 +21,7 @@ def only(summary: pd.DataFrame, **wanted: object) -> pd.Series:
 @settings(max_examples=20)
 @given(seed=st.integers(0, 1000), problems=st.integers(2, 60), speed_up=st.floats(0.2, 50.0))
 def test_intervals_hold_their_own_figure(seed: int, problems: int, speed_up: float) -> None:
-    rows = attempts(("curves",), ("rrt",), [("none", 0), ("closed", 1)], problems, speed_up, seed)
+    rows = attempts(("curves",), ("rrt",), [BASELINE, CLOSED], problems, speed_up, seed)
     summary = summarise(rows, resamples=500)
     slack = 1e-9
     for _, row in summary.iterrows():
@@ -35,10 +35,11 @@ def test_figures_are_those_of_a_plain_loop(attempt_rows: pd.DataFrame) -> None:
     for _, row in summary.iterrows():
         chosen = [
             attempt
-            for attempt in attempt_rows.to_dict("records")
+            for attempt in attempt_rows.fillna({"recall": ""}).to_dict("records")
             if (attempt["problem_class"], attempt["planner"]) == (row["panel"], row["planner"])
         ]
-        mine = [a for a in chosen if (a["assist"], a["top_k"]) == (row["assist"], row["top_k"])]
+        keys = ("assist", "recall", "top_k")
+        mine = [a for a in chosen if all(a[key] == row[key] for key in keys)]
         baseline = {a["problem_id"]: a["planning_seconds"] for a in chosen if a["assist"] == "none"}
         times = [1e3 * a["planning_seconds"] for a in mine]
         assert row["mean_ms"] == pytest.approx(np.mean(times))
@@ -60,7 +61,7 @@ def test_the_order_of_the_rows_changes_nothing(attempt_rows: pd.DataFrame, seed:
 
 
 def test_pairing_narrows_the_interval() -> None:
-    rows = attempts(("curves",), ("rrt",), [("none", 0), ("closed", 1)], problems=200)
+    rows = attempts(("curves",), ("rrt",), [BASELINE, CLOSED], problems=200)
     paired = only(summarise(rows), assist="closed")
     rng = np.random.default_rng(1)
     ids = rows["problem_id"].to_numpy().copy()
@@ -73,7 +74,7 @@ def test_pairing_narrows_the_interval() -> None:
 
 
 def test_only_problems_that_both_attempted_are_compared() -> None:
-    rows = attempts(("curves",), ("rrt",), [("none", 0), ("closed", 1)], problems=10)
+    rows = attempts(("curves",), ("rrt",), [BASELINE, CLOSED], problems=10)
     hard = rows["problem_id"].isin(["curves-0", "curves-1"])
     without = rows[~((rows["assist"] == "none") & hard)]
     expected = only(summarise(rows[~hard], resamples=10), assist="closed")["reduction"]
@@ -81,7 +82,7 @@ def test_only_problems_that_both_attempted_are_compared() -> None:
 
 
 def test_failures_keep_their_time_and_count_as_failures() -> None:
-    rows = attempts(("curves",), ("rrt",), [("none", 0)], problems=10).assign(solved=True)
+    rows = attempts(("curves",), ("rrt",), [BASELINE], problems=10).assign(solved=True)
     before = only(summarise(rows, resamples=10))
     failure = rows.index == 3
     after = only(
@@ -101,7 +102,7 @@ def test_failures_keep_their_time_and_count_as_failures() -> None:
 
 
 def test_without_a_baseline_there_is_no_reduction() -> None:
-    row = only(summarise(attempts(("curves",), ("rrt",), [("closed", 1)]), resamples=10))
+    row = only(summarise(attempts(("curves",), ("rrt",), [CLOSED]), resamples=10))
     assert np.isnan([row["reduction"], row["reduction_low"], row["reduction_high"]]).all()
     assert row["mean_low_ms"] <= row["mean_ms"] <= row["mean_high_ms"]
 

@@ -19,8 +19,8 @@ from dashboards.tables import (
 )
 from tests.dashboards.synthetic import STANDARD, attempts, recalls
 
-UNRANKED = {assist for assist, top_k in STANDARD if top_k == 0}
-ABLATION = [*STANDARD, ("random-open", 1), ("random-open", 5)]
+ABLATION = [*STANDARD, ("random-open", "random", 1), ("random-open", "random", 5)]
+BLIND = ("random-closed", "random", 5)
 
 
 def rendered(table: RenderableType) -> list[str]:
@@ -39,8 +39,9 @@ def test_the_table_holds_every_planner_configuration_and_class() -> None:
             panel = words[0].rstrip(",")
         elif words and words[0] in {"rrt", "gust", "follow"}:
             planner, words = words[0], words[1:]
-        if words and words[0] in {assist for assist, _ in ABLATION}:
-            seen.add((panel, planner, words[0] if words[0] in UNRANKED else " ".join(words[:2])))
+        if words and words[0] in {assist for assist, _, _ in ABLATION}:
+            name = [word for word in words[:3] if word.isalpha() or word.isdigit() or "-" in word[1:]]
+            seen.add((panel, planner, " ".join(name)))
     assert seen == {
         (name, planner, configuration(*each))
         for name in ("curves", "random", "trap")
@@ -51,7 +52,7 @@ def test_the_table_holds_every_planner_configuration_and_class() -> None:
 
 @pytest.mark.parametrize("slowness", [1e-4, 1.0, 1e4])
 def test_the_tables_fit_110_columns_uncut(slowness: float) -> None:
-    rows = attempts(("multiple_bugtraps",), configurations=[*ABLATION, ("random-closed", 5)], speed_up=0.3)
+    rows = attempts(("multiple_bugtraps",), configurations=[*ABLATION, BLIND], speed_up=0.3)
     rows["planning_seconds"] *= slowness
     rows["collision_checks"] = (rows["collision_checks"] * slowness).astype(int)
     retrieval = summarise_retrieval(retrieval_curve(recalls(("multiple_bugtraps",))))
@@ -66,7 +67,7 @@ def test_what_was_not_attempted_is_seen_to_be_missing(attempt_rows: pd.DataFrame
     text = summary_markdown(summarise(attempt_rows[~missing], resamples=10))
     trap = text[text.index("### trap") :].splitlines()
     open_rows = [line for line in trap if "| open" in line]
-    assert len(open_rows) == 6
+    assert len(open_rows) == 9
     assert all(line.count(NOTHING) == 7 for line in open_rows)
 
 
@@ -81,6 +82,6 @@ def test_markdown_columns_are_aligned(attempt_rows: pd.DataFrame, recall_rows: p
 
 def test_csv_reads_back_unrounded(attempt_rows: pd.DataFrame) -> None:
     summary = summarise(attempt_rows, resamples=10)
-    back = pd.read_csv(io.StringIO(as_csv(summary)))
-    back = back.astype({name: summary[name].dtype for name in ("panel", "planner", "assist")})
+    back = pd.read_csv(io.StringIO(as_csv(summary)), keep_default_na=False)
+    back = back.astype({name: summary[name].dtype for name in ("panel", "planner", "assist", "recall")})
     pd.testing.assert_frame_equal(back, summary, rtol=1e-15)

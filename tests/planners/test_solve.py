@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.labels import free_plans, sweep_plans
 from planners.memory.masks import masks_of
-from planners.memory.recall import Memory
+from planners.memory.recall import RECALLS, Memory
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.solve import ASSISTS, improved, solve, turned
@@ -75,11 +75,11 @@ def test_without_assistance_the_answer_is_the_planners_own(planner):
 
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_the_best_recalled_plan_that_is_free_is_the_answer(memory, assist):
-    attempt = solve(problem_of([]), "gust", assist, 5, memory)
+    attempt = solve(problem_of([]), "gust", assist, 5, memory, strategy="centroid")
     assert attempt.recalled == (4, 3, 2, 1, 0)
     assert attempt.plan is memory.plans[4]
     assert (attempt.source, attempt.expansions, attempt.search_seconds) == ("recalled", 0, 0.0)
-    assert attempt.collision_checks == len(memory.plans[4].states)
+    assert attempt.collision_checks == 0  # nothing is in its way
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -103,7 +103,7 @@ def test_an_open_box_is_guided_elsewhere(memory, planner):
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_where_no_plan_scores_best_nothing_is_recalled(assist):
     problem = strewn(3, 20)
-    attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]))
+    attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]), strategy="centroid")
     assert attempt.recalled == ()
     np.testing.assert_array_equal(attempt.plan.states, solve(problem, "rrt").plan.states)
 
@@ -149,7 +149,7 @@ def test_a_turned_plan_is_driven_by_the_same_controls(memory):
         ("astar", "none", 1, True, "unknown planner 'astar'"),
         ("rrt", "ajar", 1, True, "unknown assist 'ajar'"),
         ("rrt", "closed", 1, False, "needs a memory"),
-        ("rrt", "open", 0, True, "top k is 0"),
+        ("rrt", "open", 0, True, "recall 0 plans by 'exhaustive': give 1 or more"),
     ],
 )
 def test_a_wrong_question_is_refused(memory, planner, assist, k, with_memory, says):
@@ -162,10 +162,23 @@ def test_a_wrong_question_is_refused(memory, planner, assist, k, with_memory, sa
 def test_exhaustive_recall_finds_a_free_plan_if_and_only_if_there_is_one(seed, count):
     memory, problem = shared_memory(), strewn(seed, count)
     free = free_plans(memory.sweeps, scene_of(problem))
-    attempt = solve(problem, "follow", "exhaustive", 7, memory)
+    attempt = solve(problem, "follow", "closed", 1, memory)
     assert (attempt.source == "recalled") == free.any()
-    assert attempt.recalled == ((int(free.argmax()),) if free.any() else ())
-    assert attempt.top_k == 0
+    assert not free.any() or attempt.plan is memory.plans[attempt.recalled[0]]
+    assert (attempt.recall, attempt.top_k) == ("exhaustive", 1)
+
+
+@given(
+    st.sampled_from([each for each in ASSISTS if each not in ("none", "fresh")]),
+    st.sampled_from(RECALLS),
+    st.integers(0, 10**6),
+)
+@settings(max_examples=30, deadline=None)
+def test_every_assist_works_with_every_strategy(assist, strategy, seed):
+    attempt = solve(strewn(seed, 25), "gust", assist, 3, shared_memory(), seed, strategy=strategy)
+    assert attempt.solved
+    assert attempt.recall == ("random" if assist.startswith("random-") else strategy)
+    assert len(set(attempt.recalled)) == len(attempt.recalled) <= 3
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -210,7 +223,7 @@ def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory):
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
     problem = problem_of([box(*memory.plans[4].states[40, :2], 0.0, 0.2, 0.2)])
-    attempt = solve(problem, "rrt", "closed", 5, memory)
+    attempt = solve(problem, "rrt", "closed", 5, memory, strategy="centroid")
     assert attempt.recalled[0] == 4
     assert attempt.plan is not memory.plans[4]
     assert faults(problem, memory.plans[4]) != []

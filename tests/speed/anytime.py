@@ -16,14 +16,13 @@ from rich.progress import track
 from rich.table import Table
 
 from dashboards.charts import anytime_curves
-from planners.memory.labels import first_answer
-from planners.memory.recall import nearest
+from planners.memory.recall import default_recall, recall
 from planners.search.anytime import Improved, improve
 from planners.search.registry import PLANNERS
 from planners.world.classes import CLASSES, problem_class
 from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
 from planners.world.problem import Floats
+from planners.world.view import View
 from tests.speed.assists import MEASURING, memory_of
 
 COUNT = 30  # problems a class
@@ -59,10 +58,7 @@ def report(console: Console, picture: Path | None = None) -> None:
             made: dict[str, list[Improved]] = {"nothing": [], "memory": []}
             for problem in track(problems, description=f"{name}, {planner}", transient=True):
                 scene = scene_of(problem)
-                recalled = nearest(memory, memory.encoder(occupancy_of(problem)), 5)
-                order = np.array(recalled, np.int32)
-                goal = (problem.goal, problem.goal_radius)
-                found, _ = first_answer(memory.sweeps, order, scene, problem.start, *goal)
+                found = recall(memory, View(problem), default_recall(memory), 5).free
                 known = memory.plans[found] if found >= 0 else None
                 made["nothing"].append(improve(planner, problem, seconds=SECONDS, scene=scene))
                 made["memory"].append(improve(planner, problem, known, seconds=SECONDS, scene=scene))

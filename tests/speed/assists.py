@@ -2,8 +2,8 @@
 
 ``python -m tests.speed.assists`` prints per class at ``standard`` and per planner: planning time, collision
 checks, solved share, length and duration of the plans, and the paired difference of the mean time to the
-planner alone and to a fresh guide. First for all problems, then for those in which none of the k recalled
-plans is free: there closed box can only fail. Problems have a seed of their own: they are neither collected
+planner alone and to a fresh guide. First for all problems, then for those in which no stored plan is
+free: there closed box can only fail. Problems have a seed of their own: they are neither collected
 from, nor tuned or tested on. The memory is small, made here in a minute, and kept in build/speed.
 """
 
@@ -20,19 +20,19 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from dashboards.tables import configuration
 from planners.memory.build_memory import build_memory
 from planners.memory.experience import Experience
 from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.labels import free_plans, sweep_plans
-from planners.memory.recall import Memory, nearest
+from planners.memory.recall import Memory
 from planners.memory.training import TrainingSettings, train
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
 from planners.world.classes import CLASSES, problem_class
 from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
 from planners.world.problem import Floats, Problem
 from planners.world.randomness import generator
 from storage.errors import StorageError
@@ -51,15 +51,17 @@ RESAMPLES = 2_000
 
 SOURCES = ("recalled", "repaired")
 
-Rows = dict[tuple[str, int], list[Attempt]]
+Asked = tuple[str, str | None, int]  # assist, strategy of recall, top k
+Rows = dict[Asked, list[Attempt]]
 
 RECALLING = ("closed", "open", "repair")
-EVERY = [
-    ("none", 0),
-    ("fresh", 0),
-    ("exhaustive", 0),
-    *[(assist, k) for assist in RECALLING for k in (1, 5)],
-    *[(f"random-{assist}", k) for assist in RECALLING for k in (1, 5)],
+NONE: Asked = ("none", None, 0)
+FRESH: Asked = ("fresh", None, 0)
+HARD: list[Asked] = [NONE, FRESH, *[(assist, None, 5) for assist in RECALLING]]
+EVERY: list[Asked] = [
+    *HARD,
+    *[(assist, "centroid", k) for assist in RECALLING for k in (1, 5)],
+    *[(f"random-{assist}", "random", k) for assist in RECALLING for k in (1, 5)],
 ]
 
 
@@ -101,33 +103,34 @@ def _made(name: str) -> Memory:
     return build_memory(trained, plans, name)
 
 
-def hard_for(memory: Memory, name: str, k: int) -> tuple[list[Problem], int]:
-    """Problems in which plans are recalled and none of the first ``k`` is free, and how many were drawn."""
+def hard_for(memory: Memory, name: str) -> tuple[list[Problem], int]:
+    """Problems in which no stored plan is free, and how many were drawn to find them."""
     found: list[Problem] = []
     drawn = 0
     while len(found) < COUNT and drawn < MOST_DRAWN:
         problem = problem_class(name).draw(MEASURING, drawn)
         drawn += 1
-        recalled = nearest(memory, memory.encoder(occupancy_of(problem)), k)
-        if recalled and not free_plans(memory.sweeps, scene_of(problem))[list(recalled)].any():
+        if not free_plans(memory.sweeps, scene_of(problem)).any():
             found.append(problem)
     return found, drawn
 
 
 def measure(
-    problems: list[Problem], planner: str, asked: list[tuple[str, int]], memory: Memory, description: str
+    problems: list[Problem], planner: str, asked: list[Asked], memory: Memory, description: str
 ) -> Rows:
     """Attempts of every configuration on every problem, those of one problem next to each other."""
     rows: Rows = {each: [] for each in asked}
     for problem in problems[:5]:  # compiled or loaded now, not while the clock runs
-        for assist, k in asked:
-            solve(problem, planner, assist, max(k, 1), memory, MEASURING)
+        for assist, strategy, k in asked:
+            solve(problem, planner, assist, max(k, 1), memory, MEASURING, strategy=strategy)
     gc.collect()
     gc.disable()
     for number, problem in enumerate(track(problems, description=description, transient=True)):
         first = number % len(asked)
-        for assist, k in asked[first:] + asked[:first]:
-            rows[assist, k].append(solve(problem, planner, assist, max(k, 1), memory, MEASURING))
+        for each in asked[first:] + asked[:first]:
+            assist, strategy, k = each
+            made = solve(problem, planner, assist, max(k, 1), memory, MEASURING, strategy=strategy)
+            rows[each].append(made)
     gc.enable()
     return rows
 
@@ -156,14 +159,14 @@ def table(title: str) -> Table:
 def add(result: Table, planner: str, rows: Rows) -> None:
     """A row a configuration; times of failures count, lengths and durations are of the plans found."""
     times = {each: 1e3 * np.array([a.planning_seconds for a in made]) for each, made in rows.items()}
-    for (assist, k), made in rows.items():
-        mine = times[assist, k]
+    for each, made in rows.items():
+        mine = times[each]
         differences = [
-            difference(mine, times[control, 0]) if assist != control else "–" for control in ("none", "fresh")
+            difference(mine, times[control]) if each != control else "–" for control in (NONE, FRESH)
         ]
         result.add_row(
             planner,
-            f"{assist} {k}" if k else assist,
+            configuration(each[0], each[1] or "", each[2]),
             f"{100.0 * np.mean([a.solved for a in made]):.1f}",
             *(f"{value:.2f}" for value in (mine.mean(), np.median(mine), np.quantile(mine, 0.9))),
             *differences,
@@ -181,23 +184,19 @@ def _mean(values: Iterable[float | None]) -> float:
 
 
 def report(console: Console) -> None:
-    """Print tables for all problems, and for those without a free plan among the first 1, and 5."""
+    """Print tables for all problems, and for those without a free plan."""
     for name in CLASSES:
         memory = memory_of(name)
         problems = [problem_class(name).draw(MEASURING, index) for index in range(COUNT)]
         _report(console, f"{name}, {COUNT} problems", problems, EVERY, memory)
-        for k in (1, 5):
-            asked = [(assist, k if assist in RECALLING else 0) for assist in ("none", "fresh", *RECALLING)]
-            problems, drawn = hard_for(memory, name, k)
-            title = (
-                f"{name}, the {len(problems)} of {drawn} problems in which none of {k} recalled plans is free"
-            )
-            if problems:
-                _report(console, title, problems, asked, memory)
+        problems, drawn = hard_for(memory, name)
+        title = f"{name}, the {len(problems)} of {drawn} problems in which no stored plan is free"
+        if problems:
+            _report(console, title, problems, HARD, memory)
 
 
 def _report(
-    console: Console, title: str, problems: list[Problem], asked: list[tuple[str, int]], memory: Memory
+    console: Console, title: str, problems: list[Problem], asked: list[Asked], memory: Memory
 ) -> None:
     result = table(title)
     for planner in PLANNERS:

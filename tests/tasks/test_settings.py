@@ -27,7 +27,11 @@ SETTINGS = st.builds(
     test_problems=st.integers(1, 10_000),
     collector=st.just("rrt"),
     planners=st.just(("rrt", "gust")),
-    assists=st.lists(st.builds(Assist, st.sampled_from(["closed", "open"]), st.integers(1, 9))).map(tuple),
+    assists=st.lists(
+        st.builds(
+            Assist, st.sampled_from(["closed", "open"]), st.integers(1, 9), st.sampled_from([None, "mask"])
+        )
+    ).map(tuple),
     epochs=st.integers(1, 60),
     combined=st.booleans(),
     strict=st.booleans(),

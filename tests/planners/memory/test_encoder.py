@@ -5,9 +5,13 @@ import pickle
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planners.memory.encoder import Architecture, Encoder, initial_weights, layer_counts, to_onnx
+from planners.memory.forward import forward_of
 from planners.memory.network import embed, unpacked
+from planners.world.occupancy import bits_of
 from planners.world.randomness import generator
 
 ARCHITECTURES = [
@@ -37,6 +41,33 @@ def test_the_runtime_embeds_as_torch_does(architecture):
     embeddings = Encoder(to_onnx(weights))(grids)
     assert embeddings.shape == (9, architecture.dimensions)
     np.testing.assert_allclose(embeddings, expected, atol=1e-5)
+
+
+def patchy_grids(count, seed):
+    """Grids with empty, full and mixed patches."""
+    rng = generator(seed, "patchy")
+    coarse = rng.random((count, 16, 16, 1, 1))
+    fine = rng.random((count, 16, 16, 4, 4)) < rng.uniform(0.05, 0.9, (count, 16, 16, 1, 1))
+    cells = np.where(coarse < 0.4, 0, np.where(coarse < 0.5, 1, fine))
+    return cells.transpose(0, 1, 3, 2, 4).reshape(count, 64, 64).astype(np.uint8)
+
+
+@given(
+    channels=st.lists(st.integers(1, 20), min_size=1, max_size=2).map(tuple),
+    hidden=st.lists(st.integers(1, 70), max_size=3).map(tuple),
+    dimensions=st.integers(1, 40),
+    seed=st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_forward_pass_embeds_as_the_runtime_does(channels, hidden, dimensions, seed):
+    rng = generator(seed, "weights")
+    weights = initial_weights(Architecture(channels, hidden, dimensions), rng)
+    weights = {k: (v + 0.05 * rng.standard_normal(v.shape)).astype(np.float32) for k, v in weights.items()}
+    grids = patchy_grids(3, seed)
+    expected = Encoder(to_onnx(weights))(grids)
+    forward = forward_of(weights)
+    embeddings = np.array([forward(bits) for bits in bits_of(grids)])
+    assert np.abs(embeddings - expected).max() < 1e-4 * max(1.0, np.abs(expected).max())
 
 
 def test_bits_unpack_to_the_grids_they_were_packed_from():

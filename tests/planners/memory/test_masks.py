@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.labels import free_plans, sweep_plans
-from planners.memory.masks import mask_of, masks_of
+from planners.memory.masks import MOST_CELLS, masks_of, rank_by_cells
 from planners.world.bodies import swept_boxes
 from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
+from planners.world.occupancy import bits_of, grid_of, occupancy_of
 from planners.world.problem import Plan
 from planners.world.randomness import generator
 from tests.worlds import strewn
@@ -30,16 +30,6 @@ def wandering(seed: int) -> Plan:
     return Plan(np.column_stack((places, headings, speeds, np.zeros(100))), np.zeros((99, 2)))
 
 
-def cells(mask):
-    return np.array([[bool(int(word) >> column & 1) for column in range(64)] for word in mask])
-
-
-@given(seed=SEEDS)
-def test_a_mask_is_the_grid_bit_by_bit(seed):
-    grid = (generator(seed).random((64, 64)) < 0.3).astype(np.uint8)
-    assert np.array_equal(cells(mask_of(grid)), grid)
-
-
 @given(seed=SEEDS)
 def test_masks_are_the_cells_that_the_sweep_meets(seed):
     plan = wandering(seed)
@@ -52,7 +42,7 @@ def test_masks_are_the_cells_that_the_sweep_meets(seed):
     sweep = shapely.union_all(shapely.polygons(corners))
     left, bottom = np.meshgrid(np.arange(-7.0, 57.0), np.arange(-7.0, 57.0))
     inside = bool(np.all((corners > -7.0) & (corners < 57.0)))
-    drawn = cells(masks_of(sweep_plans([plan]))[0])
+    drawn = grid_of(masks_of(sweep_plans([plan]))[0]) == 1
     if not inside:
         assert drawn.all()
         return
@@ -66,6 +56,27 @@ def test_masks_are_the_cells_that_the_sweep_meets(seed):
 def test_a_plan_whose_cells_no_obstacle_meets_is_free(seed, count):
     problem = strewn(seed, count)
     sweeps = sweep_plans([wandering(seed + i) for i in range(6)])
-    masks = masks_of(sweeps)
-    unmet = ~(masks & mask_of(occupancy_of(problem))).any(axis=1) & (masks != ~np.uint64(0)).any(axis=1)
-    assert free_plans(sweeps, scene_of(problem))[unmet].all()
+    ranking = rank_by_cells(masks_of(sweeps), bits_of(occupancy_of(problem)))
+    assert free_plans(sweeps, scene_of(problem))[ranking.cells == 0].all()
+
+
+@given(seed=SEEDS, count=st.integers(1, 60))
+def test_plans_are_ranked_by_the_cells_that_they_share_with_obstacles(seed, count):
+    rng = generator(seed, "rank")
+    masks = rng.integers(0, 2**64, (count, 64), np.uint64) & rng.integers(0, 2**64, (count, 1), np.uint64)
+    masks[rng.random((count, 64)) < 0.9] = 0
+    masks[rng.random(count) < 0.1] = ~np.uint64(0)
+    occupied = rng.integers(0, 2**64, 64, np.uint64)
+    shared = np.bitwise_count(masks & occupied).sum(axis=1, dtype=int)
+    shared[masks[:, 0] == ~np.uint64(0)] = MOST_CELLS  # they leave the window
+    ranking = rank_by_cells(masks, occupied)
+    assert ranking.cells.tolist() == np.minimum(shared, MOST_CELLS).tolist()
+    assert ranking.order.tolist() == np.argsort(np.minimum(shared, MOST_CELLS), kind="stable").tolist()
+    for most in (0, 10, MOST_CELLS):
+        assert ranking.places[most] == (shared <= most).sum()
+
+
+def test_a_plan_that_leaves_the_window_is_never_taken_for_free():
+    outside = Plan(np.tile([60.0, 60.0, 0.0, 0.0, 0.0], (3, 1)), np.zeros((2, 2)))
+    ranking = rank_by_cells(masks_of(sweep_plans([outside])), np.zeros(64, np.uint64))
+    assert ranking.cells.tolist() == [MOST_CELLS]

@@ -10,10 +10,22 @@ from scipy.spatial.distance import cdist
 
 from planners.memory.build_memory import build_memory
 from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
+from planners.memory.labels import free_plans
 from planners.memory.readout import centroids_of, label_readout, nearest_readout
-from planners.memory.recall import nearest, rank, recall, scores
+from planners.memory.recall import (
+    MOST_EXHAUSTIVE,
+    RECALLS,
+    WORTH_CELLS,
+    default_recall,
+    rank,
+    recall,
+)
+from planners.memory.scores import best_plans
 from planners.memory.training import TrainedEncoder, TrainingSettings
+from planners.world.collision import scene_of
+from planners.world.occupancy import bits_of, occupancy_of
 from planners.world.randomness import generator
+from planners.world.view import View
 
 PLANS = 8
 SEEDS = st.integers(0, 2**32 - 1)
@@ -57,39 +69,136 @@ def test_centroids_are_the_mean_embeddings(memory):
 def test_ranking_by_centroids_is_ranking_by_euclidean_distance(memory, seed, k):
     embedding = memory.encoder(np.unpackbits(problems(seed)[0][seed % 27]).reshape(64, 64))
     distances = cdist(embedding[np.newaxis], memory.centroids)[0]
-    recalled = nearest(memory, embedding, k)
+    recalled = best_plans(memory.vectors, memory.biases, embedding, k)
     bits, plan_index = problems()
     embeddings = memory.encoder(np.unpackbits(bits, axis=1).reshape(-1, 64, 64))
     scatter = (np.linalg.norm(embeddings - memory.centroids[plan_index + 1], axis=1) ** 2).mean()
     if distances[0] ** 2 + 2 * scatter < distances[1:].min() ** 2:
-        assert recalled == ()
+        assert len(recalled) == 0
     else:
         assert len(recalled) == min(k, PLANS)
-        np.testing.assert_allclose(
-            distances[1:][list(recalled)], np.sort(distances[1:])[:k], rtol=1e-4, atol=1e-5
-        )
+        np.testing.assert_allclose(distances[1:][recalled], np.sort(distances[1:])[:k], rtol=1e-4, atol=1e-5)
+
+
+@pytest.fixture(scope="module")
+def problem_in(experiences, draw):
+    """Problems that some of the stored plans answer: among a few obstacles, with a wide goal."""
+
+    def make(seed, count=5):
+        obstacles = draw(generator(seed, "recall"), count)
+        return dataclasses.replace(experiences[seed % PLANS].problem, obstacles=obstacles, goal_radius=12.0)
+
+    return make
+
+
+def free_in(memory, problem):
+    ends = memory.sweeps.last_positions - problem.goal
+    return free_plans(memory.sweeps, scene_of(problem)) & (np.hypot(*ends.T) <= problem.goal_radius)
+
+
+def recalled_by(memory, problem, strategy, k, **options):
+    return recall(memory, View(problem), strategy, k, generator(k, "blindly"), **options)
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(RECALLS), off=st.sampled_from([0.0, 0.01]))
+def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
+    memory, problem_in, seed, k, strategy, off
+):
+    problem = problem_in(seed)
+    start = (*problem.start[:2], problem.start[2] + off)
+    problem = dataclasses.replace(problem, start=start)
+    found = recalled_by(memory, problem, strategy, k)
+    assert len(set(found.plans)) == len(found.plans) <= min(k, PLANS)
+    assert set(found.plans) <= set(range(PLANS))
+    if found.free >= 0:
+        assert found.free in found.plans
+        assert off or free_in(memory, problem)[found.free]
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), count=st.integers(0, 12))
+def test_exhaustive_finds_a_free_plan_if_and_only_if_there_is_one(memory, problem_in, seed, k, count):
+    problem = problem_in(seed, count)
+    assert (recalled_by(memory, problem, "exhaustive", k).free >= 0) == free_in(memory, problem).any()
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), off=st.sampled_from([0.0, 0.01]))
+def test_hybrid_of_all_plans_is_exhaustive(memory, problem_in, seed, k, off):
+    problem = problem_in(seed)
+    problem = dataclasses.replace(problem, start=(*problem.start[:2], problem.start[2] + off))
+    hybrid = recalled_by(memory, problem, "hybrid", k, candidates=PLANS)
+    assert hybrid == recalled_by(memory, problem, "exhaustive", k)
+
+
+@given(seed=SEEDS, k=st.integers(1, 8), candidates=st.integers(1, 8))
+def test_hybrid_checks_the_plans_that_the_encoder_chose(memory, problem_in, seed, k, candidates):
+    problem = problem_in(seed)
+    chosen = set(rank(memory, occupancy_of(problem))[0][:candidates].tolist())
+    found = recalled_by(memory, problem, "hybrid", k, candidates=candidates)
+    assert set(found.plans) <= chosen
+    assert (found.free >= 0) == free_in(memory, problem)[list(chosen)].any()
 
 
 @given(seed=SEEDS, k=st.integers(1, 8))
-def test_recall_is_the_head_of_the_rank(memory, seed, k):
-    grid = np.unpackbits(problems(seed)[0][seed % 27]).reshape(64, 64)
-    order, no_plan = rank(memory, grid)
+def test_mask_recalls_the_least_blocked_and_checks_these_alone(memory, problem_in, seed, k):
+    problem = problem_in(seed)
+    blocked = np.bitwise_count(memory.masks & bits_of(occupancy_of(problem))).sum(axis=1)
+    best = np.argsort(blocked, kind="stable")[:k]
+    found = recalled_by(memory, dataclasses.replace(problem), "mask", k)
+    within = set(best[blocked[best] <= WORTH_CELLS].tolist())
+    assert set(found.plans) == within
+    assert (found.free >= 0) == free_in(memory, problem)[list(within)].any()
+
+
+@given(seed=SEEDS)
+def test_plans_that_are_blocked_nearly_everywhere_are_not_recalled(memory, problem_in, seed):
+    problem = problem_in(seed, 200)
+    blocked = np.bitwise_count(memory.masks & bits_of(occupancy_of(problem))).sum(axis=1)
+    for strategy in ("mask", "hybrid", "exhaustive"):
+        found = recalled_by(memory, problem, strategy, PLANS)
+        assert all(blocked[i] <= WORTH_CELLS for i in found.plans if i != found.free)
+
+
+@given(seed=SEEDS, k=st.integers(1, 8))
+def test_centroid_is_the_head_of_the_rank(memory, problem_in, seed, k):
+    problem = problem_in(seed)
+    order, no_plan = rank(memory, occupancy_of(problem))
     assert sorted(order) == list(range(PLANS))
-    assert recall(memory, grid, k) == (() if no_plan else tuple(order[:k]))
+    found = recalled_by(memory, problem, "centroid", k)
+    assert set(found.plans) == (set() if no_plan else set(order[:k].tolist()))
+    assert found.free >= 0 or list(found.plans) == ([] if no_plan else order[:k].tolist())
 
 
-def test_nothing_is_recalled_where_row_0_scores_best(memory):
+def test_nothing_is_recalled_where_row_0_scores_best(memory, problem_in):
     hopeless = dataclasses.replace(memory, biases=np.array([1e6] + [0.0] * PLANS, np.float32))
-    grid = np.zeros((64, 64), np.uint8)
-    assert recall(hopeless, grid, 5) == ()
-    assert rank(hopeless, grid)[1]
+    problem = problem_in(0)
+    assert recalled_by(hopeless, problem, "centroid", 5).plans == ()
+    assert rank(hopeless, occupancy_of(problem))[1]
+    assert recalled_by(hopeless, problem, "exhaustive", 5).plans != ()
 
 
-def test_equal_scores_are_recalled_in_order_of_storing(memory):
-    flat = dataclasses.replace(
-        memory, vectors=np.zeros_like(memory.vectors), biases=np.zeros_like(memory.biases)
+@given(seed=SEEDS, k=st.integers(1, 30), count=st.integers(1, 30))
+def test_the_best_are_those_of_a_stable_sort(seed, k, count):
+    rng = generator(seed, "best")
+    vectors = rng.integers(-2, 3, (count + 1, 4)).astype(np.float32)
+    biases = rng.integers(-2, 3, count + 1).astype(np.float32)
+    embedding = rng.integers(-2, 3, 4).astype(np.float32)
+    scores = vectors @ embedding + biases
+    expected = np.argsort(-scores[1:], kind="stable")[:k].tolist()
+    assert best_plans(vectors, biases, embedding, k, never_none=True).tolist() == expected
+    nothing = scores[0] > scores[1:].max()
+    assert best_plans(vectors, biases, embedding, k).tolist() == ([] if nothing else expected)
+
+
+def test_the_default_is_exhaustive_until_there_are_too_many_plans(memory):
+    assert default_recall(memory) == "exhaustive"
+    many = dataclasses.replace(
+        memory,
+        plans=[memory.plans[0]] * (MOST_EXHAUSTIVE + 1),
+        masks=np.zeros((MOST_EXHAUSTIVE + 1, 64), np.uint64),
+        **{name: np.zeros((MOST_EXHAUSTIVE + 2, 6), np.float32) for name in ("centroids", "vectors")},
+        biases=np.zeros(MOST_EXHAUSTIVE + 2, np.float32),
     )
-    assert recall(flat, np.zeros((64, 64), np.uint8), 3) == (0, 1, 2)
+    assert default_recall(many) == "hybrid"
 
 
 def test_without_no_plan_problems_row_0_never_wins(memory):
@@ -99,7 +208,8 @@ def test_without_no_plan_problems_row_0_never_wins(memory):
     centroids, scatter = centroids_of(embeddings, rows, PLANS + 1)
     vectors, biases = nearest_readout(centroids, scatter)
     bare = dataclasses.replace(memory, centroids=centroids, vectors=vectors, biases=biases)
-    assert scores(bare, np.ones(6, np.float32)).argmax() > 0
+    scores = bare.vectors @ np.ones(6, np.float32) + bare.biases
+    assert scores.argmax() > 0
 
 
 def test_rows_that_do_not_fit_the_plans_are_refused(memory):
@@ -107,9 +217,15 @@ def test_rows_that_do_not_fit_the_plans_are_refused(memory):
         dataclasses.replace(memory, biases=memory.biases[1:])
 
 
-def test_k_below_one_is_refused(memory):
-    with pytest.raises(ValueError, match="at least 1"):
-        nearest(memory, np.zeros(6, np.float32), 0)
+@pytest.mark.parametrize(("strategy", "k"), [("mask", 0), ("centroid", -1), ("guess", 1)])
+def test_a_wrong_question_is_refused(memory, experiences, strategy, k):
+    with pytest.raises(ValueError, match=f"recall {k} plans by '{strategy}': give 1 or more, and one of"):
+        recall(memory, View(experiences[0].problem), strategy, k)
+
+
+def test_blindly_needs_a_generator(memory, experiences):
+    with pytest.raises(ValueError, match="pass an rng"):
+        recall(memory, View(experiences[0].problem), "random", 1)
 
 
 @given(seed=SEEDS)

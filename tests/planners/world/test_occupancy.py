@@ -5,7 +5,18 @@ import shapely
 from hypothesis import given, settings
 
 from planners.world.classes import CLASSES, problem_class
-from planners.world.occupancy import GRID, draw_occupancy, occupancy_of, pack, unpack
+from planners.world.occupancy import (
+    GRID,
+    allocate_drawing,
+    bits_of,
+    draw,
+    draw_occupancy,
+    drawing_of,
+    grid_of,
+    occupancy_of,
+    pack,
+    unpack,
+)
 from planners.world.problem import BOUNDS, Problem, obstacles_of
 from tests.planners.world.strategies import clutter, problem_with, seeds
 
@@ -58,8 +69,39 @@ def test_an_empty_problem_has_an_empty_grid() -> None:
 @given(seeds)
 def test_the_kernel_equals_its_python_function(seed: int) -> None:
     obstacles = clutter(np.random.default_rng(seed), 5)
-    arguments = (obstacles.vertices, obstacles.piece_starts, np.array(BOUNDS))
-    assert (draw_occupancy(*arguments) == draw_occupancy.py_func(*arguments)).all()  # type: ignore[attr-defined]
+    drawings = []
+    for draw_it in (draw, draw.py_func):  # type: ignore[attr-defined]
+        drawing = allocate_drawing(len(obstacles.piece_starts))
+        draw_it(obstacles.vertices, obstacles.piece_starts, BOUNDS, drawing)
+        drawings.append(drawing.occupied.copy())
+    assert (drawings[0] == drawings[1]).all()
+    grid = draw_occupancy(obstacles.vertices, obstacles.piece_starts, np.array(BOUNDS))
+    assert (bits_of(grid) == drawings[0]).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_what_is_occupied_is_what_the_pieces_meet(seed: int) -> None:
+    problem = problem_with(clutter(np.random.default_rng(seed), 20))
+    drawing = drawing_of(problem)
+    together = np.zeros(GRID, np.uint64)
+    for i, piece in enumerate(problem.obstacles.pieces()):
+        first, last = drawing.rows[i]
+        rows = np.arange(first, last + 1)
+        together[rows] |= drawing.pieces[i, rows]
+        alone = drawing.pieces[i, rows].copy()
+        assert (bits_of(occupancy_of(problem_with(obstacles_of([[piece]]))))[rows] == alone).all()
+        drawing = drawing_of(problem)
+    assert (together == drawing.occupied).all()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds)
+def test_bits_are_the_grid(seed: int) -> None:
+    grid = np.random.default_rng(seed).integers(0, 2, (GRID, GRID), np.uint8)
+    bits = bits_of(grid)
+    assert (grid_of(bits) == grid).all()
+    assert all(bool(int(bits[r]) >> c & 1) == grid[r, c] for r in range(0, GRID, 9) for c in range(GRID))
 
 
 @settings(max_examples=20, deadline=None)

@@ -1,0 +1,56 @@
+"""A problem as one attempt sees it: each structure made when first wanted, and how long each part took."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+from planners.world.collision import Scene, scene_of
+from planners.world.occupancy import Bits, Drawing, Grid, drawing_of, grid_of
+from planners.world.problem import Problem
+
+
+class View:
+    """The drawing, the grid and the scene of a canonical problem. One at a time: they share buffers."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.seconds: dict[str, float] = {}  # by part
+        self.began = self._last = perf_counter()
+        self._drawing: Drawing | None = None
+        self._grid: Grid | None = None
+        self._scene: Scene | None = None
+
+    def lap(self, part: str) -> None:
+        """Count the time since the last lap to ``part``."""
+        now = perf_counter()
+        self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
+        self._last = now
+
+    @property
+    def drawing(self) -> Drawing:
+        """The cells that obstacles meet, of each convex piece too."""
+        if self._drawing is None:
+            self._drawing = drawing_of(self.problem)
+            self.lap("occupancy")
+        return self._drawing
+
+    @property
+    def bits(self) -> Bits:
+        """Bits ``[64]`` of the cells that are not free."""
+        return self.drawing.occupied
+
+    @property
+    def grid(self) -> Grid:
+        """The same as a grid ``[64, 64]``."""
+        if self._grid is None:
+            self._grid = grid_of(self.bits)
+            self.lap("occupancy")
+        return self._grid
+
+    @property
+    def scene(self) -> Scene:
+        """The obstacles, ready for collision checks."""
+        if self._scene is None:
+            self._scene = scene_of(self.problem)
+            self.lap("scene")
+        return self._scene
