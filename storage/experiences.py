@@ -48,12 +48,12 @@ def write_experiences(
     write_table(path, table, key)
 
 
-def read_experiences(path: Path, vehicle: Vehicle = CAR) -> list[Experience]:
-    """The experiences of a file, in order.
+def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = None) -> list[Experience]:
+    """The experiences of a file, in order; the first ``count`` if given.
 
     StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
     """
-    table = read_table(path, EXPERIENCES)
+    table = read_table(path, EXPERIENCES).slice(0, count)
     refuse_another(path, _recorded(path), vehicle)
     size = state_size(vehicle)
     return [

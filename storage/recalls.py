@@ -19,21 +19,21 @@ from storage.shards import read_table, write_table
 def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key: str = "") -> None:
     """Write recall rows with the fields of ``storage.schemas.recalls``.
 
-    ``order``: the numbers of all plans, best first. ``free``: one truth value a plan. KeyError where a row
-    lacks a field.
+    ``order``: the numbers of the first plans, best first, all of them or not. ``free``: one truth value a
+    plan. KeyError where a row lacks a field.
     """
     schema = recalls(plans)
     columns = {name: [row[name] for row in rows] for name in schema.names}
     free = np.array(columns["free"], bool).reshape(-1, plans)
     arrays = {
-        "order": list_column(columns["order"], np.int16),
+        "order": list_column(columns["order"], np.int32),
         "free": bits_column(np.packbits(free, axis=1)),
     }
     write_table(path, pa.table(columns | arrays, schema=schema), key)
 
 
 def read_recalls(paths: Sequence[Path]) -> pd.DataFrame:
-    """The recall rows of some shards; ``order`` holds int16 arrays, ``free`` bool arrays."""
+    """The recall rows of some shards; ``order`` holds int32 arrays, ``free`` bool arrays."""
     return pd.concat([_read(path) for path in paths], ignore_index=True)
 
 

@@ -128,7 +128,7 @@ def recalls(plans: int) -> pa.Schema:
             ("class", pa.string()),
             ("memory", pa.string()),
             ("protocol", pa.string()),  # held-out or fresh
-            ("order", pa.list_(pa.int16())),  # all plans, the best first
+            ("order", pa.list_(pa.int32())),  # the first plans, best first
             ("free", pa.binary((plans + 7) // 8)),  # which plans are free, most significant bit first
             ("nothing_recalled", pa.bool_()),
             ("recall", pa.string()),  # what ranked the plans: centroid, mask, or the control popularity

@@ -15,9 +15,9 @@ from planners.memory.recall import Memory
 from planners.world.occupancy import GRID
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
-from storage.experiences import read_experiences
 from storage.memories import save_memory
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done
+from tasks.growth import grown_memory, taught_experiences
 from tasks.settings import COMBINED, RunSettings
 from tasks.train import memory_names, problems_of_memory, train_chunks
 from tasks.worlds import class_settings
@@ -26,17 +26,20 @@ SHOWN_PROBLEMS: Final = 4_000  # on an embedding map
 
 
 def build_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Build one memory, of the encoder that is best on the validation problems; the first of equals."""
+    """Build one memory, of the encoder that is best on the validation problems; the first of equals.
+
+    Plans that no encoder was taught join it then.
+    """
+    run, name, settings = chunk.run, chunk.class_name, chunk.settings
+    vehicle = vehicle_named(settings.vehicle)
     built = memories_by_seed(chunk)
-    vehicle = vehicle_named(chunk.settings.vehicle)
-    scores = [
-        load_encoder(chunk.run.model(chunk.class_name, seed), vehicle).score for seed in range(len(built))
-    ]
+    scores = [load_encoder(run.model(name, seed), vehicle).score for seed in range(len(built))]
     best = scores.index(max(scores))
     _draw(chunk, best, built[best])
-    save_memory(chunk.run.memory(chunk.class_name), built[best])
-    mark_done(chunk.run.memory(chunk.class_name), chunk.key)
-    return {"plans": len(built[best].plans), "training_seed": best}
+    memory = grown_memory(chunk, built[best]) if settings.grown else built[best]
+    save_memory(run.memory(name), memory)
+    mark_done(run.memory(name), chunk.key)
+    return {"plans": len(memory.plans), "training_seed": best}
 
 
 build_one_memory = chunk_task(build_chunk)
@@ -85,10 +88,10 @@ def _draw(chunk: Chunk, seed: int, memory: Memory) -> None:
 
 
 def memories_by_seed(chunk: Chunk) -> list[Memory]:
-    """The memory of a chunk with the encoder of each training seed."""
+    """The memory of a chunk's taught plans with the encoder of each training seed."""
     name, run, settings = chunk.class_name, chunk.run, chunk.settings
     vehicle = vehicle_named(settings.vehicle)
-    plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
+    plans = [experience.plan for experience in taught_experiences(run, settings, name)]
     classes = settings.class_names if name == COMBINED else (name,)
     metadata = {
         "run": settings.run_name,

@@ -15,7 +15,6 @@ from planners.memory.labels import PlanSweeps, sweep_plans
 from planners.world.problem import Integers, Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
-from storage.experiences import read_experiences
 from storage.hallucinated import (
     read_hallucinated_problems,
     read_labelled,
@@ -26,6 +25,7 @@ from storage.hallucinators import load_hallucinator
 from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.collect import experiences_key
+from tasks.growth import taught_experiences
 from tasks.settings import COMBINED, RunSettings
 from tasks.worlds import source_key, source_of
 
@@ -45,7 +45,7 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
     vehicle = vehicle_named(settings.vehicle)
-    experiences = read_experiences(chunk.run.experiences(name), vehicle)
+    experiences = taught_experiences(chunk.run, settings, name)
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     mixture = dict(settings.hallucination)
     weights = load_hallucinator(chunk.run.hallucinator(name), vehicle) if LEARNED in mixture else None
@@ -66,9 +66,9 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
         rng = generator(settings.seed, NO_PLAN, name, index)
         problems.append(no_plan(sweeps, source.draw, rng, name, index, experiences[0].problem.bounds))
         methods.append(NO_PLAN)
-    wanted = round(DRAWN_SHARE * settings.experiences * settings.problems_per_experience)
+    wanted = round(DRAWN_SHARE * settings.taught * settings.problems_per_experience)
     drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
-    first, last = (drawn * i // settings.experiences for i in (chunk.first, chunk.last))
+    first, last = (drawn * i // settings.taught for i in (chunk.first, chunk.last))
     problems += [source.problem("collect", index) for index in range(first, last)]
     methods += [DRAWN] * (last - first)
     for_none = np.full(len(problems) - len(made_for), -1)
@@ -95,7 +95,7 @@ def hallucination_chunks(data: str, settings: RunSettings) -> list[Chunk]:
             settings,
             "hallucinate",
             name,
-            settings.experiences,
+            settings.taught,
             size,
             [
                 settings.seed,
@@ -113,10 +113,10 @@ def relabel_chunk(chunk: Chunk) -> dict[str, Any]:
     run, settings = chunk.run, chunk.settings
     origin = hallucination_chunks(chunk.data, settings)[chunk.index]
     place = run.shard("hallucinated", origin.class_name, origin.index)
-    offset = settings.class_names.index(origin.class_name) * settings.experiences
+    offset = settings.class_names.index(origin.class_name) * settings.taught
     made_for = read_labelled([place]).plan_index
     vehicle = vehicle_named(settings.vehicle)
-    experiences = read_experiences(run.experiences(COMBINED), vehicle)
+    experiences = taught_experiences(run, settings, COMBINED)
     sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
     problems = read_hallucinated_problems(place)
     offsets = np.where(made_for >= 0, np.int32(offset), np.int32(0))

@@ -14,11 +14,13 @@ import numpy as np
 from planners.memory.labels import Flags, free_plans
 from planners.memory.masks import rank_by_cells
 from planners.memory.recall import Memory, rank
+from planners.memory.training import TrainedEncoder
 from planners.world.collision import scene_of
 from planners.world.occupancy import GRID, Grid, bits_of, occupancy_of
 from planners.world.problem import Integers
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
+from storage.memories import load_memory
 from storage.recalls import write_recalls
 from storage.shards import shard_is_done
 from tasks.build_memory import memories_by_seed, memory_chunks
@@ -29,6 +31,7 @@ from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 2_000
 HELD_OUT_PROBLEMS: Final = 10_000  # a class: a share within 1 %
+LONGEST_ORDER: Final = 100  # plans of a ranking that are kept: figures ask for some twenty
 
 
 class Asked(NamedTuple):
@@ -43,22 +46,22 @@ class Asked(NamedTuple):
 
 def recall_chunk(chunk: Chunk) -> dict[str, Any]:
     """Rank the plans for a range of a memory's problems, with the encoder of each training seed."""
-    memories = memories_by_seed(chunk)
-    popularity = load_encoder(
-        chunk.run.model(chunk.class_name), vehicle_named(chunk.settings.vehicle)
-    ).popularity
-    by_popularity = np.argsort(-popularity, kind="stable").astype(np.int32)
+    name, run, grown = chunk.class_name, chunk.run, chunk.settings.grown
+    vehicle = vehicle_named(chunk.settings.vehicle)
+    memories = [load_memory(run.memory(name), vehicle)] if grown else memories_by_seed(chunk)
+    by_popularity = None if grown else _by_popularity(load_encoder(run.model(name), vehicle))
     protocol = "held-out" if chunk.index == 0 else "fresh"
     problems = _held_out(chunk) if chunk.index == 0 else _fresh(chunk, memories[0])
     rows: list[dict[str, Any]] = []
     for asked in problems:
         by_cells = rank_by_cells(memories[0].masks, bits_of(asked.grid)).order.copy()
         rows.append(_row(chunk, protocol, asked, "mask", 0, by_cells, False))
-        rows.append(_row(chunk, protocol, asked, "popularity", 0, by_popularity, False))
+        if by_popularity is not None:
+            rows.append(_row(chunk, protocol, asked, "popularity", 0, by_popularity, False))
         for seed, memory in enumerate(memories):
             rows.append(_row(chunk, protocol, asked, "centroid", seed, *rank(memory, asked.grid)))
     path = chunk.run.shard("recalls", chunk.class_name, chunk.index)
-    write_recalls(path, rows, plans=len(by_popularity), key=chunk.key)
+    write_recalls(path, rows, plans=len(memories[0].plans), key=chunk.key)
     return {"rows": len(rows)}
 
 
@@ -104,13 +107,19 @@ def _fresh(chunk: Chunk, memory: Memory) -> Iterator[Asked]:
         yield Asked(problem.id, name, -1, occupancy_of(problem), free)
 
 
+def _by_popularity(trained: TrainedEncoder) -> Integers:
+    return np.argsort(-trained.popularity, kind="stable").astype(np.int32)
+
+
 def _held_out(chunk: Chunk) -> Iterator[Asked]:
     name, settings = chunk.class_name, chunk.settings
+    if settings.grown:  # most plans were never hallucinated for
+        return
     problems = problems_of_memory(chunk.data, settings, name)
     held_out = load_encoder(chunk.run.model(name), vehicle_named(settings.vehicle)).held_out
     of_plans = held_out[problems.plan_index[held_out] >= 0]
     classes = _classes(settings, name)
-    places = problems.plan_index[of_plans] // settings.experiences  # plans are stored class by class
+    places = problems.plan_index[of_plans] // settings.taught  # plans are stored class by class
     for place, class_name in enumerate(classes):
         for i in of_plans[places == place][:HELD_OUT_PROBLEMS].tolist():
             yield Asked(
@@ -130,7 +139,7 @@ def _row(
         "class": asked.class_name,
         "memory": chunk.class_name,
         "protocol": protocol,
-        "order": order,
+        "order": order[:LONGEST_ORDER],
         "free": asked.free,
         "nothing_recalled": nothing,
         "recall": recall,

@@ -44,6 +44,7 @@ ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
 COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
 ABLATION_PLANNER: Final = "gust"
 DEFAULT_VEHICLE: Final = "car"
+TAUGHT: Final = 1_000  # plans a class that the encoder is trained on; a larger memory grows beyond them
 COMBINED: Final = "combined"  # the memory that does not distinguish the classes
 
 
@@ -78,7 +79,7 @@ class RunSettings:
     seed: int
     objective: Objective
     experiences: int  # solved problems kept a class
-    problems_per_experience: int  # hallucinated for each plan, its own problem included
+    problems_per_experience: int  # hallucinated for each plan that is taught, its own problem included
     test_problems: int  # unseen problems a class
     collector: str  # the planner whose plans are kept
     planners: tuple[str, ...]  # those that are measured
@@ -95,6 +96,16 @@ class RunSettings:
     def class_names(self) -> tuple[str, ...]:
         """All classes of the run, folders of worlds after the generated ones."""
         return self.classes + tuple(world_class(folder) for folder in self.worlds)
+
+    @property
+    def taught(self) -> int:
+        """How many experiences of a class problems are hallucinated for: the first, that encoders learn."""
+        return min(self.experiences, TAUGHT)
+
+    @property
+    def grown(self) -> bool:
+        """Whether memories have more plans than their encoders were taught (``planners.memory.growth``)."""
+        return self.experiences > self.taught
 
     @property
     def digest(self) -> str:

@@ -35,6 +35,8 @@ from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.attempts import PlanFaultError, check_attempt, same_outcome
 from tasks.benchmark import CHUNK_PROBLEMS
+from tasks.growth import taught_experiences
+from tasks.recalls import LONGEST_ORDER
 from tasks.settings import RunError, RunSettings
 from tasks.train import memory_names
 from tasks.worlds import source_of
@@ -86,7 +88,7 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
         if run.experiences(name).exists():
             yield partial(_experiences, run.experiences(name), vehicle)
         for path in run.shards("hallucinated", name):
-            yield partial(_hallucinated, run, name, path, vehicle)
+            yield partial(_hallucinated, run, settings, name, path)
         if run.hallucinator(name).exists():
             yield partial(_hallucinator, run, name, vehicle)
         for path in run.shards("recalls", name):
@@ -110,11 +112,11 @@ def _experiences(path: Path, vehicle: Vehicle) -> Findings:
     return Counter({"plans of experiences re-simulated and checked by FCL": len(experiences)}), wrong
 
 
-def _hallucinated(run: RunFolder, name: str, path: Path, vehicle: Vehicle) -> Findings:
+def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) -> Findings:
     problems, labelled = read_hallucinated_problems(path), read_labelled([path])
     free = np.unpackbits(labelled.labels, axis=1, count=labelled.plans).astype(bool)
-    experiences = read_experiences(run.experiences(name), vehicle)
-    sweeps = sweep_plans([experience.plan for experience in experiences], vehicle)
+    experiences = taught_experiences(run, settings, name)
+    sweeps = sweep_plans([each.plan for each in experiences], vehicle_named(settings.vehicle))
     made_for = labelled.plan_index
     rows = np.arange(len(made_for))
     solved = (made_for < 0) | free[rows, np.maximum(made_for, 0)]
@@ -139,7 +141,7 @@ def _recalls(path: Path) -> Findings:
     wrong = [
         f"{path}: {row['problem_id']} ranks {len(row['order'])} of {len(row['free'])} plans, or some twice"
         for row in rows
-        if sorted(row["order"]) != list(range(len(row["free"])))
+        if len({*row["order"]} & {*range(len(row["free"]))}) != min(len(row["free"]), LONGEST_ORDER)
     ]
     return Counter({"recalls read": len(rows)}), wrong
 

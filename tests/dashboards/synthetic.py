@@ -77,7 +77,7 @@ def recalls(
                 "class": name,
                 "memory": name,
                 "protocol": protocol,
-                "order": np.argsort(-score).astype(np.int16),
+                "order": np.argsort(-score).astype(np.int32),
                 "free": free,
                 "nothing_recalled": bool(rng.random() < 0.1),
                 "recall": recall,
