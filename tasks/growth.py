@@ -29,7 +29,7 @@ def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list
 
 
 def grown_memory(chunk: Chunk, memory: Memory) -> Memory:
-    """The chunk's memory with all plans that were collected, read out from problems as the classes have them."""
+    """The memory with all plans that were collected, read out from problems as the classes have them."""
     settings, name = chunk.settings, chunk.class_name
     experiences = read_experiences(chunk.run.experiences(name), memory.vehicle)
     classes = settings.class_names if name == COMBINED else (name,)

@@ -31,7 +31,7 @@ from planners.memory.recall import Memory
 from planners.memory.training import TrainingSettings, train
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
-from planners.world.classes import CLASSES, problem_class
+from planners.world.classes import CLASSES, ProblemClass, problem_class
 from planners.world.collision import scene_of
 from planners.world.problem import Floats, Problem
 from planners.world.randomness import generator
@@ -65,22 +65,28 @@ EVERY: list[Asked] = [
 ]
 
 
-def memory_of(name: str) -> Memory:
-    """A small memory of a class, from where it is kept if it is there."""
-    place = KEPT / f"{name}-{key_of(COLLECTING, EXPERIENCES, HALLUCINATED, EPOCHS)}"
+def memory_of(
+    name: str,
+    difficulty: str = "standard",
+    count: int = EXPERIENCES,
+    hallucinated: int = HALLUCINATED,
+    kept: Path = KEPT,
+) -> Memory:
+    """A small memory of a class, from where it is kept if it is there; ``hallucinated`` problems a plan."""
+    place = kept / f"{name}-{difficulty}-{count}-{key_of(COLLECTING, hallucinated, EPOCHS)}"
     try:
         return load_memory(place)
     except StorageError:
-        memory = _made(name)
+        memory = _made(problem_class(name, difficulty), count, hallucinated)
         save_memory(place, memory)
         return memory
 
 
-def _made(name: str) -> Memory:
-    source = problem_class(name)
+def _made(source: ProblemClass, count: int, hallucinated: int) -> Memory:
+    name = source.name
     experiences: list[Experience] = []
     index = 0
-    while len(experiences) < EXPERIENCES:
+    while len(experiences) < count:
         problem = source.draw(COLLECTING, index)
         index += 1
         plan = solve(problem, "follow", seed=COLLECTING).plan
@@ -93,10 +99,10 @@ def _made(name: str) -> Memory:
     for i, experience in enumerate(track(experiences, description=f"memory of {name}", transient=True)):
         rng = generator(COLLECTING, name, i)
         made = hallucinate(experience, {"rearrange": 1.0}, source.draw_obstacles, rng)
-        problems += [problem for problem, _ in islice(made, HALLUCINATED)]
+        problems += [problem for problem, _ in islice(made, hallucinated)]
         rng = generator(COLLECTING, "no-plan", name, i)
-        problems += [no_plan(sweeps, source.draw_obstacles, rng, name, j) for j in range(HALLUCINATED // 20)]
-        made_for += [i] * HALLUCINATED + [-1] * (HALLUCINATED // 20)
+        problems += [no_plan(sweeps, source.draw_obstacles, rng, name, j) for j in range(hallucinated // 20)]
+        made_for += [i] * hallucinated + [-1] * (hallucinated // 20)
     packed, free = label_problems(problems, sweeps)
     index_of = np.array(made_for, np.int32)
     trained = train(packed, index_of, free, TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
