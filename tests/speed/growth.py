@@ -27,8 +27,6 @@ from pathlib import Path
 from time import perf_counter, thread_time
 
 import numpy as np
-from planners.memory.scores import best_plans
-from planners.world.view import View
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import track
@@ -38,10 +36,12 @@ from planners.memory.encoder import Floats32
 from planners.memory.inverted_lists import best_listed, list_readout
 from planners.memory.labels import Flags, free_plans
 from planners.memory.recall import RECALLS, Memory, default_recall, recall
+from planners.memory.scores import best_plans
 from planners.world.classes import problem_class
 from planners.world.collision import scene_of
 from planners.world.problem import Integers, Problem
 from planners.world.randomness import generator
+from planners.world.view import View
 from storage.memories import load_memory, save_memory
 from tests.speed.assists import KEPT, MEASURING
 from tests.speed.many_plans import collected_memory, collected_plans, synthetic_memory
