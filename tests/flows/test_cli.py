@@ -35,6 +35,12 @@ COMMANDS = (
         (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
         (["collect", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'. Known: car, differential-drive"),
         (["plan", "p.json", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),
+        (
+            ["run", "--hallucination", "dream"],
+            2,
+            "Unknown hallucination method 'dream'. Known: rearrange",
+        ),
+        (["hallucinate", "--hallucination", "minimal=0"], 2, "'minimal=0': give a weight above 0"),
         (["solve"], 2, "--problems"),
         (["plan", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
         (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),

@@ -20,6 +20,7 @@ SECTIONS: Final = {
     "assists": "tests.speed.assists",
     "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",
+    "hallucination": "tests.speed.hallucination",
 }
 
 
