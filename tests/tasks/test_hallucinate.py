@@ -84,9 +84,7 @@ def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> Non
         hallucinate_chunk(chunk)
     shards = _shards(data)
     labelled = read_labelled(shards)
-    methods = Counter(
-        m for path in shards for m in pq.read_table(path, partitioning=None)["method"].to_pylist()
-    )
+    methods = Counter(method for path in shards for method in read_methods(path))
     assert methods["origin"] == 6
     assert sum(methods[name] for name in METHODS) == 6 * 11
     assert min(methods[name] for name in METHODS) > 6
