@@ -246,6 +246,61 @@ def solve(
     solve_many(assistant, problems, out, plans)
 
 
+@app.command
+def import_worlds(
+    path: Path,
+    *,
+    format: str | None = None,
+    out: Path,
+    part: str = "both",
+    problems: int | None = None,
+    seed: int = 1,
+    vehicle: str = "car",
+    scale: float = 1.0,
+    resolution: float | None = None,
+    unknown: str = "occupied",
+    tolerance: float = 0.0,
+    strict: bool = False,
+    picture: Path | None = None,
+) -> None:
+    """Make problems of worlds, or cut them from a map.
+
+    Parameters
+    ----------
+    path
+        A folder of worlds or problem files, one such file, or a map: .map, .scen, .yaml (ROS), .npy, .npz.
+    format
+        png, polygons, problems, moving-ai, ros or numpy; by default recognised by the files' endings.
+    out
+        A .parquet, .jsonl or .json file, or a new folder with parts train and test for run --worlds.
+    part
+        train, test, validation, or both of the first two.
+    problems
+        How many of each part; of a map 1,000 by default, of worlds all.
+    seed
+        Where on a map problems are cut follows from it.
+    vehicle
+        Who must have room to start: car, differential-drive, car-1-trailer or car-2-trailers.
+    scale
+        Metres of a map in a canonical metre: 2 for a robot twice as large with goals twice as far.
+    resolution
+        Metres a cell of a .map or NumPy map; default 1.
+    unknown
+        What unknown cells of a map are: occupied or free.
+    tolerance
+        Metres that the outline of what is occupied on a map may move, for fewer pieces; 0: it is exact.
+    strict
+        Stop at a bad world instead of skipping it.
+    picture
+        Where to draw the map with its problems, .png, .svg or .pdf.
+
+    """
+    from tasks import import_worlds as task
+
+    settings = task.import_settings(vehicle, strict, problems, seed, scale, resolution, unknown, tolerance)
+    task.import_worlds(path, format, out, part, settings, picture)
+
+
 def _do(stage: str, options: Options) -> None:
     from tasks.session import run_stage
     from tasks.settings import for_preset

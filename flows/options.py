@@ -26,7 +26,7 @@ class Options:
     classes
         Generated problem classes; all of them by default, none beside --worlds.
     worlds
-        A folder of worlds with parts train and test: one more class. Can be given several times.
+        A folder of worlds, or a map to cut problems from: one more class. Can be given several times.
     difficulty
         Of the generated classes: easy, standard or hard.
     vehicle

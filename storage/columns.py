@@ -24,6 +24,7 @@ def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
         "goal": list_column([problem.goal for problem in problems], np.float64),
         "goal_radius": [problem.goal_radius for problem in problems],
         "bounds": list_column([problem.bounds for problem in problems], np.float64),
+        "scale": [problem.scale for problem in problems],
         "vertices": list_column([problem.obstacles.vertices for problem in problems], np.float32),
         "piece_starts": list_column([problem.obstacles.piece_starts for problem in problems], np.int32),
         "obstacle_starts": list_column([problem.obstacles.obstacle_starts for problem in problems], np.int32),
@@ -42,6 +43,7 @@ def problems_of(table: pa.Table) -> list[Problem]:
         lists_of(table["vertices"]),
         lists_of(table["piece_starts"]),
         lists_of(table["obstacle_starts"]),
+        table["scale"].to_pylist() if "scale" in table.column_names else [1.0] * len(table),
         strict=True,
     )
     return [
@@ -53,8 +55,9 @@ def problems_of(table: pa.Table) -> list[Problem]:
             radius,
             tuple(bounds),
             Obstacles(vertices.astype(np.float64).reshape(-1, 2), pieces.copy(), obstacles.copy()),
+            scale,
         )
-        for identity, class_name, start, goal, radius, bounds, vertices, pieces, obstacles in rows
+        for identity, class_name, start, goal, radius, bounds, vertices, pieces, obstacles, scale in rows
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,8 @@ from planners.world.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
 from storage.files import read_json, write_json
 from storage.vehicles import other_vehicle
+
+X, Y, SPEED, ACCELERATION = 0, 1, 3, 0  # columns of every vehicle's states and controls that hold lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +26,18 @@ class PlanRecord:
     planner: str
     assist: str
     planning_seconds: float
-    plan: Plan | None
+    plan: Plan | None  # in the lengths of its problem; files hold those of the world outside
     vehicle: Vehicle = CAR
+    scale: float = 1.0  # metres of the world outside in one of the plan's
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
-    """Write the plan contract's JSON; without a plan, states and controls are empty, lengths null."""
-    plan = record.plan
+    """Write the plan contract's JSON; without a plan, states and controls are empty, lengths null.
+
+    At another scale than 1 positions, speeds and accelerations are those of the vehicle made as much larger.
+    """
+    plan = record.plan and _scaled(record.plan, record.scale)
+    scaled = {} if record.scale == 1.0 else {"scale": record.scale}
     write_json(
         path,
         {
@@ -40,6 +47,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
             "planner": record.planner,
             "assist": record.assist,
             "vehicle": name_of(record.vehicle),
+            **scaled,
             "dt": None if plan is None else plan.dt,
             "states": [] if plan is None else plan.states.tolist(),
             "controls": [] if plan is None else plan.controls.tolist(),
@@ -57,6 +65,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         made_for = str(found.get("vehicle", name_of(CAR)))  # files were once of the car alone
         states = np.array(found["states"], float)
         controls = np.array(found["controls"], float).reshape(-1, 2)
+        scale = float(found.get("scale", 1.0))
         plan = Plan(states, controls, float(found["dt"])) if len(states) else None
         record = PlanRecord(
             str(found["problem_id"]),
@@ -67,6 +76,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
             float(found["planning_seconds"]),
             plan,
             vehicle,
+            scale,
         )
     except KeyError as error:
         raise StorageError(f"{path} has no field {error}; is it a plan?") from None
@@ -85,4 +95,16 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         raise StorageError(
             f"{path} has a state or control that is not a finite number; write the plan again."
         )
-    return record
+    if not 0.0 < scale < np.inf:
+        raise StorageError(f"{path} has scale {scale}; wanted are metres a canonical metre.")
+    return record if plan is None else replace(record, plan=_scaled(plan, 1.0 / scale))
+
+
+def _scaled(plan: Plan, scale: float) -> Plan:
+    """A plan with its lengths multiplied; a vehicle as much larger drives it in the same time."""
+    if scale == 1.0:
+        return plan
+    states, controls = plan.states.copy(), plan.controls.copy()
+    states[:, [X, Y, SPEED]] *= scale
+    controls[:, ACCELERATION] *= scale
+    return Plan(states, controls, plan.dt)

@@ -11,19 +11,21 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from planners.world.faults import problem_fault
+from planners.world.polygons import PolygonError, convex_pieces
 from planners.world.problem import Floats, Obstacles, Problem, obstacles_of
 from planners.world.vehicle import CAR, Vehicle
-from storage.checks import problem_fault
 from storage.errors import StorageError
 from storage.files import parse_json, read_text, whole_file, write_json
-from storage.polygons import PolygonError, convex_pieces
 from storage.schemas import PROBLEMS
 from storage.shards import table_of, write_table
 
 FORMATS: Final = (".json", ".jsonl", ".parquet")
+SMALLEST_SCALE: Final = 0.01  # a robot of 2 cm
+LARGEST_SCALE: Final = 100.0
 UNKNOWN_CLASS: Final = "unknown"
 _REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
-_OPTIONAL: Final = ("id", "class", "groups")
+_OPTIONAL: Final = ("id", "class", "groups", "scale")
 
 
 def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
@@ -37,6 +39,17 @@ def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
     StorageError: a problem is malformed, impossible or has another's id; the message names file, line, id
     and what to do.
     """
+    for place, problem in problems_or_faults(path, vehicle):
+        if isinstance(problem, str):
+            raise StorageError(f"{place}: {problem}.")
+        yield problem
+
+
+def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
+    """Each problem of a file, or what is wrong with it, and where it stands.
+
+    StorageError: the file itself is missing, unreadable or of no known format.
+    """
     seen: set[str] = set()
     for number, fields in _raw_problems(path):
         place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
@@ -46,18 +59,21 @@ def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
             name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
             problem = problem_of(fields, name, vehicle)
         except ValueError as error:
-            raise StorageError(f"{named}: {error}.") from None
+            yield named, str(error)
+            continue
         if problem.id in seen:
-            raise StorageError(f'{place}: id "{problem.id}" occurs twice; give every problem its own.')
+            yield place, f'id "{problem.id}" occurs twice; give every problem its own'
+            continue
         seen.add(problem.id)
-        yield problem
+        yield place, problem
 
 
 def write_problems(path: Path, problems: Sequence[Problem]) -> None:
     """Write problems, whole or not at all, in the format that the file's ending says.
 
-    Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Reading gives the
-    same problems back, exactly.
+    Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Files hold the
+    lengths of the world outside: a problem's own times its scale. Reading gives the same problems back,
+    exactly, or to a last digit where the scale is not 1.
     """
     rows = [fields_of(problem) for problem in problems]
     match _format(path):
@@ -81,18 +97,20 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         raise ValueError(f"field {missing[0]} is missing; wanted are {', '.join(_REQUIRED)}")
     start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
     bounds = _numbers(fields, "bounds", 4)
+    scale = _scale(fields.get("scale"))
     problem = Problem(
         id=_text(fields, "id", default_id),
         class_name=_text(fields, "class", UNKNOWN_CLASS),
-        start=(start[0], start[1], start[2]),
-        goal=(goal[0], goal[1]),
-        goal_radius=_number(fields["goal_radius"], "goal_radius"),
-        bounds=(bounds[0], bounds[1], bounds[2], bounds[3]),
-        obstacles=_obstacles(fields["obstacles"], fields.get("groups")),
+        start=(start[0] / scale, start[1] / scale, start[2]),
+        goal=(goal[0] / scale, goal[1] / scale),
+        goal_radius=_number(fields["goal_radius"], "goal_radius") / scale,
+        bounds=(bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
+        obstacles=_obstacles(fields["obstacles"], fields.get("groups"), scale),
+        scale=scale,
     )
     fault = problem_fault(problem, vehicle)
     if fault is not None:
-        raise ValueError(fault)
+        raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
     return problem
 
 
@@ -128,13 +146,13 @@ def _format(path: Path) -> str:
     return path.suffix
 
 
-def _obstacles(polygons: object, groups: object) -> Obstacles:
+def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:
     if not isinstance(polygons, list):
         raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
     pieces = []
     for number, points in enumerate(polygons, start=1):
         try:
-            pieces.append(convex_pieces(_points(points)))
+            pieces.append(convex_pieces(_points(points) / scale))
         except PolygonError as error:
             raise ValueError(f"obstacle {number} {error}") from None
     if groups is None:
@@ -178,6 +196,16 @@ def _number(value: object, name: str) -> float:
         return float("inf")  # which the checks refuse
 
 
+def _scale(value: object) -> float:
+    scale = 1.0 if value is None else _number(value, "scale")
+    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
+        raise ValueError(
+            f"scale is {scale:g}; wanted are metres a canonical metre, "
+            f"from {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}"
+        )
+    return scale
+
+
 def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
     value = fields.get(name)
     if value is None or value == "":
@@ -193,16 +221,19 @@ def _short(value: object) -> str:
 
 
 def fields_of(problem: Problem) -> dict[str, Any]:
-    """The contract's object that describes a problem (``problem_of``)."""
-    obstacles = problem.obstacles
+    """The contract\'s object that describes a problem (``problem_of``)."""
+    obstacles, scale = problem.obstacles, problem.scale
+    x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()
     fields: dict[str, Any] = {
         "id": problem.id,
         "class": problem.class_name,
-        "start": list(problem.start),
-        "goal": list(problem.goal),
-        "goal_radius": problem.goal_radius,
-        "bounds": list(problem.bounds),
-        "obstacles": [piece.tolist() for piece in obstacles.pieces()],
+        "start": [scale * x, scale * y, heading],
+        "goal": [scale * coordinate for coordinate in problem.goal],
+        "goal_radius": scale * problem.goal_radius,
+        "bounds": [scale * bound for bound in problem.bounds],
+        "obstacles": [(scale * piece).tolist() for piece in obstacles.pieces()],
     }
-    return fields if all(size == 1 for size in groups) else {**fields, "groups": groups}
+    scaled = {} if scale == 1.0 else {"scale": scale}
+    grouped = {} if all(size == 1 for size in groups) else {"groups": groups}
+    return fields | scaled | grouped

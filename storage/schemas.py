@@ -15,6 +15,7 @@ _PROBLEM: Final = [
     ("goal", pa.list_(pa.float64())),  # x m, y m
     ("goal_radius", pa.float64()),  # m
     ("bounds", pa.list_(pa.float64())),  # x_min, y_min, x_max, y_max, m
+    ("scale", pa.float64()),  # metres of the world outside a metre here; null: 1
 ]
 
 # Flat: a list of lists of lists costs ten times as much to read
@@ -45,7 +46,7 @@ PROBLEMS: Final = _schema(
         ("obstacles", pa.list_(pa.list_(pa.list_(pa.float64())))),  # polygons of [x, y], m
         ("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
     ],
-    optional=("groups",),
+    optional=("groups", "scale"),  # in this table the lengths are those of the world outside
 )
 
 EXPERIENCES: Final = _schema(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -15,17 +14,15 @@ import dask
 import distributed
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from tasks.caching import Chunk
+from tasks.progress import progress
 from tasks.settings import RunError
 
 KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
 CONNECT_SECONDS: Final = 5
 CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
-LINE_SECONDS: Final = 5.0  # between lines of progress where there is no terminal
 
 Client: Any = distributed.Client  # Dask has no types
 LocalCluster: Any = distributed.LocalCluster
@@ -128,7 +125,7 @@ def fan_out(
         task.with_options(refresh_cache=not is_done(chunk)).submit(chunk) for chunk in chunks
     ]
     sizes = [units(chunk) for chunk in chunks]
-    with _progress(description, sum(sizes)) as show:
+    with progress(description, sum(sizes)) as show:
         pending = dict(zip(range(len(chunks)), futures, strict=True))
         done = 0
         while pending:
@@ -155,30 +152,3 @@ def _check(future: Any, chunk: Chunk, description: str) -> None:
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ChunkError(f"{where} failed: {reason or type(error).__name__}") from error
-
-
-@contextmanager
-def _progress(description: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar with the time left on a terminal, a line now and then elsewhere; both on the error stream."""
-    console = Console(file=sys.stderr)
-    began = time.monotonic()
-    if console.is_terminal:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=console) as bar:
-            row = bar.add_task(description, total=total)
-            yield lambda done: bar.update(row, completed=done)
-        return
-    told = began
-    complete = False
-
-    def tell(done: int) -> None:
-        nonlocal told, complete
-        now = time.monotonic()
-        if now - told >= LINE_SECONDS or (done == total and not complete):
-            told, complete = now, done == total
-            left = f", {(now - began) / done * (total - done):.0f} s left" if 0 < done < total else ""
-            console.print(
-                f"{description}: {done} of {total} after {now - began:.0f} s{left}", highlight=False
-            )
-
-    yield tell

@@ -96,8 +96,8 @@ def optimise_one(
         raise RunError(f"No plan for {asked.id or problem}: {told}.")
     clearance = least_clearance(asked, found.plan.states, begin.vehicle)
     print(
-        f"{told}, {found.plan.length_m:.1f} m, {found.plan.duration_s:.1f} s"
-        f" (guess: {guess.duration_s:.1f} s), {clearance:.2f} m clear"
+        f"{told}, {asked.scale * found.plan.length_m:.1f} m, {found.plan.duration_s:.1f} s"
+        f" (guess: {guess.duration_s:.1f} s), {asked.scale * clearance:.2f} m clear"
     )
     for what, place in (("plan", out), ("picture", drawing)):
         if place is not None:
@@ -114,4 +114,5 @@ def _record(problem: Problem, found: Optimised, planner: str, seconds: float, ve
         seconds,
         found.plan,
         vehicle,
+        problem.scale,
     )

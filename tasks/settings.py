@@ -74,7 +74,7 @@ class RunSettings:
 
     preset: str
     classes: tuple[str, ...]  # generated problem classes
-    worlds: tuple[str, ...]  # folders of worlds; each is one more class, named as its folder
+    worlds: tuple[str, ...]  # folders of worlds, or maps; each is one more class, named as its folder or file
     difficulty: str
     seed: int
     objective: Objective
@@ -153,9 +153,10 @@ def default_data() -> Path:
     return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
 
 
-def world_class(folder: str) -> str:
-    """The class name of a folder of worlds: the folder's own name."""
-    return Path(folder).resolve().name
+def world_class(path: str | Path) -> str:
+    """The class name of worlds or of a map: the folder's name, or the file's without its ending."""
+    place = Path(path).resolve()
+    return place.name if place.is_dir() else place.stem
 
 
 class _Preset(NamedTuple):
@@ -213,9 +214,11 @@ def for_preset(
     if not named:
         raise UsageError(f"No planner to measure. Name some of: {', '.join(PLANNERS)}.")
     for folder in worlds:
-        for part in ("train", "test"):
-            if not (Path(folder) / part).is_dir():
-                raise UsageError(f"{folder} is no folder of worlds: it has no {part} in it.")
+        if not Path(folder).exists():
+            raise UsageError(f"{folder} is no folder of worlds and no map: there is nothing of that name.")
+        parts = {part: (Path(folder) / part).is_dir() for part in ("train", "test")}
+        if any(parts.values()) and not all(parts.values()):
+            raise UsageError(f"{folder} has only one of the parts {' and '.join(parts)}; both are needed.")
     if seed < 0:
         raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
     settings = RunSettings(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -85,6 +86,8 @@ class Assistant:
         if self.improve_seconds > 0.0:
             attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)
         check_attempt(canonical, attempt, set(), self.vehicle)
+        if attempt.length_m is not None:
+            attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
         stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
         recalled = [from_canonical(plan, alignment) for plan in stored]
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
@@ -109,7 +112,7 @@ def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Pat
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     if plan is None:
         raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
-    print(f"{told}, {plan.length_m:.1f} m, {plan.duration_s:.1f} s")
+    print(f"{told}, {problems[0].scale * plan.length_m:.1f} m, {plan.duration_s:.1f} s")
     for what, place in (("plan", out), ("picture", drawing)):
         if place is not None:
             print(f"{what:8} {place}")
@@ -158,6 +161,7 @@ def _record(problem: Problem, attempt: Attempt, plan: Plan | None, vehicle: Vehi
         attempt.planning_seconds,
         plan,
         vehicle,
+        problem.scale,
     )
 
 

@@ -1,4 +1,4 @@
-"""Where a class's problems come from: a generator with a seed, or a folder of worlds read once a run."""
+"""Where a class's problems come from: a generator with a seed, or worlds or a map read once a run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import functools
 import hashlib
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -15,14 +15,16 @@ import numpy as np
 from planners.world.alignment import to_canonical
 from planners.world.classes import ProblemClass, problem_class
 from planners.world.problem import Obstacles, Problem
-from planners.world.vehicle import Vehicle, vehicle_named
-from storage.problems import read_problems, write_problems
-from storage.worlds import import_png_folder
+from planners.world.vehicle import vehicle_named
+from storage.imported import read_imported, write_imported
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import Part, source_at
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
 from tasks.settings import RunError, RunSettings, world_class
 
 Purpose = Literal["collect", "test"]
-PARTS: Final[dict[Purpose, str]] = {"collect": "train", "test": "test"}
+CUT_AN_EXPERIENCE: Final = 4  # problems cut to collect from for each experience wanted: some are not solved
+PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}
 
 
 @dataclass(frozen=True)
@@ -47,10 +49,9 @@ class Generated:
 
 @dataclass(frozen=True)
 class Worlds:
-    """A folder of worlds: its ``train`` part to collect from, its ``test`` part to test with."""
+    """Worlds, or what was cut from a map: their ``train`` part to collect from, ``test`` to test with."""
 
     folder: Path  # where the run keeps them
-    vehicle: Vehicle
 
     def count(self, purpose: Purpose, wanted: int) -> int:
         """How many of the ``wanted`` problems there are."""
@@ -68,28 +69,28 @@ class Worlds:
     def _worlds(self, purpose: Purpose) -> tuple[Problem, ...]:
         path = _part(self.folder, purpose)
         if not path.exists():
-            raise RunError(f"{path} is not there; run collect with this folder of worlds first.")
-        return _problems(path, path.stat().st_mtime_ns, self.vehicle)
+            raise RunError(f"{path} is not there; run collect with these worlds first.")
+        return _problems(path, path.stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=4)
-def _problems(path: Path, _changed: int, vehicle: Vehicle) -> tuple[Problem, ...]:
-    return tuple(read_problems(path, vehicle))
+def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
+    return tuple(read_imported(path))
 
 
 def source_of(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
-    """The problems of a class of the run; a folder of worlds must have been read (``read_worlds``)."""
-    vehicle = vehicle_named(settings.vehicle)
+    """The problems of a class of the run; worlds must have been read (``read_worlds``)."""
     if class_name in settings.classes:
+        vehicle = vehicle_named(settings.vehicle)
         return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
-    return Worlds(run_folder(data, settings).path / "worlds" / class_name, vehicle)
+    return Worlds(run_folder(data, settings).path / "worlds" / class_name)
 
 
 def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
     """What a class's problems depend on, for the keys of chunks; the vehicle too: it needs room to start."""
-    folders = [Path(folder) for folder in settings.worlds if world_class(folder) == class_name]
-    drawn = [_digest(folders[0])] if folders else [settings.difficulty, settings.seed]
-    return [*drawn, settings.vehicle]
+    paths = [Path(path) for path in settings.worlds if world_class(path) == class_name]
+    drawn = [_digest(paths[0])] if paths else [settings.difficulty]
+    return [*drawn, settings.seed, settings.vehicle]
 
 
 def class_settings(settings: RunSettings, class_name: str) -> dict[str, Any]:
@@ -110,7 +111,7 @@ def _part(folder: Path, purpose: Purpose) -> Path:
 
 
 def world_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each folder of worlds of the run."""
+    """One chunk for the worlds or the map of each class of the run."""
     names = [world_class(folder) for folder in settings.worlds]
     return [
         chunk
@@ -120,20 +121,30 @@ def world_chunks(data: str, settings: RunSettings) -> list[Chunk]:
 
 
 def worlds_are_read(chunk: Chunk) -> bool:
-    """Whether the problems of a folder of worlds lie in the run's folder."""
+    """Whether a class's worlds have been read into the run's folder."""
     return is_marked(chunk.run.path / "worlds" / chunk.class_name, chunk.key)
 
 
 def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Read a folder of worlds, bring its problems to the canonical frame, and list the worlds left out."""
-    origin = next(Path(f) for f in chunk.settings.worlds if world_class(f) == chunk.class_name)
+    """Read worlds or cut a map, bring the problems to the canonical frame, and list the worlds left out."""
+    settings = chunk.settings
+    source = source_at(next(Path(f) for f in settings.worlds if world_class(f) == chunk.class_name))
     folder = chunk.run.path / "worlds" / chunk.class_name
-    vehicle = vehicle_named(chunk.settings.vehicle)
+    counts = {"collect": CUT_AN_EXPERIENCE * settings.experiences, "test": settings.test_problems}
     skipped: list[str] = []
     for purpose, part in PARTS.items():
-        problems, left_out = import_png_folder(origin, part, chunk.settings.strict, vehicle)
-        write_problems(_part(folder, purpose), [to_canonical(problem)[0] for problem in problems])
-        skipped += [f"{file}: {reason}" for file, reason in left_out]
+        asked = ImportSettings(
+            vehicle_named(settings.vehicle),
+            settings.strict,
+            counts[purpose] if source.is_map else None,
+            settings.seed,
+        )
+        imported = import_part(source, part, asked)
+        if not imported.problems:
+            raise RunError(f"{source.path} holds no usable problem of part {part} ({imported.explained()}).")
+        problems = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
+        write_imported(_part(folder, purpose), problems)
+        skipped += [f"{place}: {reason}" for place, reason in imported.skipped]
     mark_done(folder, chunk.key)
     return {"skipped": skipped}
 
@@ -142,13 +153,11 @@ read_worlds = chunk_task(read_worlds_chunk)
 
 
 @functools.cache
-def _digest(folder: Path) -> str:
-    """A digest of a folder's pictures."""
+def _digest(path: Path) -> str:
+    """A digest of worlds' or a map's files."""
     digest = hashlib.sha256()
-    for file in sorted(
-        file for part in PARTS.values() for file in (folder / part).rglob("*") if file.is_file()
-    ):
-        digest.update(f"{file.relative_to(folder)}\0".encode())
+    for file in source_at(path).contents():
+        digest.update(f"{file.relative_to(path.parent)}\0".encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 

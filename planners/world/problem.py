@@ -43,6 +43,7 @@ class Problem:
     goal_radius: float  # metres
     bounds: tuple[float, float, float, float]  # x_min, y_min, x_max, y_max in metres
     obstacles: Obstacles
+    scale: float = 1.0  # metres of the world outside in one metre here; files are in the former
 
 
 @dataclass(frozen=True, eq=False)

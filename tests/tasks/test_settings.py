@@ -133,7 +133,10 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
         ({"learning": {"seeds": 0}}, "0 training seeds: give 1 or more."),
         ({"learning": {"learning_rate": -1.0}}, "learning_rate is -1.0: give a number above 0."),
         ({"learning": {"dimensions": 0}}, "Sizes of the encoder are (16,), (128,), 0: give 1 or more."),
-        ({"worlds": ["/nowhere"]}, "/nowhere is no folder of worlds: it has no train in it."),
+        (
+            {"worlds": ["/nowhere"]},
+            "/nowhere is no folder of worlds and no map: there is nothing of that name.",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(wrong: dict[str, object], told: str) -> None:

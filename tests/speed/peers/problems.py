@@ -9,20 +9,22 @@ from rich.console import Console
 
 from planners.world.classes import CLASSES, problem_class
 from planners.world.problem import Problem
-from storage.worlds import import_png_folder
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import Part, source_at
 
 WORLDS = Path(__file__).parents[4] / "shared" / "worlds" / "grid201"
 FOLDERS = ("forest", "shifting_gaps", "multiple_bugtraps")
 
 
 def problem_sets(
-    console: Console, seed: int, part: str, count: int, worlds: Path = WORLDS
+    console: Console, seed: int, part: Part, count: int, worlds: Path = WORLDS
 ) -> Iterator[tuple[str, list[Problem]]]:
     """Name and up to ``count`` problems of each set; a line on the console for a missing folder."""
     for name in CLASSES:
         yield name, [problem_class(name).draw(seed, index) for index in range(count)]
     for name in FOLDERS:
         if (worlds / name / part).is_dir():
-            yield name, import_png_folder(worlds / name, part)[0][:count]
+            found = import_part(source_at(worlds / name), part, ImportSettings(count=count))
+            yield name, found.problems
         else:
             console.print(f"{name} left out: {worlds / name / part} is not here.")

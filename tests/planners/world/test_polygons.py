@@ -6,8 +6,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.world.polygons import PolygonError, convex_pieces
 from planners.world.problem import Floats
-from storage.polygons import PolygonError, convex_pieces
 from tests.storage.samples import box, quick, stars
 
 

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 
 from planners.world.collision import box_is_free, count_free_prefix, scene_of
+from planners.world.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
 from planners.world.vehicle import CAR, Vehicle
-from storage.polygons import LARGEST_COORDINATE_M
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell look-up of collision checks grows with the bounds' area
 

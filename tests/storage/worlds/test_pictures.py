@@ -14,12 +14,22 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 from scipy import ndimage
 
-from planners.world.problem import Obstacles
+from planners.maps.occupancy_map import Cells
+from planners.world.problem import Obstacles, Problem
 from storage.errors import StorageError
-from storage.worlds import PARTS, PIXELS, Cells, import_png_folder, rectangles_of
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.pictures import PIXELS, obstacles_of_cells
+from storage.worlds.sources import PARTS, Part, source_at
 from tests.storage.samples import quick
 
-REAL = Path(__file__).parents[3] / "shared" / "worlds" / "grid201"
+REAL = Path(__file__).parents[4] / "shared" / "worlds" / "grid201"
+
+
+def import_png_folder(
+    folder: Path, part: Part, strict: bool = False
+) -> tuple[list[Problem], list[tuple[str, str]]]:
+    found = import_part(source_at(folder), part, ImportSettings(strict=strict))
+    return found.problems, found.skipped
 
 
 def occupied_by(obstacles: Obstacles, rows: int, columns: int) -> tuple[Cells, int]:
@@ -48,7 +58,7 @@ def world(*squares: tuple[int, int]) -> Cells:
 @quick
 @given(dark=arrays.arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12))))
 def test_rectangles_cover_exactly_the_dark_pixels_once(dark: Cells) -> None:
-    obstacles = rectangles_of(dark)
+    obstacles = obstacles_of_cells(dark)
     painted, twice = occupied_by(obstacles, *dark.shape)
     assert np.array_equal(painted, dark)
     assert twice == 0
@@ -57,7 +67,7 @@ def test_rectangles_cover_exactly_the_dark_pixels_once(dark: Cells) -> None:
 @quick
 @given(dark=arrays.arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12))))
 def test_an_obstacle_is_one_region_of_pixels_that_share_sides(dark: Cells) -> None:
-    obstacles = rectangles_of(dark)
+    obstacles = obstacles_of_cells(dark)
     _, count = ndimage.label(dark)
     assert len(obstacles.obstacle_starts) - 1 == count
     pieces = obstacles.pieces()
@@ -67,7 +77,7 @@ def test_an_obstacle_is_one_region_of_pixels_that_share_sides(dark: Cells) -> No
 
 
 def test_a_rectangle_stays_one_rectangle() -> None:
-    (piece,) = rectangles_of(world((100, 60))).pieces()
+    (piece,) = obstacles_of_cells(world((100, 60))).pieces()
     assert np.allclose(piece, [[13, 22.3], [16, 22.3], [16, 25.3], [13, 25.3]], atol=1e-5)
 
 
@@ -123,7 +133,7 @@ def mixed(tmp_path: Path) -> Path:
 def test_bad_pictures_are_skipped_each_with_its_reason(mixed: Path) -> None:
     problems, skipped = import_png_folder(mixed, "train")
     assert [problem.id for problem in problems] == ["woods-train-2", "woods-train-10"]
-    reasons = {file.stem: reason for file, reason in skipped}
+    reasons = {Path(file).stem: reason for file, reason in skipped}
     assert sorted(reasons, key=int) == ["3", "4", "5", "6", "7", "8", "9", "11", "12", "13"]
     assert "start footprint" in reasons["3"]
     assert "goal centre" in reasons["4"]
@@ -140,19 +150,37 @@ def test_under_strict_the_first_bad_picture_is_an_error(mixed: Path) -> None:
 
 
 def test_a_folder_without_worlds_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "woods" / "train").mkdir(parents=True)
-    write_world(tmp_path / "woods" / "validation" / "1.png", world((178, 15)))
+    (tmp_path / "all" / "woods" / "train").mkdir(parents=True)
+    (tmp_path / "all" / "maps").mkdir()
+    (tmp_path / "all" / "maps" / "town.map").touch()
+    write_world(tmp_path / "all" / "woods" / "validation" / "1.png", world((178, 15)))
+    write_world(tmp_path / "all" / "my woods" / "validation" / "1.png", world())
     for folder, part, reason in [
         ("gone", "train", "does not exist"),
-        ("woods", "test", "does not exist"),
-        ("woods", "train", "no usable PNG world"),
-        ("woods", "validation", "1 files were skipped"),
-        ("woods", "tain", "no part"),
-        ("my woods", "train", "cannot name a class"),
+        ("all/woods", "test", "does not exist"),
+        ("all/woods/train", "train", "holds no worlds"),
+        ("all/maps", "train", "give one of town.map"),
+        ("all", "train", "give one of maps, woods"),
+        ("all/woods", "tain", "no part"),
+        ("all/my woods", "validation", "cannot name a class"),
     ]:
         with pytest.raises(StorageError, match=reason) as error:
-            import_png_folder(tmp_path / folder, part)
+            import_png_folder(tmp_path / folder, part)  # type: ignore[arg-type]
         assert "\n" not in str(error.value)
+
+
+def test_a_part_may_hold_nothing_that_is_fit(tmp_path: Path) -> None:
+    write_world(tmp_path / "woods" / "validation" / "1.png", world((178, 15)))
+    found = import_part(source_at(tmp_path / "woods"), "validation")
+    assert found.problems == []
+    assert found.explained().startswith("1 were skipped; the first cannot be planned in: start footprint")
+
+
+def test_worlds_without_parts_are_divided_by_two(tmp_path: Path) -> None:
+    for number in range(5):
+        write_world(tmp_path / "woods" / f"{number}.png", world((100, 20 * number)))
+    found = {part: [p.id for p in import_png_folder(tmp_path / "woods", part)[0]] for part in PARTS[:2]}
+    assert found == {"train": ["woods-0", "woods-2", "woods-4"], "test": ["woods-1", "woods-3"]}
 
 
 @quick

@@ -9,6 +9,8 @@ import shapely
 
 from planners.world.problem import Floats, counter_clockwise
 
+Corner = tuple[float, ...]
+
 LARGEST_COORDINATE_M: Final = 10_000.0  # float32 is exact to 1 mm up to there
 
 
@@ -33,8 +35,11 @@ def convex_pieces(polygon: Floats) -> list[Floats]:
         reason = shapely.is_valid_reason(shape).partition("[")[0].lower()
         raise PolygonError(f"crosses or touches itself ({reason}); draw it as a simple polygon")
     corners = counter_clockwise(corners)
-    if _is_convex(corners):
-        return [corners]
+    return [corners] if _is_convex(corners) else joined_triangles(shape)
+
+
+def joined_triangles(shape: shapely.Polygon) -> list[Floats]:
+    """Convex pieces ``[n, 2]`` that cover a valid polygon, which may have holes; no vertex is added."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
     pieces = [counter_clockwise(shapely.get_coordinates(triangle)[:-1]) for triangle in triangles]
     return _joined([piece for piece in pieces if _is_convex(piece)])
@@ -83,11 +88,22 @@ def _joined(pieces: list[Floats]) -> list[Floats]:
         at = first.index(end)
         there = second.index(begin)
         union = first[at:] + first[:at] + (second[there:] + second[:there])[1:-1]
-        if len(set(union)) == len(union) and _is_convex(np.array(union)):
+        joint = len(first) - 1  # the union begins with one end of the common edge, here is the other
+        if (
+            len(set(union)) == len(union)
+            and _turns_left(union[-1], union[0], union[1])
+            and _turns_left(union[joint - 1], union[joint], union[(joint + 1) % len(union)])
+        ):
             loops[i], loops[j] = union, []
             owner.update((edge, i) for edge in _edges(second))
     return [np.array(loop) for loop in loops if loop]
 
 
-def _edges(loop: list[tuple[float, ...]]) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+def _turns_left(before: Corner, corner: Corner, after: Corner) -> bool:
+    """Whether the way over a corner turns left or goes straight on."""
+    to, on = (corner[0] - before[0], corner[1] - before[1]), (after[0] - corner[0], after[1] - corner[1])
+    return to[0] * on[1] - to[1] * on[0] >= 0.0
+
+
+def _edges(loop: list[Corner]) -> list[tuple[Corner, Corner]]:
     return list(zip(loop, [*loop[1:], loop[0]], strict=True))

@@ -1,0 +1,1 @@
+"""Large maps: what is occupied, in few convex pieces; local problems cut from them."""

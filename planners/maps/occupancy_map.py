@@ -1,0 +1,56 @@
+"""A map: which cells of a large grid are occupied, and where the grid lies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planners.world.problem import Floats
+
+Cells = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True, eq=False)
+class OccupancyMap:
+    """Occupied cells of a grid, and the grid's place in the map's frame (metres, x to the right, y up).
+
+    Grid coordinates are metres from the grid's lower left corner along its sides; outside of the grid all is
+    occupied.
+    """
+
+    name: str
+    occupied: Cells  # [rows, columns]; row 0 is the lowest
+    resolution: float  # metres a cell
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the lower left corner: x, y (m), turn (rad)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height in metres."""
+        rows, columns = self.occupied.shape
+        return columns * self.resolution, rows * self.resolution
+
+    def is_free(self, points: Floats) -> Cells:
+        """Whether each of ``points [n, 2]``, in grid coordinates, lies in a free cell."""
+        columns, rows = np.floor(points / self.resolution).astype(np.int64).T
+        height, width = self.occupied.shape
+        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+        free: Cells = inside.copy()
+        free[inside] = ~self.occupied[rows[inside], columns[inside]]
+        return free
+
+    def pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """A pose of grid coordinates in the map's frame: x, y (m), heading (rad)."""
+        left, bottom, turn = self.origin
+        cos, sin = math.cos(turn), math.sin(turn)
+        return left + cos * x - sin * y, bottom + sin * x + cos * y, heading + turn
+
+    def coarser(self, cell_m: float) -> OccupancyMap:
+        """The same map in cells of about ``cell_m``, occupied where any of the cells in one is."""
+        factor = max(1, math.floor(cell_m / self.resolution + 1e-9))
+        rows, columns = self.occupied.shape
+        padded = np.pad(self.occupied, ((0, -rows % factor), (0, -columns % factor)), constant_values=True)
+        blocks = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
+        occupied: Cells = np.any(blocks, axis=(1, 3))
+        return OccupancyMap(self.name, occupied, factor * self.resolution, self.origin)

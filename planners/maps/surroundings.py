@@ -1,0 +1,109 @@
+"""Local problems of a map: what surrounds a pose, turned and moved into the canonical frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import shapely
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from planners.maps.occupancy_map import OccupancyMap
+from planners.maps.pieces import Shapes, pieces_of
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    GOAL_RADIUS,
+    Floats,
+    Obstacles,
+    Problem,
+)
+
+WINDOW: Final = BOUNDS[2] - BOUNDS[0]  # canonical metres a side
+SPECK: Final = 1e-6  # square metres: what a window cuts off smaller than this is left out
+
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """A map's pieces and where they touch each other, found quickly by place; in grid metres."""
+
+    pieces: Shapes  # [n] convex polygons, those around the grid included
+    tree: shapely.STRtree  # of the pieces
+    touching: Indices  # [m, 2] pairs of pieces
+    contacts: shapely.STRtree  # of what the pairs have in common
+    scale: float  # metres a canonical metre
+
+    def problem(self, x: float, y: float, heading: float, identity: str, class_name: str) -> Problem:
+        """The canonical problem of a robot at a pose in grid coordinates, its goal straight ahead."""
+        turn = heading - CANONICAL_START[2]
+        along, across = self.scale * math.cos(turn), self.scale * math.sin(turn)
+        to_map = np.array([[along, across], [-across, along]])
+        window = shapely.transform(shapely.box(*BOUNDS), lambda points: points @ to_map + (x, y))
+        near = np.sort(self.tree.query(window, predicate="intersects"))
+        cut = self.pieces[near]
+        shapely.prepare(window)
+        across_border = ~shapely.covers(window, cut)
+        cut[across_border] = shapely.intersection(cut[across_border], window)
+        to_canonical = to_map.T / self.scale**2
+        turned = shapely.transform(cut, lambda points: _rounded((points - (x, y)) @ to_canonical))
+        met = self.touching[self.contacts.query(window, predicate="intersects")]
+        return Problem(
+            identity,
+            class_name,
+            CANONICAL_START,
+            CANONICAL_GOAL,
+            GOAL_RADIUS,
+            BOUNDS,
+            _obstacles(shapely.convex_hull(turned), np.searchsorted(near, met)),
+            self.scale,
+        )
+
+
+def surroundings_of(world: OccupancyMap, scale: float = 1.0, tolerance_m: float = 0.0) -> Surroundings:
+    """A map made ready to have problems cut from it.
+
+    ``scale`` is how many metres of the map are a canonical metre: 2 for a robot twice as long and wide, whose
+    goals are twice as far. ``tolerance_m`` is how far the outline of what is occupied may move.
+    """
+    width, height = world.size
+    reach = math.sqrt(2.0) * WINDOW * scale  # no window reaches farther out of the map
+    outside = shapely.box(
+        [-reach, width, -reach, -reach],
+        [-reach, -reach, -reach, height],
+        [0.0, width + reach, width + reach, width + reach],
+        [height + reach, height + reach, 0.0, height + reach],
+    )
+    pieces: Shapes = np.concatenate([pieces_of(world, tolerance_m), outside])
+    tree = shapely.STRtree(pieces)
+    pairs = tree.query(pieces, predicate="intersects").T
+    touching = pairs[pairs[:, 0] < pairs[:, 1]]
+    contacts = shapely.STRtree(shapely.intersection(*pieces[touching.T]))
+    return Surroundings(pieces, tree, touching, contacts, scale)
+
+
+def _obstacles(pieces: Shapes, touching: Indices) -> Obstacles:
+    """Pieces with an area as obstacles; those that touch, by pairs ``[m, 2]``, are one."""
+    one, other = touching.T
+    together = sparse.csr_array((np.ones(len(one)), (one, other)), shape=(len(pieces), len(pieces)))
+    _, group = csgraph.connected_components(together, directed=False)
+    solid = (shapely.get_type_id(pieces) == shapely.GeometryType.POLYGON) & (shapely.area(pieces) > SPECK)
+    order = np.flatnonzero(solid)[np.argsort(group[solid], kind="stable")]
+    rings = shapely.get_exterior_ring(shapely.orient_polygons(pieces[order]))
+    corners = shapely.get_num_coordinates(rings) - 1  # the last repeats the first
+    closed = np.cumsum(corners + 1) - 1
+    return Obstacles(
+        np.delete(shapely.get_coordinates(rings), closed, axis=0),
+        np.concatenate([[0], np.cumsum(corners)]).astype(np.int32),
+        np.append(np.unique(group[order], return_index=True)[1], len(order)).astype(np.int32),
+    )
+
+
+def _rounded(points: Floats) -> Floats:
+    rounded: Floats = points.astype(np.float32).astype(np.float64)
+    return rounded

@@ -1,0 +1,169 @@
+"""Problems of other people's worlds and maps: read or cut, and checked; what is unfit is listed with why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from planners.maps.cutting import Cut, cut_problems, cut_scenarios
+from planners.maps.occupancy_map import OccupancyMap
+from planners.maps.surroundings import surroundings_of
+from planners.world.faults import problem_fault
+from planners.world.problem import Problem
+from planners.world.vehicle import CAR, Vehicle
+from storage.errors import StorageError
+from storage.problems import problems_or_faults
+from storage.worlds.moving_ai import map_of_scenarios, read_map, read_scenarios
+from storage.worlds.numpy_grids import grid_worlds, read_grid
+from storage.worlds.pictures import picture_world
+from storage.worlds.polygon_scenes import polygon_world
+from storage.worlds.ros_maps import read_ros_map
+from storage.worlds.sources import PARTS, Part, Source
+
+CUT_PROBLEMS: Final = 1_000  # a part of a map, where not said otherwise
+
+Tell = Callable[[int, int], None]  # how many are done, of how many
+Item = tuple[str, Problem | str]  # where a problem stands, and the problem or what is wrong with it
+
+
+@dataclass(frozen=True)
+class ImportSettings:
+    """How worlds and maps are understood."""
+
+    vehicle: Vehicle = CAR  # which must have room to start
+    strict: bool = False  # stop at the first unfit world
+    count: int | None = None  # problems of a part at most; of a map exactly
+    seed: int = 1  # of the poses on a map
+    scale: float = 1.0  # metres of a map in a canonical metre
+    resolution: float | None = None  # metres a cell of a map that does not say
+    unknown: Literal["occupied", "free"] = "occupied"  # what unknown cells are
+    tolerance_m: float = 0.0  # how far the outline of what is occupied on a map may move
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A part's problems, and what was left out."""
+
+    problems: list[Problem]
+    skipped: list[tuple[str, str]]  # where it stands, and why
+    cuts: list[Cut]  # of a map: the problems, and where they lie
+
+    def explained(self) -> str:
+        """What was left out, in a few words."""
+        return (
+            f"{len(self.skipped)} were skipped; the first {self.skipped[0][1]}"
+            if self.skipped
+            else "it is empty"
+        )
+
+
+def import_part(
+    source: Source, part: Part, settings: ImportSettings | None = None, tell: Tell = lambda done, total: None
+) -> Imported:
+    """The problems of one part of a source, in an order that stays, each checked for the vehicle.
+
+    Worlds in folders of parts are those of the part's folder; otherwise every second world is for testing. A
+    map's blocks lie in the pattern of a chequerboard. StorageError: nothing can be read, or with
+    ``strict`` one is unfit.
+    """
+    if part not in PARTS:
+        raise StorageError(f"{part!r} is no part of worlds; wanted is one of {', '.join(PARTS)}.")
+    settings = settings or ImportSettings()
+    if source.is_map:
+        return _of_map(source, part, settings, tell)
+    problems: dict[str, Problem] = {}
+    skipped = []
+    for number, (place, item) in enumerate(_worlds(source, part, settings, tell)):
+        if not source.has_parts and (number % 2 == 1) != (part == "test"):
+            continue
+        if isinstance(item, Problem) and item.id in problems:
+            item = f'has the id "{item.id}", which another problem has'
+        if isinstance(item, Problem):
+            problems[item.id] = item
+        elif settings.strict:
+            raise StorageError(f"{place} {item}.")
+        else:
+            skipped.append((place, item))
+        if len(problems) == settings.count:
+            break
+    return Imported(list(problems.values()), skipped, [])
+
+
+def load_map(source: Source, settings: ImportSettings | None = None) -> OccupancyMap:
+    """The map of a source; StorageError with what is wrong with it."""
+    settings = settings or ImportSettings()
+    name, unknown_is_occupied = source.class_name, settings.unknown == "occupied"
+    try:
+        if source.format == "ros":
+            return read_ros_map(source.path, name, unknown_is_occupied)
+        if source.format == "numpy":
+            return read_grid(source.path, name, settings.resolution, unknown_is_occupied)
+        if source.path.suffix == ".scen":
+            return read_map(map_of_scenarios(source.path), name, settings.resolution)
+        return read_map(source.path, name, settings.resolution)
+    except ValueError as error:
+        raise StorageError(f"{source.path} {error}.") from None
+
+
+def _of_map(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Imported:
+    if part == "validation":
+        raise StorageError(f"{source.path} is a map, whose parts are train and test; ask for one of them.")
+    world = load_map(source, settings)
+    surroundings = surroundings_of(world, settings.scale, settings.tolerance_m)
+    try:
+        if source.path.suffix != ".scen":
+            count = CUT_PROBLEMS if settings.count is None else settings.count
+            cuts = cut_problems(
+                world,
+                surroundings,
+                part,
+                count,
+                settings.seed,
+                settings.vehicle,
+                lambda done: tell(done, count),
+            )
+            return Imported([cut.problem for cut in cuts], [], cuts)
+        cuts, skipped = [], []
+        ends = read_scenarios(source.path, world)[: settings.count]
+        found = cut_scenarios(world, surroundings, part, ends, settings.vehicle)
+        for number, cut in enumerate(found, start=1):
+            tell(number, len(ends))
+            if isinstance(cut, Cut):
+                cuts.append(cut)
+            else:
+                skipped.append((f"{source.path} scenario {number}", cut))
+        return Imported([cut.problem for cut in cuts], skipped, cuts)
+    except ValueError as error:
+        raise StorageError(f"{source.path} {error}.") from None
+
+
+def _worlds(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Iterator[Item]:
+    """Every world of a source's files, checked."""
+    files = source.files(part)
+    for number, file in enumerate(files, start=1):
+        try:
+            for place, item in _worlds_of(file, source, part, settings):
+                fault = problem_fault(item, settings.vehicle) if isinstance(item, Problem) else None
+                yield place, item if fault is None else f"cannot be planned in: {fault}"
+        except (ValueError, StorageError) as error:
+            yield str(file), str(error).removeprefix(str(file)).strip(" .")
+        tell(number, len(files))
+
+
+def _worlds_of(file: Path, source: Source, part: Part, settings: ImportSettings) -> Iterator[Item]:
+    name = source.class_name
+    identity = f"{name}-{part}-{file.stem}" if source.has_parts else f"{name}-{file.stem}"
+    if source.path == file:
+        identity = name
+    match source.format:
+        case "png":
+            yield str(file), picture_world(file, identity, name)
+        case "polygons":
+            yield str(file), polygon_world(file, identity, name)
+        case "numpy":
+            for place, problem in grid_worlds(file, identity, name, settings.unknown == "occupied"):
+                yield f"{file} {place}", problem
+        case _:
+            yield from problems_or_faults(file, settings.vehicle)

@@ -1,0 +1,110 @@
+"""Maps and scenarios of the Moving AI benchmarks (Sturtevant 2012): characters as cells, row 0 at the top.
+
+A cell is one metre unless said otherwise, the lower left corner of the map is at (0, 0), y goes up.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from planners.maps.occupancy_map import OccupancyMap
+from planners.world.problem import Floats
+from storage.files import read_text
+from storage.worlds.limits import LARGEST_FILE, check_resolution, check_size
+
+CELL_M: Final = 1.0
+PASSABLE: Final = ".GS"  # ground, and swamp
+BLOCKED: Final = "@OTW"  # out of bounds, trees, and water
+_HEADER: Final = ("type", "height", "width", "map")
+_SCENARIO: Final = ("bucket", "map", "width", "height", "x", "y", "x", "y", "length")
+
+
+def read_map(file: Path, name: str, resolution: float | None = None) -> OccupancyMap:
+    """The map of a ``.map`` file; ValueError or StorageError with what is wrong with it."""
+    metres = CELL_M if resolution is None else resolution
+    check_resolution(metres)
+    _check_file(file)
+    lines = read_text(file).splitlines()
+    words = [line.split() for line in lines[:4]]
+    if [word[0] if word else "" for word in words] != list(_HEADER):
+        raise ValueError(f"does not begin with the lines {', '.join(_HEADER)}; is it a map of Moving AI?")
+    rows, columns = _count(words[1], "height"), _count(words[2], "width")
+    check_size(rows, columns)
+    cells = lines[4:]
+    while cells and not cells[-1].strip():
+        cells.pop()
+    if len(cells) != rows or any(len(row) != columns for row in cells):
+        wrong = next((i for i, row in enumerate(cells) if len(row) != columns), len(cells))
+        found = (
+            f"row {wrong + 1} has {len(cells[wrong])} cells" if wrong < len(cells) else f"it has {wrong} rows"
+        )
+        raise ValueError(f"should have {rows} rows of {columns} cells, but {found}; is it cut off?")
+    text = "".join(cells)
+    odd = sorted(set(text) - set(PASSABLE + BLOCKED))
+    if odd:
+        raise ValueError(f"has the cell {odd[0]!r}; known are {PASSABLE + BLOCKED}")
+    characters = np.frombuffer(text.encode("ascii"), np.uint8).reshape(rows, columns)
+    free = np.isin(characters, np.frombuffer(PASSABLE.encode(), np.uint8))
+    return OccupancyMap(name, ~free[::-1], metres)
+
+
+def map_of_scenarios(file: Path) -> Path:
+    """The ``.map`` file beside a ``.scen`` file that belongs to it; ValueError where there is none."""
+    first = next(iter(_rows(file)), None)
+    if first is None:
+        raise ValueError("holds no scenario")
+    name = first[1].replace("\\", "/").rpartition("/")[2]
+    place = file.parent / name
+    if not name.endswith(".map") or not place.is_file():
+        raise ValueError(f"is of map {name[:60]!r}, which does not lie beside it; put it there")
+    return place
+
+
+def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
+    """Where the scenarios of a ``.scen`` file start and end: ``[n, 2, 2]`` grid metres, middles of cells.
+
+    ValueError: a line is malformed, or of a map of another size.
+    """
+    rows, columns = world.occupied.shape
+    ends = []
+    for number, words in enumerate(_rows(file), start=1):
+        try:
+            width, height, *cells = (int(word) for word in words[2:8])
+        except ValueError:
+            raise ValueError(f"scenario {number} is not {' '.join(_SCENARIO)}") from None
+        if (width, height) != (columns, rows):
+            raise ValueError(
+                f"scenario {number} is of a map of {width} x {height} cells, the map has {columns} x {rows}"
+            )
+        if not all(0 <= cell < most for cell, most in zip(cells, (columns, rows) * 2, strict=True)):
+            raise ValueError(f"scenario {number} begins or ends outside of the map")
+        ends.append(cells)
+    places = np.array(ends, float).reshape(-1, 2, 2) + 0.5
+    places[..., 1] = rows - places[..., 1]
+    return world.resolution * places
+
+
+def _rows(file: Path) -> list[list[str]]:
+    _check_file(file)
+    lines = read_text(file).splitlines()
+    if not lines or not lines[0].startswith("version"):
+        raise ValueError("does not begin with a version; is it a file of scenarios?")
+    rows = [line.split() for line in lines[1:] if line.strip()]
+    for number, words in enumerate(rows, start=1):
+        if len(words) != len(_SCENARIO):
+            raise ValueError(f"scenario {number} has {len(words)} words, wanted are {' '.join(_SCENARIO)}")
+    return rows
+
+
+def _check_file(file: Path) -> None:
+    if file.is_file() and file.stat().st_size > LARGEST_FILE:
+        raise ValueError(f"is larger than {LARGEST_FILE:,} bytes; cut it into several")
+
+
+def _count(words: list[str], what: str) -> int:
+    if len(words) != 2 or not (words[1].isascii() and words[1].isdigit() and len(words[1]) < 8):
+        raise ValueError(f"has no whole number as its {what}; is it a map of Moving AI?")
+    return int(words[1])

@@ -1,0 +1,121 @@
+"""Maps and worlds as NumPy arrays: 0 free, 1 occupied, -1 or NaN unknown; row 0 at the top."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any, Final
+
+import numpy as np
+
+from planners.maps.occupancy_map import Cells, OccupancyMap
+from planners.world.problem import Problem
+from storage.worlds.limits import check_resolution, check_size
+from storage.worlds.pictures import PIXELS, problem_of_cells
+
+CELL_M: Final = 1.0
+MOST_NUMBERS: Final = 100_000_000  # of a stack of worlds: 2,475 of them
+_BROKEN: Final = (
+    ValueError, OSError, EOFError, KeyError, TypeError, SyntaxError, MemoryError,
+    RuntimeError, OverflowError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip  # what NumPy and zipfile raise on a file that only begins like an array
+
+Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
+
+
+def is_stack(file: Path) -> bool:
+    """Whether a file holds worlds ``[n, 201, 201]`` and no map ``[rows, columns]``."""
+    return any(len(shape) == 3 for _, shape in _shapes(file))
+
+
+def read_grid(
+    file: Path, name: str, resolution: float | None = None, unknown_is_occupied: bool = True
+) -> OccupancyMap:
+    """The map of a file with one array ``[rows, columns]``; ValueError with what is wrong with it."""
+    metres = CELL_M if resolution is None else resolution
+    check_resolution(metres)
+    shapes = list(_shapes(file))
+    if len(shapes) != 1 or len(shapes[0][1]) != 2:
+        found = ", ".join(str(list(shape)) for _, shape in shapes[:5]) or "nothing"
+        raise ValueError(f"holds {found}; wanted was one array [rows, columns]")
+    check_size(*shapes[0][1])
+    cells = _occupied(_arrays(file)[0][1], unknown_is_occupied)
+    return OccupancyMap(name, cells[::-1], metres)
+
+
+def grid_worlds(
+    file: Path, identity: str, class_name: str, unknown_is_occupied: bool = True
+) -> Iterator[tuple[str, Problem]]:
+    """The canonical problems of arrays ``[201, 201]`` or ``[n, 201, 201]``, each with its place in the file.
+
+    ValueError with what is wrong with the file.
+    """
+    shapes = list(_shapes(file))
+    for name, shape in shapes:
+        if shape[-2:] != (PIXELS, PIXELS) or len(shape) not in (2, 3):
+            raise ValueError(f"holds {name} {list(shape)}; wanted were worlds [n, {PIXELS}, {PIXELS}]")
+    if sum(int(np.prod(shape)) for _, shape in shapes) > MOST_NUMBERS:
+        raise ValueError(f"holds more than {MOST_NUMBERS:,} numbers; cut it into several files")
+    number = 0
+    for name, array in _arrays(file):
+        for index, cells in enumerate(array.reshape(-1, PIXELS, PIXELS)):
+            occupied = _occupied(cells, unknown_is_occupied)
+            yield f"{name}[{index}]", problem_of_cells(occupied, f"{identity}-{number}", class_name)
+            number += 1
+
+
+def _occupied(cells: Array, unknown_is_occupied: bool) -> Cells:
+    unknown = np.isnan(cells) if cells.dtype.kind == "f" else np.zeros(cells.shape, bool)
+    if cells.dtype.kind in "if":
+        unknown = unknown | (cells == -1)
+    occupied: Cells = cells == 1
+    odd = ~(unknown | occupied | (cells == 0))
+    if odd.any():
+        raise ValueError(f"holds {cells[odd][0]}; wanted are 0 (free), 1 (occupied) and -1 or NaN (unknown)")
+    return occupied | unknown if unknown_is_occupied else occupied
+
+
+def _shapes(file: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The arrays of a file by name with their shapes, which stand at their beginnings."""
+    try:
+        if file.suffix == ".npz":
+            with zipfile.ZipFile(file) as archive:
+                for member in archive.infolist():
+                    with archive.open(member) as stream:
+                        yield member.filename.removesuffix(".npy"), _shape(stream)
+        else:
+            with file.open("rb") as stream:
+                yield file.stem, _shape(stream)
+    except FileNotFoundError:
+        raise ValueError("does not exist; check the name") from None
+    except _BROKEN as error:
+        raise _broken(error) from None
+
+
+def _shape(stream: IO[bytes]) -> tuple[int, ...]:
+    version = np.lib.format.read_magic(stream)
+    if version == (1, 0):
+        shape, _, kind = np.lib.format.read_array_header_1_0(stream)
+    else:
+        shape, _, kind = np.lib.format.read_array_header_2_0(stream)
+    if kind.kind not in "buif":
+        raise ValueError(f"it holds {kind}, wanted were numbers or bool")
+    return tuple(shape)
+
+
+def _arrays(file: Path) -> list[tuple[str, Array]]:
+    """The arrays of a file whose shapes have been looked at."""
+    try:
+        if file.suffix != ".npz":
+            return [(file.stem, np.load(file, allow_pickle=False))]
+        with np.load(file, allow_pickle=False) as archive:
+            return [(name, archive[name]) for name in archive.files]
+    except _BROKEN as error:
+        raise _broken(error) from None
+
+
+def _broken(error: Exception) -> ValueError:
+    reason = (str(error) or type(error).__name__).partition("\n")[0][:100]
+    return ValueError(f"is no whole NumPy file ({reason})")

@@ -1,0 +1,75 @@
+"""Pictures as numbers: whole, of a kind that is understood, and not larger than memory allows."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from PIL import Image
+
+from planners.maps.occupancy_map import Cells
+from storage.worlds.limits import check_size
+
+Levels = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+_MODES: Final = ("1", "L", "LA", "P", "RGB", "RGBA")
+_BROKEN: Final = (
+    OSError,
+    ValueError,
+    SyntaxError,
+    EOFError,
+    IndexError,
+    OverflowError,
+    struct.error,
+    Image.DecompressionBombError,
+    Image.DecompressionBombWarning,
+)  # what Pillow raises on a file that is no picture, or only begins like one
+
+
+class Picture(NamedTuple):
+    """A picture's pixels, row 0 at the top."""
+
+    levels: Levels  # [rows, columns] grey, 0 black to 255 white, on white paper where transparent
+    drawn: Cells  # [rows, columns] whether there is any colour; False where wholly transparent
+
+
+def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | None = None) -> Picture:
+    """The picture in a file of one of Pillow's ``kinds``, such as PNG, of ``wanted`` width and height.
+
+    ValueError, the end of a sentence: it is no whole picture, of another size or kind, or too large.
+    """
+    if not file.is_file():
+        raise ValueError("is no file")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(file, formats=kinds) as picture:
+                _check_shape(picture, wanted)
+                coloured = picture.convert("RGBA")
+    except _WrongPictureError:
+        raise
+    except _BROKEN as error:
+        reason = str(error).partition("\n")[0]
+        raise ValueError(f"is no whole {' or '.join(kinds)} picture ({reason})") from None
+    paper = Image.new("RGBA", coloured.size, "white")
+    paper.alpha_composite(coloured)
+    return Picture(np.asarray(paper.convert("L")), np.asarray(coloured.getchannel("A")) > 0)
+
+
+def _check_shape(picture: Image.Image, wanted: tuple[int, int] | None) -> None:
+    columns, rows = picture.size
+    if wanted is not None and picture.size != wanted:
+        raise _WrongPictureError(f"has {columns} x {rows} pixels, wanted were {wanted[0]} x {wanted[1]}")
+    if picture.mode not in _MODES:
+        raise _WrongPictureError(f"is of kind {picture.mode}, wanted was grey, RGB or RGBA of 8 bits")
+    try:
+        check_size(rows, columns)
+    except ValueError as error:
+        raise _WrongPictureError(str(error)) from None
+
+
+class _WrongPictureError(ValueError):
+    """A whole picture, but not the one wanted."""

@@ -1,0 +1,136 @@
+"""Maps of ROS's map_server: a YAML file beside a PGM or PNG picture.
+
+The YAML gives metres a pixel, the pose of the picture's lower left corner, and how dark a pixel is free or
+occupied; see docs/worlds.md for the three modes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from planners.maps.occupancy_map import Cells, OccupancyMap
+from storage.files import read_text
+from storage.worlds.limits import check_resolution
+from storage.worlds.picture_files import Picture, read_picture
+
+LARGEST_YAML: Final = 16_384  # bytes
+MOST_BRACKETS: Final = 64  # a map has one list; unclosed ones cost the parser the square of their number
+MODES: Final = ("trinary", "scale", "raw")
+FARTHEST_ORIGIN_M: Final = 1e8  # beyond any grid of the earth
+_BROKEN: Final = (
+    yaml.YAMLError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    ArithmeticError,
+    RecursionError,
+)
+_REQUIRED: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
+
+
+def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> OccupancyMap:
+    """The map of a YAML file; ValueError or StorageError with what is wrong with it or its picture."""
+    fields = _fields(file)
+    resolution = _number(fields["resolution"], "resolution")
+    check_resolution(resolution)
+    origin = fields["origin"]
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise ValueError("has no origin [x, y, yaw] in metres and radians")
+    x, y, yaw = (_number(value, "origin") for value in origin)
+    if not all(math.isfinite(value) and abs(value) <= FARTHEST_ORIGIN_M for value in (x, y, yaw)):
+        raise ValueError("has an origin that is not finite or not on earth; wanted is [x, y, yaw]")
+    picture = read_picture(_picture_file(file, fields["image"]), ("PNG", "PPM"))
+    occupied, free = _judged(picture, fields)
+    return OccupancyMap(name, (occupied if not unknown_is_occupied else ~free)[::-1], resolution, (x, y, yaw))
+
+
+def picture_of(file: Path) -> Path:
+    """The picture that a map's YAML file names."""
+    return _picture_file(file, _fields(file)["image"])
+
+
+def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
+    """Which pixels are surely occupied, and which surely free; the others are unknown."""
+    occupied_from = _share(fields["occupied_thresh"], "occupied_thresh")
+    free_to = _share(fields["free_thresh"], "free_thresh")
+    mode = fields.get("mode", "trinary")
+    if mode not in MODES:
+        raise ValueError(f"has mode {str(mode)[:20]!r}; known are {', '.join(MODES)}")
+    if free_to > occupied_from:
+        raise ValueError(
+            f"has free_thresh {free_to:g} above occupied_thresh {occupied_from:g}; exchange them"
+        )
+    levels = picture.levels.astype(float)
+    if mode == "raw":
+        known = picture.drawn & (levels <= 100.0)  # percent; 101 to 255 is unknown
+        share = levels / 100.0
+        return known & (share >= occupied_from), known & (share <= free_to)
+    negate = fields.get("negate", 0)
+    if negate not in (0, 1):
+        raise ValueError("has a negate that is neither 0 nor 1")
+    share = (levels if negate else 255.0 - levels) / 255.0
+    if mode == "scale":  # between the thresholds a pixel is what it is more likely to be
+        free_to = occupied_from = 0.5 * (free_to + occupied_from)
+        return picture.drawn & (share > occupied_from), picture.drawn & (share <= free_to)
+    return picture.drawn & (share > occupied_from), picture.drawn & (share < free_to)
+
+
+def _fields(file: Path) -> Mapping[str, Any]:
+    if file.is_file() and file.stat().st_size > LARGEST_YAML:
+        raise ValueError(f"is larger than {LARGEST_YAML:,} bytes; is it the YAML of a map?")
+    text = read_text(file)
+    if text.count("[") + text.count("{") > MOST_BRACKETS:
+        raise ValueError("has more lists in it than any map")
+    try:  # an alias refers to what was said before: a few lines of them could fill memory
+        aliases = any(
+            isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)
+        )
+        fields = None if aliases else yaml.safe_load(text)
+    except _BROKEN as error:
+        reason = str(error).partition("\n")[0][:100]
+        raise ValueError(f"is not YAML ({reason})") from None
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"is not the YAML of a map; wanted are {', '.join(_REQUIRED)}")
+    missing = [name for name in _REQUIRED if fields.get(name) is None]
+    if missing:
+        raise ValueError(f"lacks {missing[0]}; wanted are {', '.join(_REQUIRED)}")
+    return fields
+
+
+def _picture_file(file: Path, image: object) -> Path:
+    if not isinstance(image, str) or not image.isprintable():
+        raise ValueError("has no picture's name as its image")
+    folder = file.resolve().parent
+    try:
+        place = (folder / image).resolve()
+        there = place.is_file()
+    except (OSError, RuntimeError):  # too long a name, links in a circle
+        raise ValueError(f"names the image {image[:60]!r}, which no file can be called") from None
+    if not place.is_relative_to(folder):
+        raise ValueError(f"has its image {image[:60]!r} outside of its own folder; put it beside the YAML")
+    if not there:
+        raise ValueError(f"names the image {image[:60]!r}, which is not there; put it beside the YAML")
+    return place
+
+
+def _share(value: object, what: str) -> float:
+    share = _number(value, what)
+    if not 0.0 <= share <= 1.0:
+        raise ValueError(f"has {what} {share:g}; wanted is a share from 0 to 1")
+    return share
+
+
+def _number(value: object, what: str) -> float:
+    """A number; YAML 1.1 reads 5e-2 as text."""
+    try:
+        if isinstance(value, bool):
+            raise ValueError
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"has {str(value)[:20]!r} as its {what}, wanted was a number") from None

@@ -1,0 +1,127 @@
+"""What lies at a path: worlds or a map, in which format, in which files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from storage.errors import StorageError
+from storage.layout import checked_name
+from storage.worlds.moving_ai import map_of_scenarios
+from storage.worlds.numpy_grids import is_stack
+from storage.worlds.ros_maps import picture_of
+
+Part = Literal["train", "test", "validation"]
+
+PARTS: Final[tuple[Part, ...]] = ("train", "test", "validation")
+WORLDS: Final = {
+    ".png": "png",
+    ".txt": "polygons",
+    ".npy": "numpy",
+    ".npz": "numpy",
+    ".json": "problems",
+    ".jsonl": "problems",
+    ".parquet": "problems",
+}
+MAPS: Final = {
+    ".map": "moving-ai",
+    ".scen": "moving-ai",
+    ".yaml": "ros",
+    ".yml": "ros",
+    ".npy": "numpy",
+    ".npz": "numpy",
+}
+FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values()}))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Worlds, or a map to cut problems from."""
+
+    path: Path  # absolute; of a file, or of a folder of files
+    format: str  # one of FORMATS
+    is_map: bool
+
+    @property
+    def class_name(self) -> str:
+        """The class of its problems: its own name without ending."""
+        return class_of(self.path)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether it is a folder that holds a folder for each part."""
+        return any((self.path / part).is_dir() for part in PARTS)
+
+    def files(self, part: Part) -> list[Path]:
+        """The files of its worlds, by number: of a part, or all where it has no folder for each.
+
+        StorageError: it has folders for other parts only.
+        """
+        folder = self.path / part if self.has_parts else self.path
+        if not folder.exists():
+            raise StorageError(
+                f"{folder} does not exist; a folder of worlds has the parts {', '.join(PARTS)}."
+            )
+        return _files(folder) if folder.is_dir() else [folder]
+
+    def contents(self) -> list[Path]:
+        """Every file that its problems depend on, in an order that stays."""
+        if self.path.is_dir():
+            return sorted(file for file in self.path.rglob("*") if file.is_file())
+        try:
+            if self.format == "ros":
+                return [self.path, picture_of(self.path)]
+            if self.path.suffix == ".scen":
+                return [self.path, map_of_scenarios(self.path)]
+        except ValueError as error:
+            raise StorageError(f"{self.path} {error}.") from None
+        return [self.path]
+
+
+def class_of(path: Path) -> str:
+    """The class that a path of worlds names; StorageError where it cannot name one."""
+    return checked_name(path.name if path.is_dir() else path.stem)
+
+
+def source_at(path: Path, named: str | None = None) -> Source:
+    """The worlds or the map at a path, in the format ``named`` or recognised by the files' endings.
+
+    StorageError: nothing is there, or nothing of a known format.
+    """
+    if named is not None and named not in FORMATS:
+        raise StorageError(f"Unknown format {named!r}; known are {', '.join(FORMATS)}.")
+    path = path.absolute()
+    if not path.exists():
+        raise StorageError(f"{path} does not exist; check the name.")
+    class_of(path)  # which raises where the name cannot be a class's
+    if path.is_dir():
+        return Source(path, named or _format_of_folder(path), is_map=False)
+    found = named or MAPS.get(path.suffix) or WORLDS.get(path.suffix)
+    if found is None:
+        known = ", ".join(dict.fromkeys([*WORLDS, *MAPS]))
+        raise StorageError(f"{path} is of no known format ({known}); name it with --format.")
+    if found != "numpy":
+        return Source(path, found, is_map=found in MAPS.values())
+    try:
+        return Source(path, found, is_map=not is_stack(path))
+    except ValueError as error:
+        raise StorageError(f"{path} {error}.") from None
+
+
+def _format_of_folder(folder: Path) -> str:
+    """The format of most files of a folder of worlds."""
+    parts = [folder / part for part in PARTS if (folder / part).is_dir()] or [folder]
+    endings = Counter(file.suffix for part in parts for file in _files(part) if file.suffix in WORLDS)
+    if endings:
+        return WORLDS[endings.most_common(1)[0][0]]
+    inside = [entry for entry in _files(folder) if entry.is_dir() or entry.suffix in MAPS]
+    if inside:
+        names = ", ".join(entry.name for entry in inside[:6])
+        raise StorageError(f"{folder} holds no worlds itself; give one of {names}.")
+    raise StorageError(f"{folder} holds no worlds ({', '.join(WORLDS)}); give another folder.")
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("[!.]*"), key=lambda file: (len(file.name), file.name))

@@ -1,0 +1,300 @@
+"""Maps of three formats: the cells, where they lie, and what is wrong with a bad file in one line."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from planners.maps.occupancy_map import Cells, OccupancyMap
+from storage.errors import StorageError
+from storage.worlds.importing import ImportSettings, import_part, load_map
+from storage.worlds.moving_ai import read_scenarios
+from storage.worlds.sources import source_at
+from tests.storage.worlds.samples import town_cells, write_map, write_ros, write_scenarios
+from tests.storage.worlds.test_pictures import bomb
+
+CELLS = town_cells()
+
+
+def loaded(file: Path, **settings: Any) -> OccupancyMap:
+    return load_map(source_at(file), ImportSettings(**settings))
+
+
+def told(file: Path, **settings: Any) -> str:
+    with pytest.raises(StorageError) as error:
+        loaded(file, **settings)
+    assert "\n" not in str(error.value)
+    assert str(file) in str(error.value)
+    return str(error.value)
+
+
+def in_all_formats(folder: Path, cells: Cells) -> list[Path]:
+    write_map(folder / "a.map", cells)
+    write_ros(folder / "b.yaml", cells, "b.png")
+    write_ros(folder / "c.yml", cells, "c.pgm")
+    np.save(folder / "d.npy", cells)
+    np.savez_compressed(folder / "e.npz", grid=cells.astype(np.int8))
+    np.save(folder / "f.npy", np.where(cells, 1.0, 0.0))
+    return sorted(folder.glob("*.[mny]*"))
+
+
+def test_every_format_says_the_same_cells_with_row_0_the_lowest(tmp_path: Path) -> None:
+    files = in_all_formats(tmp_path, CELLS)
+    assert len(files) == 6
+    for file in files:
+        found = loaded(file)
+        assert np.array_equal(found.occupied[::-1], CELLS), file
+        assert (found.resolution, found.origin, found.name) == (1.0, (0.0, 0.0, 0.0), file.stem)
+
+
+def test_the_same_cells_give_the_same_problems_whatever_the_format(tmp_path: Path) -> None:
+    vertices = []
+    for file in in_all_formats(tmp_path, CELLS)[:3]:
+        file = file.rename(file.with_name(f"town{file.suffix}"))
+        found = import_part(source_at(file), "train", ImportSettings(count=3, seed=5))
+        vertices.append(np.concatenate([problem.obstacles.vertices for problem in found.problems]))
+        assert [problem.class_name for problem in found.problems] == ["town"] * 3
+    assert all(np.array_equal(vertices[0], other) for other in vertices)
+
+
+def test_metres_a_cell_are_an_option_of_formats_that_do_not_say_them(tmp_path: Path) -> None:
+    write_map(tmp_path / "a.map", CELLS)
+    assert loaded(tmp_path / "a.map", resolution=0.25).size == (50.0, 37.5)
+    for wrong in (0.0, -1.0, math.nan, math.inf, 1e4):
+        assert "has resolution" in told(tmp_path / "a.map", resolution=wrong)
+
+
+def test_a_ros_map_lies_where_its_origin_says(tmp_path: Path) -> None:
+    write_ros(tmp_path / "town.yaml", CELLS, resolution="5e-2", origin=[-10.0, 4.0, 0.5])
+    found = loaded(tmp_path / "town.yaml")
+    assert found.resolution == 0.05  # which YAML 1.1 reads as text
+    assert found.pose(0.0, 0.0, 0.1) == pytest.approx((-10.0, 4.0, 0.6))
+    assert found.pose(1.0, 0.0, 0.0) == pytest.approx((-10.0 + math.cos(0.5), 4.0 + math.sin(0.5), 0.5))
+
+
+@pytest.mark.parametrize(
+    ("fields", "unknown", "occupied"),
+    [
+        (
+            {},
+            "occupied",
+            [0, 100, 204, 205],
+        ),  # darkness 1, 0.61, 0.2, 0.196: only 254 and 206 are surely free
+        ({}, "free", [0]),
+        ({"negate": 1}, "free", [204, 205, 206, 254]),
+        ({"negate": 1}, "occupied", [100, 204, 205, 206, 254]),
+        ({"mode": "scale"}, "occupied", [0, 100]),
+        ({"mode": "scale"}, "free", [0, 100]),
+        ({"mode": "raw"}, "free", [100]),
+        ({"mode": "raw"}, "occupied", [100, 204, 205, 206, 254]),
+        ({"occupied_thresh": 0.5, "free_thresh": 0.25}, "occupied", [0, 100]),
+    ],
+)
+def test_pixels_are_judged_as_map_server_does(
+    tmp_path: Path, fields: dict[str, Any], unknown: str, occupied: list[int]
+) -> None:
+    write_ros(tmp_path / "town.yaml", CELLS, "town.png", **fields)
+    levels = np.array([[0, 100, 204, 205, 206, 254]], np.uint8)
+    Image.fromarray(levels).save(tmp_path / "town.png")
+    found = loaded(tmp_path / "town.yaml", unknown=unknown)
+    assert levels[found.occupied].tolist() == occupied
+
+
+def test_transparent_pixels_of_a_ros_map_are_unknown(tmp_path: Path) -> None:
+    write_ros(tmp_path / "town.yaml", CELLS, "town.png")
+    Image.fromarray(np.array([[[0, 0, 0, 0], [255, 255, 255, 255]]], np.uint8)).save(tmp_path / "town.png")
+    assert loaded(tmp_path / "town.yaml").occupied.tolist() == [[True, False]]
+    assert loaded(tmp_path / "town.yaml", unknown="free").occupied.tolist() == [[False, False]]
+
+
+def test_unknown_cells_of_a_grid_are_occupied_or_free_by_choice(tmp_path: Path) -> None:
+    for values in (np.array([[0, 1, -1]], np.int8), np.array([[0.0, 1.0, np.nan]])):
+        np.save(tmp_path / "a.npy", values)
+        assert loaded(tmp_path / "a.npy").occupied.tolist() == [[False, True, True]]
+        assert loaded(tmp_path / "a.npy", unknown="free").occupied.tolist() == [[False, True, False]]
+
+
+def test_scenarios_lie_in_the_middles_of_cells_with_y_up(tmp_path: Path) -> None:
+    world = OccupancyMap("m", np.zeros((150, 200), bool), 2.0)
+    (tmp_path / "m.scen").write_text("version 1\n0\tmaps/m.map\t200\t150\t0\t0\t199\t149\t200.5\n")
+    assert read_scenarios(tmp_path / "m.scen", world).tolist() == [[[1.0, 299.0], [399.0, 1.0]]]
+
+
+def test_scenarios_find_their_map_beside_them(tmp_path: Path) -> None:
+    write_map(tmp_path / "m.map", CELLS)
+    write_scenarios(tmp_path / "m.scen", "somewhere/else/m.map", CELLS, 40)
+    parts = [import_part(source_at(tmp_path / "m.scen"), part) for part in ("train", "test")]
+    assert all(len(part.problems) + len(part.skipped) == 40 for part in parts)
+    assert len(parts[0].problems) + len(parts[1].problems) > 0
+    (tmp_path / "m.map").unlink()
+    assert "which does not lie beside it" in told(tmp_path / "m.scen")
+
+
+def _no_picture(folder: Path) -> None:
+    (folder / "town.pgm").unlink()
+
+
+def _bomb(folder: Path) -> None:
+    (folder / "town.pgm").write_bytes(bomb())
+
+
+def _plain_bomb(folder: Path) -> None:
+    (folder / "town.pgm").write_bytes(b"P5 60000 60000 255\n")
+
+
+def _large(folder: Path) -> None:
+    (folder / "town.pgm").write_bytes(b"P5 6000 6000 255\n" + bytes(100))
+
+
+def _cut(folder: Path) -> None:
+    (folder / "town.pgm").write_bytes((folder / "town.pgm").read_bytes()[:999])
+
+
+def _outside(folder: Path) -> None:
+    (folder.parent / "secret.pgm").write_bytes((folder / "town.pgm").read_bytes())
+
+
+def _link(folder: Path) -> None:
+    _outside(folder)
+    (folder / "link.pgm").symlink_to(folder.parent / "secret.pgm")
+
+
+@pytest.mark.parametrize(
+    ("fields", "change", "reason"),
+    [
+        ({"resolution": -0.05}, None, "has resolution -0.05"),
+        ({"resolution": 0}, None, "has resolution 0"),
+        ({"resolution": 1e9}, None, "has resolution 1e+09"),
+        ({"resolution": "wide"}, None, "has 'wide' as its resolution"),
+        ({"resolution": True}, None, "as its resolution, wanted was a number"),
+        ({"resolution": None}, None, "lacks resolution"),
+        ({"origin": [math.nan, 0, 0]}, None, "origin that is not finite"),
+        ({"origin": [0, 0, math.inf]}, None, "origin that is not finite"),
+        ({"origin": [1e300, 0, 0]}, None, "not on earth"),
+        ({"origin": [0, 0]}, None, "has no origin"),
+        ({"origin": "here"}, None, "has no origin"),
+        ({"origin": [0, {}, 0]}, None, "as its origin"),
+        ({"mode": "best"}, None, "has mode 'best'"),
+        ({"negate": 7}, None, "negate that is neither"),
+        ({"occupied_thresh": 1.5}, None, "has occupied_thresh 1.5"),
+        ({"free_thresh": 0.9}, None, "above occupied_thresh"),
+        ({"image": "none.pgm"}, None, "which is not there"),
+        ({"image": "../secret.pgm"}, _outside, "outside of its own folder"),
+        ({"image": "/etc/passwd"}, None, "outside of its own folder"),
+        ({"image": "link.pgm"}, _link, "outside of its own folder"),
+        ({"image": "x" * 5000}, None, "which no file can be called"),
+        ({"image": "a\0b"}, None, "no picture's name"),
+        ({"image": ["town.pgm"]}, None, "no picture's name"),
+        ({}, _no_picture, "which is not there"),
+        ({}, _bomb, "no whole PNG or PPM picture"),
+        ({}, _plain_bomb, "no whole PNG or PPM picture"),
+        ({}, _large, "6000 x 6000 cells, more than"),
+        ({}, _cut, "no whole PNG or PPM picture"),
+    ],
+)
+def test_a_bad_ros_map_is_told_in_one_line(
+    tmp_path: Path, fields: dict[str, Any], change: Callable[[Path], None] | None, reason: str
+) -> None:
+    (tmp_path / "in").mkdir()
+    write_ros(tmp_path / "in" / "town.yaml", CELLS)
+    said = yaml.safe_load((tmp_path / "in" / "town.yaml").read_text())
+    (tmp_path / "in" / "town.yaml").write_text(yaml.safe_dump(said | fields))
+    if change is not None:
+        change(tmp_path / "in")
+    assert reason in told(tmp_path / "in" / "town.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "not the YAML of a map"),
+        ("[1, 2]", "not the YAML of a map"),
+        ("image: [", "is not YAML"),
+        ("a: !!python/object/apply:os.system [ls]", "is not YAML"),
+        ("a: &a [1, 1]\nb: &b [*a, *a]\nc: [*b, *b]", "is not the YAML of a map"),
+        ("[" * 10_000, "has more lists in it"),
+        ("- " * 5_000, "is not YAML"),
+        ("resolution: " + "9" * 10_000, "is not YAML"),
+        ("x" * 70_000, "is larger than"),
+    ],
+)
+def test_what_is_no_yaml_of_a_map_is_told_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
+    (tmp_path / "town.yaml").write_text(text)
+    assert reason in told(tmp_path / "town.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "does not begin with the lines"),
+        ("type octile\nheight 2\nwidth 2\nmap\n..\n", "has 1 rows"),
+        ("type octile\nheight 2\nwidth 2\nmap\n..\n.\n", "row 2 has 1 cells"),
+        ("type octile\nheight 2\nwidth 2\nmap\n..\n.?\n", "has the cell '?'"),
+        ("type octile\nheight -2\nwidth 2\nmap\n..\n..\n", "no whole number as its height"),
+        ("type octile\nheight 99999999999\nwidth 2\nmap\n..\n", "no whole number as its height"),
+        ("type octile\nheight 999999\nwidth 999999\nmap\n..\n", "more than 25,000,000"),
+        ("type octile\nheight 0\nwidth 0\nmap\n", "wanted is at least one"),
+    ],
+)
+def test_a_bad_moving_ai_map_is_told_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
+    (tmp_path / "m.map").write_text(text)
+    assert reason in told(tmp_path / "m.map")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "does not begin with a version"),
+        ("version 1\n", "holds no scenario"),
+        ("version 1\n0 m.map 200 150 0 0 1\n", "has 7 words"),
+        ("version 1\n0 m.map 200 150 0 0 1 x 1.0\n", "scenario 1 is not"),
+        ("version 1\n0 m.map 100 150 0 0 1 1 1.0\n", "is of a map of 100 x 150 cells"),
+        ("version 1\n0 m.map 200 150 0 0 200 1 1.0\n", "outside of the map"),
+        ("version 1\n0 ../m.map.txt 200 150 0 0 1 1 1.0\n", "does not lie beside it"),
+    ],
+)
+def test_bad_scenarios_are_told_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
+    write_map(tmp_path / "m.map", CELLS)
+    (tmp_path / "m.scen").write_text(text)
+    with pytest.raises(StorageError, match=reason) as error:
+        import_part(source_at(tmp_path / "m.scen"), "train")
+    assert "\n" not in str(error.value)
+
+
+def test_bad_numpy_files_are_told_in_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "a.npy"
+    for values, reason in [
+        (np.array([[{}]], object), "holds object"),
+        (np.zeros((3, 4), "M8[s]"), "wanted were numbers or bool"),
+        (np.zeros(3), "wanted was one array"),
+        (np.zeros((0, 3)), "wanted is at least one"),
+        (np.array([[0.3]]), "holds 0.3"),
+        (np.array([[7]]), "holds 7"),
+        (np.array([[np.inf]]), "holds inf"),
+    ]:
+        np.save(file, values)
+        with pytest.raises(StorageError, match=reason) as error:
+            loaded(file)
+        assert "\n" not in str(error.value)
+    np.save(file, CELLS)
+    whole = file.read_bytes()
+    for damaged in (b"", whole[:50], whole[:-9], whole.replace(b"(150, 200)", b"(99150, 9)")):
+        file.write_bytes(damaged)
+        assert "no whole NumPy file" in told(file) or "more than" in told(file)
+    np.savez(tmp_path / "b.npz", one=CELLS, two=CELLS)
+    assert "wanted was one array" in told(tmp_path / "b.npz")
+    np.savez(tmp_path / "b.npz", one=np.broadcast_to(np.int8(0), (5_001, 5_000)))
+    assert "more than 25,000,000" in told(tmp_path / "b.npz")
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:
+        archive.writestr("letter.txt", "dear")
+    assert "no whole NumPy file" in told(tmp_path / "b.npz")
+    (tmp_path / "b.npz").write_bytes(b"PK")
+    assert "no whole NumPy file" in told(tmp_path / "b.npz")
