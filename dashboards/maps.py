@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
@@ -20,7 +21,7 @@ from planners.maps.cutting import Cut
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Blocks, blocks_of
 from planners.maps.surroundings import WINDOW
-from planners.world.problem import BOUNDS, CANONICAL_START, Floats
+from planners.world.problem import BOUNDS, CANONICAL_START, Floats, Problem
 from planners.world.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"train": BLUE, "test": ORANGE}
@@ -42,7 +43,7 @@ def map_picture(
     for row, part in enumerate(parts):
         _draw_cuts(axes, [cut.pose for cut in cuts[part]], scale, COLOURS[part])
         beside = figure.add_subplot(grid[row, 1])
-        shown = cuts[part][0].problem
+        shown = max((cut.problem for cut in cuts[part][:SHOWN_WINDOWS]), key=_pieces)
         draw_problem(beside, shown, vehicle)
         beside.set_title(shown.id, fontsize=9, color=COLOURS[part], pad=4)
     handles: list[Line2D | Patch] = [
@@ -57,13 +58,15 @@ def map_picture(
     return figure
 
 
+def _pieces(problem: Problem) -> int:
+    return len(problem.obstacles.piece_starts)
+
+
 def _draw_map(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
     width, height = world.size
     left, bottom, turn = world.origin
     place = Affine2D().rotate(turn).translate(left, bottom) + axes.transData
     picture = np.ma.masked_equal(world.occupied, False)
-    from matplotlib.colors import ListedColormap
-
     axes.imshow(
         picture,
         origin="lower",

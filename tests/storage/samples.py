@@ -98,7 +98,7 @@ experiences = st.builds(Experience, problems(), st.builds(plan, st.integers(2, 2
 
 def same_problem(one: Problem, other: Problem) -> bool:
     """Whether two problems agree in every field, to the last bit."""
-    plain = ("id", "class_name", "start", "goal", "goal_radius", "bounds")
+    plain = ("id", "class_name", "start", "goal", "goal_radius", "bounds", "scale")
     return all(getattr(one, name) == getattr(other, name) for name in plain) and all(
         a.dtype == b.dtype and np.array_equal(a, b)
         for a, b in zip(one.obstacles, other.obstacles, strict=True)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,25 @@ def test_the_file_has_exactly_the_fields_of_the_contract(tmp_path: Path) -> None
     assert RECORD.plan is not None
     assert found["states"] == RECORD.plan.states.tolist()
     assert found["duration_s"] == pytest.approx(1.9)
+
+
+def test_a_file_holds_the_lengths_outside_and_says_the_scale(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    write_plan(path, replace(RECORD, scale=0.5))
+    found = json.loads(path.read_text())
+    assert RECORD.plan is not None
+    assert found["scale"] == 0.5
+    assert found["length_m"] == pytest.approx(0.5 * RECORD.plan.length_m)
+    assert found["states"][3][:2] == (0.5 * RECORD.plan.states[3, :2]).tolist()
+    assert found["states"][3][4] == RECORD.plan.states[3, 4]
+    read = read_plan(path)
+    assert read.plan is not None
+    assert read.scale == 0.5
+    assert same_plan(read.plan, RECORD.plan)
+    for scale in (0.0, -1.0, math.nan):
+        path.write_text(json.dumps(found | {"scale": scale}))
+        with pytest.raises(StorageError, match="has scale"):
+            read_plan(path)
 
 
 @pytest.mark.parametrize("name", VEHICLES)

@@ -83,6 +83,32 @@ def test_the_contract_is_read_in_all_three_formats(tmp_path: Path) -> None:
     assert sorted(map(tuple, one.obstacles.vertices)) == sorted(map(tuple, GOOD["obstacles"][0]))
 
 
+@pytest.mark.parametrize("scale", [0.2, 1.0, 3.0])
+def test_a_scaled_problem_is_the_canonical_one_in_lengths_outside(tmp_path: Path, scale: float) -> None:
+    fields = {
+        **GOOD,
+        "scale": scale,
+        "goal": [50.0 * scale, 50.0 * scale],
+        "goal_radius": 2.0 * scale,
+        "bounds": [scale * bound for bound in GOOD["bounds"]],
+        "obstacles": [[[scale * x, scale * y] for x, y in GOOD["obstacles"][0]]],
+    }
+    (tmp_path / "p.json").write_text(json.dumps(fields))
+    (problem,) = read_problems(tmp_path / "p.json")
+    assert problem.scale == scale
+    assert problem.goal == pytest.approx((50.0, 50.0))
+    assert problem.bounds == pytest.approx(GOOD["bounds"])
+    assert np.allclose(problem.obstacles.vertices, GOOD["obstacles"][0], atol=1e-5)
+    for path in (tmp_path / "q.jsonl", tmp_path / "q.parquet"):
+        write_problems(path, [problem])
+        (again,) = read_problems(path)
+        assert again.scale == scale
+        assert np.array_equal(again.obstacles.vertices, problem.obstacles.vertices)
+        assert again.goal == pytest.approx(problem.goal, rel=1e-15)
+    write_imported(tmp_path / "r.parquet", [problem])
+    assert read_imported(tmp_path / "r.parquet")[0].scale == scale
+
+
 def test_a_missing_id_comes_from_the_file_and_a_missing_class_is_unknown(tmp_path: Path) -> None:
     nameless = {name: value for name, value in GOOD.items() if name not in ("id", "class")}
     (tmp_path / "mine.jsonl").write_text(f"{json.dumps(nameless)}\n{json.dumps(nameless)}\n")
@@ -122,6 +148,10 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal": [10**400, 50]}, "finite"),
         ({"start": [0, 0, 1e300]}, "farther"),
         ({"goal": [80, 50]}, "94.34 m apart"),
+        ({"scale": 2.0}, "divided by scale 2: start and goal are 35.36 m apart"),
+        ({"scale": 0}, "scale is 0; wanted"),
+        ({"scale": math.nan}, "scale is nan; wanted"),
+        ({"scale": "large"}, "scale must hold numbers"),
         ({"goal_radius": 0}, "goal_radius is 0"),
         ({"goal_radius": -1.0}, "goal_radius is -1"),
         ({"goal_radius": [2]}, "goal_radius must hold numbers"),

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.world.alignment import Alignment, from_canonical, to_canonical
+from planners.world.alignment import Alignment, from_canonical, scaled, to_canonical
 from planners.world.authority import faults
 from planners.world.classes import problem_class
 from planners.world.collision import box_is_free, scene_of
 from planners.world.problem import CANONICAL_DISTANCE, Floats, Plan, Problem, obstacles_of
+from planners.world.vehicle import CAR
 from tests.planners.world.strategies import angles, seeds
 from tests.planners.world.test_authority import good_plan
 
@@ -106,3 +107,23 @@ def test_the_goal_radius_is_the_distance_that_is_forgiven() -> None:
     reach = (CANONICAL_DISTANCE + 1.9) / math.sqrt(2.0)
     canonical, _ = to_canonical(replace(problem_class("curves").draw(0, 0), goal=(reach, reach)))
     assert canonical.goal == pytest.approx((reach, reach))
+
+
+@given(scale=st.floats(0.05, 20.0))
+def test_a_scaled_plan_is_driven_by_the_scaled_vehicle(scale: float) -> None:
+    problem = replace(problem_class("trap").draw(0, 0), obstacles=obstacles_of([]))
+    lengths = ("front", "rear", "width", "wheelbase", "min_speed", "max_speed", "max_acceleration")
+    larger = CAR._replace(**{name: scale * getattr(CAR, name) for name in lengths})
+    outside = replace(
+        problem,
+        goal=(scale * problem.goal[0], scale * problem.goal[1]),
+        goal_radius=scale * problem.goal_radius,
+        bounds=tuple(scale * bound for bound in problem.bounds),
+    )
+    plan = scaled(good_plan(), scale)
+    assert faults(outside, plan, larger) == []
+    assert plan.length_m == pytest.approx(scale * good_plan().length_m)
+    assert plan.duration_s == good_plan().duration_s
+    back = scaled(plan, 1.0 / scale)
+    assert np.allclose(back.states, good_plan().states, rtol=1e-12)
+    assert np.allclose(back.controls, good_plan().controls, rtol=1e-12)
