@@ -32,7 +32,7 @@ _OCCUPIED: Final = "#6B7280"
 def map_picture(
     world: OccupancyMap, cuts: Mapping[str, Sequence[Cut]], scale: float, vehicle: Vehicle = CAR
 ) -> Figure:
-    """The map in its own frame with its blocks and the poses cut by part, beside one problem of each part."""
+    """The map in its own frame with its blocks and the poses cut by part, beside a window of each part."""
     parts = [part for part in cuts if cuts[part]]
     figure = new_figure(7.4 + 3.0 * bool(parts), 7.2, f"Problems cut from {world.name}")
     grid = figure.add_gridspec(

@@ -1,7 +1,13 @@
-"""The one error of this package."""
+"""The one error of this package, and how its line ends."""
 
 from __future__ import annotations
 
 
 class StorageError(Exception):
     """Something on disk is missing, damaged, foreign or cannot be written; the message is one line."""
+
+
+def sentence(subject: object, told: object) -> str:
+    """One line of what is wrong with something, ended as a sentence where it does not end as a question."""
+    text = f"{subject} {told}"
+    return text if text.endswith(("?", ".")) else f"{text}."

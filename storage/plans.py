@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from planners.world.alignment import scaled
 from planners.world.problem import Plan
 from planners.world.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
 from storage.files import read_json, write_json
 from storage.vehicles import other_vehicle
-
-X, Y, SPEED, ACCELERATION = 0, 1, 3, 0  # columns of every vehicle's states and controls that hold lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +35,8 @@ def write_plan(path: Path, record: PlanRecord) -> None:
 
     At another scale than 1 positions, speeds and accelerations are those of the vehicle made as much larger.
     """
-    plan = record.plan and _scaled(record.plan, record.scale)
-    scaled = {} if record.scale == 1.0 else {"scale": record.scale}
+    plan = record.plan and scaled(record.plan, record.scale)
+    scale = {} if record.scale == 1.0 else {"scale": record.scale}
     write_json(
         path,
         {
@@ -47,7 +46,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
             "planner": record.planner,
             "assist": record.assist,
             "vehicle": name_of(record.vehicle),
-            **scaled,
+            **scale,
             "dt": None if plan is None else plan.dt,
             "states": [] if plan is None else plan.states.tolist(),
             "controls": [] if plan is None else plan.controls.tolist(),
@@ -97,14 +96,4 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         )
     if not 0.0 < scale < np.inf:
         raise StorageError(f"{path} has scale {scale}; wanted are metres a canonical metre.")
-    return record if plan is None else replace(record, plan=_scaled(plan, 1.0 / scale))
-
-
-def _scaled(plan: Plan, scale: float) -> Plan:
-    """A plan with its lengths multiplied; a vehicle as much larger drives it in the same time."""
-    if scale == 1.0:
-        return plan
-    states, controls = plan.states.copy(), plan.controls.copy()
-    states[:, [X, Y, SPEED]] *= scale
-    controls[:, ACCELERATION] *= scale
-    return Plan(states, controls, plan.dt)
+    return record if plan is None else replace(record, plan=scaled(plan, 1.0 / scale))

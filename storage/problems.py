@@ -221,7 +221,7 @@ def _short(value: object) -> str:
 
 
 def fields_of(problem: Problem) -> dict[str, Any]:
-    """The contract\'s object that describes a problem (``problem_of``)."""
+    """The contract's object that describes a problem (``problem_of``)."""
     obstacles, scale = problem.obstacles, problem.scale
     x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()

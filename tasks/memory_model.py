@@ -24,7 +24,7 @@ from planners.memory.labels import plan_answers
 from planners.memory.recall import Memory
 from planners.memory.scores import best_plans
 from planners.solve import turned
-from planners.world.alignment import from_canonical, to_canonical
+from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.classes import problem_class
 from planners.world.collision import scene_of
 from planners.world.occupancy import drawing_of
@@ -99,7 +99,8 @@ class MemoryModel(PythonModel):
         best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
         for rank, i in enumerate(best, start=1):
             free, _ = plan_answers(memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
-            plan = from_canonical(turned(memory.plans[i], asked.start[2]), alignment)
+            aligned = from_canonical(turned(memory.plans[i], asked.start[2]), alignment)
+            plan = scaled(aligned, problem.scale)
             row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
             rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
         return rows

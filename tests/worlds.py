@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from planners.world.problem import (
@@ -13,6 +15,8 @@ from planners.world.problem import (
     Problem,
     obstacles_of,
 )
+
+SHARED = Path(__file__).parents[2] / "shared" / "worlds"  # real worlds, where they lie beside the repository
 
 
 def box(x: float, y: float, angle: float, half_length: float, half_width: float) -> Floats:

@@ -83,8 +83,8 @@ def surroundings_of(world: OccupancyMap, scale: float = 1.0, tolerance_m: float 
     tree = shapely.STRtree(pieces)
     pairs = tree.query(pieces, predicate="intersects").T
     touching = pairs[pairs[:, 0] < pairs[:, 1]]
-    contacts = shapely.STRtree(shapely.intersection(*pieces[touching.T]))
-    return Surroundings(pieces, tree, touching, contacts, scale)
+    common: Shapes = np.asarray(shapely.intersection(*pieces[touching.T]))
+    return Surroundings(pieces, tree, touching, shapely.STRtree(common), scale)
 
 
 def _obstacles(pieces: Shapes, touching: Indices) -> Obstacles:

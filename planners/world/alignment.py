@@ -75,6 +75,16 @@ def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
     return Plan(states, plan.controls, plan.dt)
 
 
+def scaled(plan: Plan, scale: float) -> Plan:
+    """A plan with its lengths multiplied; a vehicle as much larger drives it in the same time."""
+    if scale == 1.0:
+        return plan
+    states, controls = plan.states.copy(), plan.controls.copy()
+    states[:, [0, 1, 3]] *= scale  # x, y and speed of every vehicle; the others are angles
+    controls[:, 0] *= scale  # acceleration
+    return Plan(states, controls, plan.dt)
+
+
 def _turned(points: Floats, alignment: Alignment) -> Floats:
     """Points ``[n, 2]`` of the own frame in the canonical one."""
     cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)

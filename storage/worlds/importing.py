@@ -13,7 +13,7 @@ from planners.maps.surroundings import surroundings_of
 from planners.world.faults import problem_fault
 from planners.world.problem import Problem
 from planners.world.vehicle import CAR, Vehicle
-from storage.errors import StorageError
+from storage.errors import StorageError, sentence
 from storage.problems import problems_or_faults
 from storage.worlds.moving_ai import map_of_scenarios, read_map, read_scenarios
 from storage.worlds.numpy_grids import grid_worlds, read_grid
@@ -83,7 +83,7 @@ def import_part(
         if isinstance(item, Problem):
             problems[item.id] = item
         elif settings.strict:
-            raise StorageError(f"{place} {item}.")
+            raise StorageError(sentence(place, item))
         else:
             skipped.append((place, item))
         if len(problems) == settings.count:
@@ -104,7 +104,7 @@ def load_map(source: Source, settings: ImportSettings | None = None) -> Occupanc
             return read_map(map_of_scenarios(source.path), name, settings.resolution)
         return read_map(source.path, name, settings.resolution)
     except ValueError as error:
-        raise StorageError(f"{source.path} {error}.") from None
+        raise StorageError(sentence(source.path, error)) from None
 
 
 def _of_map(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Imported:
@@ -136,7 +136,7 @@ def _of_map(source: Source, part: Part, settings: ImportSettings, tell: Tell) ->
                 skipped.append((f"{source.path} scenario {number}", cut))
         return Imported([cut.problem for cut in cuts], skipped, cuts)
     except ValueError as error:
-        raise StorageError(f"{source.path} {error}.") from None
+        raise StorageError(sentence(source.path, error)) from None
 
 
 def _worlds(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Iterator[Item]:

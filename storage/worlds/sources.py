@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from storage.errors import StorageError
+from storage.errors import StorageError, sentence
 from storage.layout import checked_name
 from storage.worlds.moving_ai import map_of_scenarios
 from storage.worlds.numpy_grids import is_stack
@@ -76,7 +76,7 @@ class Source:
             if self.path.suffix == ".scen":
                 return [self.path, map_of_scenarios(self.path)]
         except ValueError as error:
-            raise StorageError(f"{self.path} {error}.") from None
+            raise StorageError(sentence(self.path, error)) from None
         return [self.path]
 
 
@@ -107,7 +107,7 @@ def source_at(path: Path, named: str | None = None) -> Source:
     try:
         return Source(path, found, is_map=not is_stack(path))
     except ValueError as error:
-        raise StorageError(f"{path} {error}.") from None
+        raise StorageError(sentence(path, error)) from None
 
 
 def _format_of_folder(folder: Path) -> str:

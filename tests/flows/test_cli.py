@@ -13,7 +13,7 @@ from flows.cli import app, call
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
-    "optimise", "solve", "sweep", "experience-curve",
+    "optimise", "solve", "import-worlds", "sweep", "experience-curve",
 )  # fmt: skip
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 
 from planners.maps.occupancy_map import Cells
-from planners.world.collision import box_is_free, scene_of
+from planners.world.collision import Scene, box_is_free, scene_of
+from planners.world.jit import jit
 from planners.world.problem import Floats, Problem
 
 HALF_LENGTH, HALF_WIDTH = 1.0, 0.45  # metres: about the car
@@ -19,12 +20,24 @@ EDGE_M = 1e-3  # how far an outline may be moved by rounding
 def cells_shape(
     occupied: Cells, resolution: float, left: float = 0.0, bottom: float = 0.0
 ) -> shapely.Geometry:
-    """Occupied cells, row 0 the lowest, as one prepared shape made cell by cell."""
-    rows, columns = np.nonzero(occupied)
-    x, y = left + columns * resolution, bottom + rows * resolution
-    shape = shapely.union_all(shapely.box(x, y, x + resolution, y + resolution))
+    """Occupied cells, row 0 the lowest, as one prepared shape made of the runs of each row."""
+    edges = np.diff(np.pad(occupied, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    (rows, begins), (_, ends) = np.nonzero(edges == 1), np.nonzero(edges == -1)
+    x, y, x_end = left + begins * resolution, bottom + rows * resolution, left + ends * resolution
+    shape = shapely.union_all(shapely.box(x, y, x_end, y + resolution))
     shapely.prepare(shape)
     return shape
+
+
+@jit
+def boxes_are_free(boxes: Floats, half_length: float, half_width: float, scene: Scene) -> Cells:
+    """Whether each box ``[n, 4]`` (centre, cosine and sine) is free."""
+    free = np.empty(len(boxes), np.bool_)
+    for i in range(len(boxes)):
+        free[i] = box_is_free(
+            boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], half_length, half_width, scene
+        )
+    return free
 
 
 def disagreements(
@@ -40,21 +53,15 @@ def disagreements(
     rng = np.random.default_rng(len(problem.obstacles.vertices))
     reach = math.hypot(HALF_LENGTH, HALF_WIDTH)
     low, high = np.array(problem.bounds[:2]) + reach, np.array(problem.bounds[2:]) - reach
-    places, turns = rng.uniform(low, high, (count, 2)), rng.uniform(-math.pi, math.pi, count)
-    cos, sin = np.cos(turns), np.sin(turns)
-    scene = scene_of(problem)
-    free = np.array(
-        [
-            box_is_free(x, y, c, s, HALF_LENGTH, HALF_WIDTH, scene)
-            for (x, y), c, s in zip(places.tolist(), cos.tolist(), sin.tolist(), strict=True)
-        ]
-    )
+    turns = rng.uniform(-math.pi, math.pi, count)
+    boxes = np.column_stack((rng.uniform(low, high, (count, 2)), np.cos(turns), np.sin(turns)))
+    free = boxes_are_free(boxes, HALF_LENGTH, HALF_WIDTH, scene_of(problem))
 
-    def meets(margin: float) -> Cells:
+    def met(among: Floats, margin: float) -> int:
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [HALF_LENGTH + margin, HALF_WIDTH + margin]
+        cos, sin = among[:, 2], among[:, 3]
         turned = corners @ np.stack((np.stack((cos, sin), -1), np.stack((-sin, cos), -1)), 1)
-        points = to_source((turned + places[:, np.newaxis]).reshape(-1, 2)).reshape(-1, 4, 2)
-        met: Cells = shapely.intersects(shape, shapely.polygons(points))
-        return met
+        points = to_source((turned + among[:, np.newaxis, :2]).reshape(-1, 2)).reshape(-1, 4, 2)
+        return int(shapely.intersects(shape, shapely.polygons(points)).sum())
 
-    return int((free & meets(-EDGE_M)).sum() + (~free & ~meets(EDGE_M)).sum())
+    return met(boxes[free], -EDGE_M) + int((~free).sum()) - met(boxes[~free], EDGE_M)

@@ -21,8 +21,9 @@ from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.pictures import PIXELS, obstacles_of_cells
 from storage.worlds.sources import PARTS, Part, source_at
 from tests.storage.samples import quick
+from tests.worlds import SHARED
 
-REAL = Path(__file__).parents[4] / "shared" / "worlds" / "grid201"
+REAL = SHARED / "grid201"
 
 
 def import_png_folder(
