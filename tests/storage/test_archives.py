@@ -8,13 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planners.memory.inverted_lists import list_readout
+from planners.memory.recall import RECALLS, recall
 from planners.memory.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
 from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES
+from planners.world.view import View
 from storage.checkpoints import load_checkpoint, save_checkpoint
 from storage.encoders import load_encoder, save_encoder
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
 from tests.storage.samples import ARCHITECTURE, WEIGHTS, a_memory, same_plan
+from tests.worlds import strewn
 
 GRID = (np.random.default_rng(1).random((64, 64)) < 0.2).astype(np.uint8)
 
@@ -37,6 +41,22 @@ def test_a_memory_comes_back_exactly_and_gives_the_same_bytes(tmp_path: Path, pl
     assert np.array_equal(loaded.encoder(GRID), memory.encoder(GRID))
     save_memory(tmp_path / "two", loaded)
     assert contents(tmp_path / "one") == contents(tmp_path / "two")
+
+
+def test_a_memory_from_the_disk_answers_exactly_as_the_one_that_was_saved(tmp_path: Path) -> None:
+    memory = a_memory(5)
+    memory = replace(memory, lists=list_readout(memory.vectors, memory.biases))
+    save_memory(tmp_path / "m", memory)
+    loaded = load_memory(tmp_path / "m")
+    assert all(np.array_equal(a, b) for a, b in zip(memory.lists, loaded.lists, strict=True))
+    for seed in range(20):
+        problem = strewn(seed, 20)
+        for strategy in RECALLS:
+            ours, theirs = (
+                recall(each, View(problem), strategy, 3, np.random.default_rng(seed))
+                for each in (memory, loaded)
+            )
+            assert ours == theirs
 
 
 def trained_encoder() -> TrainedEncoder:

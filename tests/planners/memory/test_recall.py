@@ -176,7 +176,11 @@ def test_nothing_is_recalled_where_row_0_scores_best(memory, problem_in):
     assert recalled_by(hopeless, problem, "exhaustive", 5).plans != ()
 
 
-@given(seed=SEEDS, k=st.integers(1, 30), count=st.integers(1, 30))
+@given(
+    seed=SEEDS,
+    k=st.integers(1, 30) | st.integers(1000, 2000),
+    count=st.integers(1, 30) | st.integers(1000, 2000),
+)
 def test_the_best_are_those_of_a_stable_sort(seed, k, count):
     rng = generator(seed, "best")
     vectors = rng.integers(-2, 3, (count + 1, 4)).astype(np.float32)
