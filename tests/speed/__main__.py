@@ -21,6 +21,7 @@ SECTIONS: Final = {
     "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",
     "hallucination": "tests.speed.hallucination",
+    "growth": "tests.speed.growth",
 }
 
 
