@@ -316,6 +316,7 @@ def _do(stage: str, options: Options) -> None:
         vehicle=options.vehicle,
         optimised=options.optimised,
         experiences=options.experiences,
+        candidates=options.candidates,
         problems_per_experience=options.problems_per_experience,
         test_problems=options.test_problems,
         epochs=options.epochs,

@@ -5,7 +5,16 @@ from __future__ import annotations
 from prefect import flow
 
 from tasks.caching import Chunk, keep_settings
-from tasks.collect import chunks_wanted, collect_problems, is_collected, keep_experiences
+from tasks.collect import chunks_wanted, collect_problems, is_collected
+from tasks.curate import (
+    curate_candidates,
+    curation_chunks,
+    improve_kept,
+    improvement_chunks,
+    is_curated,
+    is_improved,
+    keep_experiences,
+)
 from tasks.engine import fan_out, task_runner
 from tasks.settings import RunSettings
 from tasks.worlds import read_worlds, tell_skipped, world_chunks, worlds_are_read
@@ -13,10 +22,14 @@ from tasks.worlds import read_worlds, tell_skipped, world_chunks, worlds_are_rea
 
 @flow(name="collect", task_runner=task_runner())
 def collect(settings: RunSettings, data: str) -> None:
-    """Draw problems of each class, solve them, check the plans, and keep the first N of each class."""
+    """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""
     keep_settings(data, settings)
     tell_skipped(fan_out(read_worlds, world_chunks(data, settings), "read worlds", worlds_are_read))
     done: dict[Chunk, dict[str, int]] = {}
     while chunks := chunks_wanted(data, settings, done):
         done |= zip(chunks, fan_out(collect_problems, chunks, "collect", is_collected), strict=True)
-    keep_experiences(data, settings, done)
+    curated = curation_chunks(data, settings, done)
+    fan_out(curate_candidates, curated, "curate", is_curated)
+    improved = improvement_chunks(data, settings, curated)
+    fan_out(improve_kept, improved, "optimise", is_improved)
+    keep_experiences(data, settings, curated, improved)

@@ -46,7 +46,9 @@ class Options:
     optimised
         Make collected plans shorter and clearer before they are kept: about a second each.
     experiences
-        Solved problems kept a class; default by preset, as the next three.
+        Solved problems kept a class; default by preset, as the next four.
+    candidates
+        Solved problems a class of which they are chosen; as many as experiences: the first are kept.
     problems_per_experience
         Problems hallucinated for each of them.
     test_problems
@@ -90,6 +92,7 @@ class Options:
     strict: Annotated[bool, Parameter(negative=())] = False
     optimised: Annotated[bool, Parameter(negative=())] = False
     experiences: int | None = None
+    candidates: int | None = None
     problems_per_experience: int | None = None
     test_problems: int | None = None
     epochs: int | None = None

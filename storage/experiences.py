@@ -37,9 +37,7 @@ def write_experiences(
     plans = [experience.plan for experience in experiences]
     columns = {
         **problem_columns([experience.problem for experience in experiences]),
-        "states": list_column([plan.states for plan in plans], np.float64),
-        "controls": list_column([plan.controls for plan in plans], np.float64),
-        "dt": [plan.dt for plan in plans],
+        **_plan_columns(plans),
         "planner": [planner] * len(plans),
         "seed": list(seeds),
         "planning_seconds": list(planning_seconds),
@@ -72,8 +70,11 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
     ]
 
 
-def merge_experiences(shards: Sequence[Path], path: Path, count: int, key: str = "") -> int:
-    """Write the first ``count`` rows of the shards, in their order, as one file; how many there were."""
+def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:
+    """Write rows of the shards, numbered in the order of the shards, as one file.
+
+    StorageError: there are no shards, fewer rows in them, or plans of several vehicles.
+    """
     tables = [read_table(shard, EXPERIENCES) for shard in shards]
     if not tables:
         raise StorageError(f"{path} has no shards to be made from; run collect.")
@@ -81,9 +82,25 @@ def merge_experiences(shards: Sequence[Path], path: Path, count: int, key: str =
         raise StorageError(
             f"{path} would hold plans of several vehicles; run collect with a new data folder."
         )
-    merged = pa.concat_tables(tables).slice(0, count)
-    write_table(path, merged, key)
-    return int(merged.num_rows)
+    merged = pa.concat_tables(tables)
+    if max(rows, default=0) >= merged.num_rows:
+        raise StorageError(f"{path} would need more than the {merged.num_rows} rows there are; run collect.")
+    write_table(path, merged.take(pa.array(rows, pa.int64())), key)
+
+
+def replace_plans(source: Path, path: Path, first: int, plans: Sequence[Plan], key: str = "") -> None:
+    """Write rows ``first`` to before ``first + len(plans)`` of a file with other plans for their problems."""
+    table = read_table(source, EXPERIENCES).slice(first, len(plans))
+    columns = {name: table[name] for name in table.schema.names} | _plan_columns(plans)
+    write_table(path, pa.table(columns, schema=table.schema), key)
+
+
+def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
+    return {
+        "states": list_column([plan.states for plan in plans], np.float64),
+        "controls": list_column([plan.controls for plan in plans], np.float64),
+        "dt": [plan.dt for plan in plans],
+    }
 
 
 def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:

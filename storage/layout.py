@@ -18,7 +18,7 @@ LAYOUT: Final = 1  # one more whenever an older program could no longer read the
 MARK: Final = "motion-memory.json"
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
 
-Table = Literal["experiences", "hallucinated", "results", "recalls"]
+Table = Literal["candidates", "curated", "experiences", "hallucinated", "results", "recalls"]
 
 
 @dataclass(frozen=True)

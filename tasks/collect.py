@@ -1,26 +1,24 @@
-"""Collect: draw problems of a class, solve them, check every plan, keep the first N with their plans."""
+"""Collect: draw problems of a class, solve them, check every plan: the candidates among which to choose."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, Final
 
 from planners.memory.experience import Experience
 from planners.solve import solve
-from planners.world.problem import Plan, Problem
-from planners.world.vehicle import Vehicle, vehicle_named
-from storage.experiences import merge_experiences, write_experiences
+from planners.world.vehicle import vehicle_named
+from storage.experiences import write_experiences
 from storage.shards import metadata_of, shard_is_done
 from tasks.attempts import check_attempt
-from tasks.caching import Chunk, chunk_task, chunks_of, key_of, run_folder
-from tasks.settings import COMBINED, RunError, RunSettings
+from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
+from tasks.settings import RunError, RunSettings
 from tasks.worlds import source_key, source_of
 
-CHUNK_PROBLEMS: Final = 25
-CLEARANCE_WEIGHT: Final = 1.0  # buys most of a metre of clearance for half a second (docs/optimisation.md)
-SPARE: Final = 1.1  # problems asked for each one still wanted: some are not solved
-GIVE_UP: Final = 20  # problems asked a wanted one; a class this hard is no class to remember
+SMALLEST_CHUNK: Final = 25
+LARGEST_CHUNK: Final = 100  # a second of work
+PATIENCE: Final = 2  # problems asked a wanted candidate, once there are as many as must be kept
+GIVE_UP: Final = 20  # problems asked a wanted experience; a class this hard is no class to remember
 
 Results = Mapping[Chunk, Mapping[str, Any]]
 
@@ -34,16 +32,12 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
         attempt = solve(problem, planner, seed=seed, vehicle=vehicle)
-        plan = attempt.plan
-        if plan is None:
-            continue
-        if chunk.settings.optimised:
-            plan = _optimised(problem, plan, vehicle)
-        check_attempt(problem, replace(attempt, plan=plan), set(), vehicle)
-        experiences.append(Experience(problem, plan, vehicle))
-        seconds.append(attempt.planning_seconds)
+        if attempt.plan is not None:
+            check_attempt(problem, attempt, set(), vehicle)
+            experiences.append(Experience(problem, attempt.plan, vehicle))
+            seconds.append(attempt.planning_seconds)
     write_experiences(
-        chunk.run.shard("experiences", chunk.class_name, chunk.index),
+        chunk.run.shard("candidates", chunk.class_name, chunk.index),
         experiences,
         planner=planner,
         seeds=[seed] * len(experiences),
@@ -54,24 +48,20 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     return {"solved": len(experiences), "asked": chunk.last - chunk.first}
 
 
-def _optimised(problem: Problem, plan: Plan, vehicle: Vehicle) -> Plan:
-    """The plan made shorter and clearer; as it is where that fails."""
-    from planners.optimisation.optimise import DEFAULT_SETTINGS, improve  # late: few runs need CasADi
-
-    objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=CLEARANCE_WEIGHT)
-    return improve(problem, plan, DEFAULT_SETTINGS._replace(objective=objective), vehicle)
-
-
 collect_problems = chunk_task(collect_chunk)
 
 
 def is_collected(chunk: Chunk) -> bool:
     """Whether the chunk's shard is there."""
-    return shard_is_done(chunk.run.shard("experiences", chunk.class_name, chunk.index), chunk.key)
+    return shard_is_done(chunk.run.shard("candidates", chunk.class_name, chunk.index), chunk.key)
 
 
 def chunks_wanted(data: str, settings: RunSettings, done: Results) -> list[Chunk]:
-    """The chunks to do next so that each class gets its N experiences; none when all have them."""
+    """The chunks to do next so that each class gets its candidates; none when all have them.
+
+    A class with too few, or too few that are solved, makes do with them if they suffice for its experiences;
+    else a RunError.
+    """
     return [chunk for name in settings.class_names for chunk in _chunks_wanted(data, settings, name, done)]
 
 
@@ -79,34 +69,23 @@ def _chunks_wanted(data: str, settings: RunSettings, class_name: str, done: Resu
     results = [result for chunk, result in done.items() if chunk.class_name == class_name]
     solved = sum(result["solved"] for result in results)
     asked = sum(result["asked"] for result in results)
-    missing = settings.experiences - solved
-    if missing <= 0:
+    enough = solved >= settings.experiences
+    missing = settings.wanted - solved
+    if missing <= 0 or (enough and asked >= PATIENCE * settings.wanted):
         return []
-    more = -(-max(round(SPARE * missing), missing + 1) // CHUNK_PROBLEMS) * CHUNK_PROBLEMS
+    size = max(SMALLEST_CHUNK, min(LARGEST_CHUNK, settings.wanted // 10))
+    expected = missing * max(asked, 1) // max(solved, 1) + 1 if asked else missing
+    more = -(-min(expected, settings.wanted) // size) * size
     until = source_of(data, settings, class_name).count("collect", asked + more)
-    if until <= asked or asked >= GIVE_UP * settings.experiences + CHUNK_PROBLEMS:
+    if enough and until <= asked:
+        return []
+    if until <= asked or asked >= GIVE_UP * settings.experiences + size:
         raise RunError(
             f"Class {class_name}: {solved} of {asked} problems solved, {settings.experiences} are wanted; "
             "ask for fewer, or take easier problems."
         )
-    inputs = [settings.seed, settings.collector, settings.optimised, *source_key(settings, class_name)]
-    return chunks_of(data, settings, "collect", class_name, until, CHUNK_PROBLEMS, inputs)[len(results) :]
-
-
-def keep_experiences(data: str, settings: RunSettings, done: Results) -> None:
-    """Write the first N experiences of each class, in the order of the problems, as one file."""
-    run = run_folder(data, settings)
-    for name in settings.class_names:
-        chunks = sorted((chunk for chunk in done if chunk.class_name == name), key=lambda chunk: chunk.index)
-        key = key_of("experiences", settings.experiences, *(chunk.key for chunk in chunks))
-        shards = [run.shard("experiences", name, chunk.index) for chunk in chunks]
-        if not shard_is_done(run.experiences(name), key):
-            merge_experiences(shards, run.experiences(name), settings.experiences, key)
-    if settings.combined:
-        parts = [run.experiences(name) for name in settings.class_names]
-        key = key_of("combined", *(experiences_key(data, settings, name) for name in settings.class_names))
-        if not shard_is_done(run.experiences(COMBINED), key):
-            merge_experiences(parts, run.experiences(COMBINED), settings.experiences * len(parts), key)
+    inputs = [settings.seed, settings.collector, *source_key(settings, class_name)]
+    return chunks_of(data, settings, "collect", class_name, until, size, inputs)[len(results) :]
 
 
 def experiences_key(data: str, settings: RunSettings, class_name: str) -> str:

@@ -65,6 +65,7 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "optimised": False,
     "learning": asdict(Learning()),
     "hallucination": DEFAULT_MIXTURE,
+    "candidates": 0,
 }
 
 
@@ -91,6 +92,14 @@ class RunSettings:
     optimised: bool = False  # collected plans are made shorter and clearer before they are kept
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
+    candidates: int = (
+        0  # solved problems a class of which the experiences are chosen; few: the first are kept
+    )
+
+    @property
+    def wanted(self) -> int:
+        """Solved problems a class to collect."""
+        return max(self.candidates, self.experiences)
 
     @property
     def class_names(self) -> tuple[str, ...]:
@@ -161,6 +170,7 @@ def world_class(path: str | Path) -> str:
 
 class _Preset(NamedTuple):
     experiences: int
+    candidates: int
     problems_per_experience: int
     test_problems: int
     epochs: int
@@ -168,9 +178,9 @@ class _Preset(NamedTuple):
 
 
 PRESETS: Final = {
-    "smoke": _Preset(6, 20, 20, 2, False),
-    "laptop": _Preset(100, 200, 1_000, 10, False),
-    "paper": _Preset(100, 1_000, 10_000, 10, True),
+    "smoke": _Preset(6, 20, 20, 20, 2, False),
+    "laptop": _Preset(100, 1_000, 200, 1_000, 10, False),
+    "paper": _Preset(100, 1_000, 1_000, 10_000, 10, True),
 }
 
 
@@ -184,6 +194,7 @@ def for_preset(
     objective: str = "labels",
     planners: Sequence[str] | None = None,
     experiences: int | None = None,
+    candidates: int | None = None,
     problems_per_experience: int | None = None,
     test_problems: int | None = None,
     epochs: int | None = None,
@@ -221,6 +232,9 @@ def for_preset(
             raise UsageError(f"{folder} has only one of the parts {' and '.join(parts)}; both are needed.")
     if seed < 0:
         raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+    kept = _count("experiences", experiences, base.experiences)
+    if candidates is not None and candidates < kept:
+        raise UsageError(f"{candidates} candidates for {kept} experiences: give as many or more.")
     settings = RunSettings(
         preset=preset,
         classes=asked,
@@ -228,7 +242,7 @@ def for_preset(
         difficulty=difficulty,
         seed=seed,
         objective="triplet" if objective == "triplet" else "labels",
-        experiences=_count("experiences", experiences, base.experiences),
+        experiences=kept,
         problems_per_experience=_count(
             "problems a plan", problems_per_experience, base.problems_per_experience
         ),
@@ -243,6 +257,7 @@ def for_preset(
         optimised=optimised,
         learning=_learning(learning or {}),
         hallucination=DEFAULT_MIXTURE if hallucination is None else mixture_of(hallucination),
+        candidates=max(base.candidates, kept) if candidates is None else candidates,
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))

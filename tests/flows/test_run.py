@@ -72,7 +72,7 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
 
 def test_collected_problems_are_never_tested_with(runs: tuple[RunFolder, RunFolder]) -> None:
     collected = {
-        identity for path in runs[0].shards("experiences", "trap") for identity in rows_of(path)["id"]
+        identity for path in runs[0].shards("candidates", "trap") for identity in rows_of(path)["id"]
     }
     tested = set(rows_of(runs[0].shard("results", "trap", 0))["problem_id"])
     assert collected

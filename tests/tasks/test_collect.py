@@ -3,26 +3,81 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from planners.world.authority import faults
 from storage.experiences import read_experiences
-from tasks.caching import Chunk, keep_settings
-from tasks.collect import collect_chunk
-from tasks.settings import RunSettings, for_preset
+from storage.problems import write_problems
+from tasks.caching import Chunk, keep_settings, run_folder
+from tasks.collect import chunks_wanted, collect_chunk
+from tasks.curate import curate_chunk, curation_chunks, improve_chunk, improvement_chunks, keep_experiences
+from tasks.settings import RunError, RunSettings, for_preset
 
-PLAIN = replace(for_preset("smoke", classes=["random"], difficulty="easy"), experiences=2)
+PLAIN = replace(
+    for_preset("smoke", classes=["random"], difficulty="easy"), experiences=4, candidates=30, combined=True
+)
 
 
-def collected(data: Path, settings: RunSettings) -> list:
+def collected(data: Path, settings: RunSettings, backwards: bool = False) -> list:
+    """What is kept when chunks are done in their order, or in the other."""
     keep_settings(str(data), settings)
-    chunk = Chunk(str(data), settings, "random", 0, 0, 2, "key")
-    assert collect_chunk(chunk)["solved"] == 2
-    return read_experiences(chunk.run.shard("experiences", "random", 0))
+    done: dict[Chunk, dict[str, int]] = {}
+    while chunks := chunks_wanted(str(data), settings, done):
+        done |= {chunk: collect_chunk(chunk) for chunk in (reversed(chunks) if backwards else chunks)}
+    curated = curation_chunks(str(data), settings, done)
+    improved = improvement_chunks(str(data), settings, curated)
+    for do, of_stage in ((curate_chunk, curated), (improve_chunk, improved)):
+        for chunk in of_stage:
+            do(chunk)
+    keep_experiences(str(data), settings, curated, improved)
+    run = run_folder(str(data), settings)
+    assert len(read_experiences(run.experiences("combined"))) == settings.experiences
+    return read_experiences(run.experiences(settings.class_names[0]))
 
 
-def test_optimised_experiences_are_of_the_same_problems_shorter_and_lawful(tmp_path: Path) -> None:
-    plain = collected(tmp_path / "plain", PLAIN)
-    better = collected(tmp_path / "better", replace(PLAIN, optimised=True))
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> list:
+    return collected(tmp_path_factory.mktemp("plain"), PLAIN)
+
+
+def test_as_many_are_kept_as_asked_for_chosen_and_lawful(plain: list) -> None:
+    assert len(plain) == 4
+    assert {int(each.problem.id.rsplit("-")[-1]) for each in plain} != {0, 1, 2, 3}
+    assert all(faults(each.problem, each.plan) == [] for each in plain)
+
+
+def test_the_order_of_work_changes_nothing(tmp_path: Path, plain: list) -> None:
+    again = collected(tmp_path, PLAIN, backwards=True)
+    assert [each.problem.id for each in again] == [each.problem.id for each in plain]
+    assert all(np.array_equal(a.plan.states, b.plan.states) for a, b in zip(plain, again, strict=True))
+
+
+def test_optimised_experiences_are_of_the_same_problems_shorter_and_lawful(
+    tmp_path: Path, plain: list
+) -> None:
+    better = collected(tmp_path, replace(PLAIN, optimised=True))
     for old, new in zip(plain, better, strict=True):
         assert old.problem.id == new.problem.id
         assert new.plan.duration_s < old.plan.duration_s
         assert faults(new.problem, new.plan) == []
+
+
+def test_without_more_candidates_the_first_are_kept(tmp_path: Path) -> None:
+    kept = collected(tmp_path, replace(PLAIN, candidates=0))
+    assert [int(each.problem.id.rsplit("-")[-1]) for each in kept] == [0, 1, 2, 3]
+
+
+def test_a_folder_with_fewer_worlds_than_candidates_makes_do(tmp_path: Path, plain: list) -> None:
+    (tmp_path / "few" / "train").mkdir(parents=True)
+    (tmp_path / "few" / "test").mkdir()
+    settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "few"),))
+    place = run_folder(str(tmp_path / "data"), settings).worlds("few", "train")
+    write_problems(place, [each.problem for each in plain])
+    assert len(collected(tmp_path / "data", settings)) == 4
+    wanting = replace(settings, experiences=5)
+    write_problems(
+        run_folder(str(tmp_path / "data"), wanting).worlds("few", "train"), [each.problem for each in plain]
+    )
+    with pytest.raises(RunError, match="Class few: 4 of 4 problems solved, 5 are wanted"):
+        collected(tmp_path / "data", wanting)

@@ -19,7 +19,8 @@ from storage.results import read_attempts
 from tasks.benchmark import benchmark_chunk, benchmark_chunks
 from tasks.build_memory import build_chunk, memory_chunks
 from tasks.caching import keep_settings, run_folder
-from tasks.collect import chunks_wanted, collect_chunk, keep_experiences
+from tasks.collect import chunks_wanted, collect_chunk
+from tasks.curate import curate_chunk, curation_chunks, keep_experiences
 from tasks.draw import draw_chunk, figure_chunks
 from tasks.hallucinate import hallucinate_chunk, hallucination_chunks
 from tasks.settings import ASSISTS, for_preset
@@ -45,7 +46,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     done = {}
     while chunks := chunks_wanted(data, SETTINGS, done):
         done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-    keep_experiences(data, SETTINGS, done)
+    curated = curation_chunks(data, SETTINGS, done)
+    for chunk in curated:
+        curate_chunk(chunk)
+    keep_experiences(data, SETTINGS, curated, [])
     for chunks_of_stage, do in (
         (hallucination_chunks, hallucinate_chunk),
         (train_chunks, train_chunk),

@@ -1,0 +1,110 @@
+"""Curate: of all solved problems of a class keep the N of most use, and improve their plans if asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from planners.memory.curation import curate
+from planners.world.authority import faults
+from planners.world.problem import Plan, Problem
+from planners.world.vehicle import Vehicle, vehicle_named
+from storage.experiences import merge_experiences, read_experiences, replace_plans
+from storage.shards import shard_is_done
+from tasks.attempts import PlanFaultError
+from tasks.caching import Chunk, chunk_task, chunks_of, key_of, run_folder
+from tasks.collect import Results, experiences_key
+from tasks.settings import COMBINED, RunSettings
+
+IMPROVED_AT_ONCE: Final = 25  # plans, a second each
+CLEARANCE_WEIGHT: Final = 1.0  # buys most of a metre of clearance for half a second (docs/optimisation.md)
+
+
+def curate_chunk(chunk: Chunk) -> dict[str, Any]:
+    """Choose among the candidates of a class, which lie in shards ``first`` to before ``last``."""
+    run, settings, name = chunk.run, chunk.settings, chunk.class_name
+    vehicle = vehicle_named(settings.vehicle)
+    shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
+    candidates = [each for shard in shards for each in read_experiences(shard, vehicle)][: settings.wanted]
+    kept = curate(candidates, settings.experiences, vehicle).tolist()
+    merge_experiences(shards, run.shard("curated", name, 0), kept, chunk.key)
+    return {"candidates": len(candidates), "kept": len(kept)}
+
+
+curate_candidates = chunk_task(curate_chunk)
+
+
+def is_curated(chunk: Chunk) -> bool:
+    """Whether the choice of a class is there."""
+    return shard_is_done(chunk.run.shard("curated", chunk.class_name, 0), chunk.key)
+
+
+def curation_chunks(data: str, settings: RunSettings, done: Results) -> list[Chunk]:
+    """One chunk for each class, of all that was collected of it."""
+    chunks = []
+    for name in settings.class_names:
+        of_class = sorted((each for each in done if each.class_name == name), key=lambda each: each.index)
+        inputs = [settings.wanted, settings.experiences, *(each.key for each in of_class)]
+        chunks += chunks_of(data, settings, "curate", name, len(of_class), len(of_class), inputs)
+    return chunks
+
+
+def improve_chunk(chunk: Chunk) -> dict[str, Any]:
+    """Make a range of the kept plans of a class shorter and clearer, each checked by the authority."""
+    vehicle = vehicle_named(chunk.settings.vehicle)
+    curated = chunk.run.shard("curated", chunk.class_name, 0)
+    kept = read_experiences(curated, vehicle)[chunk.first : chunk.last]
+    plans = [_improved(each.problem, each.plan, vehicle) for each in kept]
+    for each, plan in zip(kept, plans, strict=True):
+        for wrong in faults(each.problem, plan, vehicle):
+            raise PlanFaultError(f"{each.problem.id} optimised: {wrong}")
+    place = chunk.run.shard("experiences", chunk.class_name, chunk.index)
+    replace_plans(curated, place, chunk.first, plans, chunk.key)
+    return {"improved": len(plans)}
+
+
+improve_kept = chunk_task(improve_chunk)
+
+
+def is_improved(chunk: Chunk) -> bool:
+    """Whether the chunk's shard is there."""
+    return shard_is_done(chunk.run.shard("experiences", chunk.class_name, chunk.index), chunk.key)
+
+
+def improvement_chunks(data: str, settings: RunSettings, curated: Sequence[Chunk]) -> list[Chunk]:
+    """Chunks of the kept plans of every class, if they are to be improved."""
+    return [
+        chunk
+        for each in curated
+        if settings.optimised
+        for chunk in chunks_of(
+            data, settings, "improve", each.class_name, settings.experiences, IMPROVED_AT_ONCE, [each.key]
+        )
+    ]
+
+
+def keep_experiences(
+    data: str, settings: RunSettings, curated: Sequence[Chunk], improved: Sequence[Chunk]
+) -> None:
+    """Write the kept experiences of each class as one file, and those of all classes if that is wanted."""
+    run = run_folder(data, settings)
+    for name in settings.class_names:
+        chunks = [chunk for chunk in improved or curated if chunk.class_name == name]
+        key = key_of("experiences", *(chunk.key for chunk in chunks))
+        shards = [run.shard("experiences" if improved else "curated", name, chunk.index) for chunk in chunks]
+        if not shard_is_done(run.experiences(name), key):
+            merge_experiences(shards, run.experiences(name), range(settings.experiences), key)
+    if settings.combined:
+        parts = [run.experiences(name) for name in settings.class_names]
+        key = key_of("combined", *(experiences_key(data, settings, name) for name in settings.class_names))
+        if not shard_is_done(run.experiences(COMBINED), key):
+            everything = range(settings.experiences * len(parts))
+            merge_experiences(parts, run.experiences(COMBINED), everything, key)
+
+
+def _improved(problem: Problem, plan: Plan, vehicle: Vehicle) -> Plan:
+    """The plan made shorter and clearer; as it is where that fails."""
+    from planners.optimisation.optimise import DEFAULT_SETTINGS, improve  # late: few runs need CasADi
+
+    objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=CLEARANCE_WEIGHT)
+    return improve(problem, plan, DEFAULT_SETTINGS._replace(objective=objective), vehicle)
