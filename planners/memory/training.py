@@ -36,7 +36,7 @@ class TrainingSettings:
     learning_rate: float = 3e-3  # the highest of a one-cycle schedule
     weight_decay: float = 0.1  # decoupled, AdamW
     first_weight: float = 1.0  # of the label objective: that a free plan comes first
-    origin_weight: float = 1.0  # of the label objective: that the plan a problem was made for does
+    origin_weight: float = 2.0  # of the label objective: that the plan a problem was made for does
     margin: float = 1.0  # of the triplet objective
     semi_hard: bool = False  # of the triplet objective: which triplets count
     architecture: Architecture = field(default_factory=Architecture)

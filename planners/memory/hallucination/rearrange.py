@@ -32,7 +32,7 @@ class Rearrange:
     what new problems look like an encoder has to learn from draws of the class beside these.
     """
 
-    near_m: float = 5.0  # metres
+    near_m: float = 8.0  # metres
     position_std_m: float = 0.3  # metres, in x and in y
     heading_std_rad: float = 0.05  # radians, about the obstacle's centre
     attempts: int = 20  # moves tried until one is clear of the plan; then the obstacle stays where it was
