@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -10,6 +11,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from planners.memory.training import Checkpoint, Epoch
+from storage.columns import Array
 from storage.files import whole_file
 
 _KEY: Final = "key"
@@ -25,12 +27,24 @@ def save_checkpoint(path: Path, checkpoint: Checkpoint, key: str) -> None:
 
 def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
     """The checkpoint of the training that ``key`` names; None where there is none: training begins anew."""
+    tensors = _tensors(path, key, Checkpoint._fields)
+    if tensors is None:
+        return None
+    rows = tensors.pop("history").tolist()
+    return Checkpoint(**tensors, history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in rows))
+
+
+def epochs_kept(path: Path, key: str) -> int:
+    """How many epochs of the training that ``key`` names are over; cheap enough to be asked all the time."""
+    tensors = _tensors(path, key, ("history",))
+    return 0 if tensors is None else len(tensors["history"])
+
+
+def _tensors(path: Path, key: str, names: Sequence[str]) -> dict[str, Array] | None:
     try:
         with safe_open(path, "np") as kept:
             if kept.metadata().get(_KEY) != key:
                 return None
-            tensors = {name: kept.get_tensor(name) for name in Checkpoint._fields}
+            return {name: kept.get_tensor(name) for name in names}
     except (OSError, SafetensorError):
         return None
-    rows = tensors.pop("history").tolist()
-    return Checkpoint(**tensors, history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in rows))

@@ -33,7 +33,7 @@ CHUNK_PROBLEMS: Final = 5_000  # some seconds of work
 NO_PLAN: Final = "no-plan"
 NO_PLAN_SHARE: Final = 0.05  # problems of S_0 for each one that is made for a plan
 DRAWN: Final = "drawn"
-DRAWN_SHARE: Final = 0.5  # likewise of problems as the class has them
+DRAWN_SHARE: Final = 1.0  # likewise of problems as the class has them
 ORIGIN: Final = "origin"  # a problem that was collected
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from planners.memory.training import Checkpoint, train
 from planners.world.vehicle import vehicle_named
-from storage.checkpoints import load_checkpoint, save_checkpoint
+from storage.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
 from storage.encoders import save_encoder
 from storage.hallucinated import Labelled, read_labelled
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
@@ -87,8 +87,7 @@ def epochs_done(chunks: Sequence[Chunk]) -> int:
 def _epochs_done(chunk: Chunk) -> int:
     if is_trained(chunk):
         return chunk.last - chunk.first
-    checkpoint = load_checkpoint(_checkpoint(chunk), chunk.key)
-    return len(checkpoint.history) if checkpoint else 0
+    return epochs_kept(_checkpoint(chunk), chunk.key)
 
 
 def problems_of_memory(data: str, settings: RunSettings, name: str) -> Labelled:

@@ -10,7 +10,7 @@ from tasks.local_server import local_server
 from tasks.settings import for_preset
 
 SETTINGS = replace(
-    for_preset("smoke", classes=["random", "trap"], seed=3),
+    for_preset("smoke", classes=["random", "trap"], seed=3, learning={"seeds": 2}),
     experiences=4,
     problems_per_experience=10,
     test_problems=6,

@@ -17,6 +17,7 @@ import pytest
 
 from storage.layout import DataFolder, RunFolder
 from storage.memories import load_memory
+from storage.recalls import read_recalls
 from tasks.settings import ABLATION, ASSISTS
 from tests.flows.same_rows import assert_same_rows, rows_of
 
@@ -86,6 +87,29 @@ def test_the_same_command_again_does_nothing_again(runs: tuple[RunFolder, RunFol
     assert all(path.stat().st_mtime_ns < finished for path in made)
 
 
+def test_recall_is_measured_for_each_memory_seed_and_protocol(runs: tuple[RunFolder, RunFolder]) -> None:
+    run = runs[0]
+    rows = read_recalls(
+        [path for name in ("random", "trap", "combined") for path in run.shards("recalls", name)]
+    )
+    asked = rows.groupby(["memory", "class", "protocol", "recall", "training_seed"])["problem_id"].nunique()
+    assert set(asked.index.droplevel([2, 3, 4])) == {
+        ("random", "random"), ("trap", "trap"), ("combined", "random"), ("combined", "trap")
+    }  # fmt: skip
+    ways = [("centroid", 0), ("centroid", 1), ("popularity", 0)]
+    assert (asked.groupby(level=[0, 1, 2]).size() == len(ways)).all()
+    assert (asked.xs("fresh", level="protocol") == 6).all()
+    held_out = rows[rows["protocol"] == "held-out"]
+    assert (rows.loc[rows["protocol"] == "fresh", "made_for"] == -1).all()
+    assert all(free[made_for] for free, made_for in zip(held_out["free"], held_out["made_for"], strict=True))
+    plans = {"random": range(4), "trap": range(4, 8)}  # of the combined memory, class by class
+    combined = held_out[held_out["memory"] == "combined"]
+    assert all(
+        made in plans[name] for name, made in zip(combined["class"], combined["made_for"], strict=True)
+    )
+    assert "origin@1" in (run.path / "retrieval.csv").read_text()
+
+
 def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder]) -> None:
     with sqlite3.connect(runs[0].path.parents[1] / "mlflow.db") as database:
         tags = database.execute("SELECT run_uuid, key, value FROM tags").fetchall()
@@ -94,16 +118,18 @@ def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder
     stages = {run: value for run, key, value in tags if key == "motion_memory.stage"}
     parents = {run: value for run, key, value in tags if key == "mlflow.parentRunId"}
     (parent,) = [run for run, stage in stages.items() if stage == "run"]
-    children = ["benchmark", "train combined", "train random", "train trap"]
+    trained = [f"train {name} seed {seed}" for name in ("combined", "random", "trap") for seed in (0, 1)]
+    children = ["benchmark", *trained]
     assert sorted(stages.values()) == sorted([*children, "run"])
     assert parents == {run: parent for run in stages if run != parent}
     assert {"loss", "hit_1", "hit_5", "trap/gust/none/mean_ms"} <= metrics
-    assert inputs == 4
+    assert inputs == 7
 
 
 def test_the_report_is_there(runs: tuple[RunFolder, RunFolder]) -> None:
     drawn = {path.name for path in runs[0].figures.iterdir()}
     assert {"planning-times.png", "retrieval.png", "problems-trap.png", "training-combined.png"} <= drawn
+    assert {"embeddings-trap.png", "embeddings-combined.png"} <= drawn
     assert "follow" in runs[0].summary("md").read_text()
 
 

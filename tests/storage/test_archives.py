@@ -13,7 +13,7 @@ from planners.memory.recall import RECALLS, recall
 from planners.memory.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
 from planners.world.vehicle import CAR, CAR_1_TRAILER, VEHICLES
 from planners.world.view import View
-from storage.checkpoints import load_checkpoint, save_checkpoint
+from storage.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
 from storage.encoders import load_encoder, save_encoder
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
@@ -99,6 +99,7 @@ def test_a_checkpoint_comes_back_for_its_own_training_only(tmp_path: Path) -> No
     assert loaded.history == checkpoint.history
     assert all(map(np.array_equal, loaded[1:], checkpoint[1:]))
     assert load_checkpoint(path, "b") is None
+    assert (epochs_kept(path, "a"), epochs_kept(path, "b")) == (1, 0)
     path.write_bytes(path.read_bytes()[:-1])
     assert load_checkpoint(path, "a") is None
 
