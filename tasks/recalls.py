@@ -30,7 +30,7 @@ from tasks.train import problems_of_memory
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 2_000
-HELD_OUT_PROBLEMS: Final = 10_000  # a class: a share within 1 %
+HELD_OUT_PROBLEMS: Final = 10_000  # a class, at most: a share within 1 %
 LONGEST_ORDER: Final = 100  # plans of a ranking that are kept: figures ask for some twenty
 
 
@@ -121,7 +121,9 @@ def _held_out(chunk: Chunk) -> Iterator[Asked]:
     classes = _classes(settings, name)
     places = problems.plan_index[of_plans] // settings.taught  # plans are stored class by class
     for place, class_name in enumerate(classes):
-        for i in of_plans[places == place][:HELD_OUT_PROBLEMS].tolist():
+        of_class = of_plans[places == place]
+        every = max(1, -(-len(of_class) // HELD_OUT_PROBLEMS))  # they are sorted by plan
+        for i in of_class[::every].tolist():
             yield Asked(
                 f"{name}-held-out-{i}",
                 class_name,

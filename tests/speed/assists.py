@@ -103,6 +103,8 @@ def _made(source: ProblemClass, count: int, hallucinated: int) -> Memory:
         rng = generator(COLLECTING, "no-plan", name, i)
         problems += [no_plan(sweeps, source.draw_obstacles, rng, name, j) for j in range(hallucinated // 20)]
         made_for += [i] * hallucinated + [-1] * (hallucinated // 20)
+    problems += [source.draw(COLLECTING, i) for i in range(index, index + count * hallucinated)]
+    made_for += [-1] * (count * hallucinated)
     packed, free = label_problems(problems, sweeps)
     index_of = np.array(made_for, np.int32)
     trained = train(packed, index_of, free, TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
