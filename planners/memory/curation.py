@@ -17,8 +17,9 @@ import numpy as np
 from planners.memory.experience import Experience
 from planners.memory.labelling import label_problems
 from planners.memory.labels import Flags, sweep_plans
-from planners.memory.masks import Masks, masks_of
+from planners.memory.masks import masks_of
 from planners.world.jit import jit
+from planners.world.occupancy import Bits
 from planners.world.problem import Floats, Integers
 from planners.world.vehicle import CAR, Vehicle
 
@@ -37,7 +38,7 @@ def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR)
     return choose(labels, masks_of(sweeps), count)
 
 
-def choose(labels: Flags, masks: Masks, count: int) -> Integers:
+def choose(labels: Flags, masks: Bits, count: int) -> Integers:
     """Numbers of ``count`` of N plans in the order of the greedy choice, near-duplicates after all others.
 
     ``labels [M, N]``: which plans are free in which problem. ``masks [N, 64]``: the plans' swept cells.
@@ -64,7 +65,7 @@ def choose(labels: Flags, masks: Masks, count: int) -> Integers:
     return order
 
 
-def similarity(masks: Masks, mask: Masks) -> Floats:
+def similarity(masks: Bits, mask: Bits) -> Floats:
     """Cells that plans ``[N, 64]`` share with one ``[64]``, of all that either sweeps: ``[N]``, 0 to 1.
 
     Nothing is like a plan that leaves the window, of which all cells are set.
