@@ -13,6 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from planners.memory.labels import START_TOLERANCE
+from planners.memory.nearly_free import least_blocked
 from planners.memory.recall import Memory, Recalled, default_recall, recall
 from planners.search.anytime import improve
 from planners.search.grid_path import grid_path
@@ -82,33 +83,28 @@ def turned(stored: Plan, heading: float) -> Plan:
     return Plan(states, stored.controls, stored.dt)
 
 
-def least_blocked(
+def nearly_free(
     memory: Memory, recalled: Sequence[int], view: View, vehicle: Vehicle
 ) -> tuple[tuple[Plan, Flags] | None, int]:
-    """The recalled plan with the fewest blocked states, and which these are; None where none begins here.
+    """The least blocked of the recalled plans, and which of its states are blocked; None: none begins here.
 
-    Also how many states were checked.
+    Also how many collision checks were made.
     """
-    problem = view.problem
-    best: tuple[Plan, Flags] | None = None
-    fewest: int | None = None
-    checks = 0
-    for i in recalled:
-        stored = turned(memory.plans[i], problem.start[2])
-        if math.dist(stored.states[0, :2], problem.start[:2]) > START_TOLERANCE:
-            continue
-        blocked, checked = blocked_states(stored, view.scene, vehicle, fewest)
-        checks += checked
-        if blocked is not None and (fewest is None or blocked.sum() < fewest):
-            best, fewest = (stored, blocked), int(blocked.sum())
+    order = np.array(recalled, np.int32)
+    best, checks = least_blocked(order, memory.sweeps, view.scene, view.problem.start)
+    found: tuple[Plan, Flags] | None = None
+    if best >= 0:
+        stored = turned(memory.plans[int(best)], view.problem.start[2])
+        blocked, checked = blocked_states(stored, view.scene, vehicle)
+        found, checks = (stored, blocked), checks + checked
     view.lap("check")
-    return best, checks
+    return found, int(checks)
 
 
 def guide_along(nearly: tuple[Plan, Flags] | None, view: View) -> Guide | None:
     """A guide along a recalled plan, if there is one, and a way over the grid, if there is one."""
     problem = view.problem
-    around = grid_path(view.grid, problem.start[:2], problem.goal, problem.goal_radius)
+    around = grid_path(view.bits, problem.start[:2], problem.goal, problem.goal_radius)
     ways = [each for each in (nearly and nearly[0].states, around) if each is not None]
     guide = guidance(ways) if ways else None
     view.lap("guide")
@@ -169,11 +165,10 @@ def solve(
         guide, prefix = None, None
         nearly = None
         if known is not None and use != "closed":
-            nearly, checked = least_blocked(known, recalled.plans, view, vehicle)
+            nearly, checked = nearly_free(known, recalled.plans, view, vehicle)
             checks += checked
         if use == "repair" and nearly is not None:
-            grid, scene = view.grid, view.scene
-            spent.append(repair(planner, problem, *nearly, grid, scene, rng, vehicle))
+            spent.append(repair(planner, problem, *nearly, view.bits, view.scene, rng, vehicle))
             answer, source = spent[0].plan, "repaired"
             view.lap("repair")
         if answer is None:

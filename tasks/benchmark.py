@@ -19,7 +19,7 @@ from tasks.attempts import attempt_row, check_attempt
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
-from tasks.warm_up import compile_repair
+from tasks.warm_up import compile_assists
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
@@ -60,7 +60,7 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
     asked = configurations(settings, name)
     rows: list[dict[str, Any]] = []
-    compile_repair(vehicle)
+    compile_assists(vehicle)
     for asked_first in asked:  # code and caches are warm before the first time counts
         _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
     with _no_garbage_collection():

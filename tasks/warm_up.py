@@ -9,17 +9,18 @@ from typing import Final
 
 import numpy as np
 
+from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.experience import Experience
 from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
+from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
+from planners.memory.recall import RECALLS, TRIED_DRAWN, Memory
 from planners.search.registry import PLANNERS
-from planners.search.repair import blocked_states, repair
 from planners.solve import solve
 from planners.world.classes import CLASSES, problem_class
-from planners.world.collision import scene_of
 from planners.world.dynamics import simulate
-from planners.world.occupancy import occupancy_of
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
@@ -68,23 +69,30 @@ def _compile_hallucination(vehicle: Vehicle) -> None:
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 
-def compile_repair(vehicle: Vehicle) -> None:
-    """What repair needs: a plan through an empty world, with a box put on it."""
+def compile_assists(vehicle: Vehicle) -> None:
+    """What a memory needs, by every strategy: of copies of one plan, with a box put on it."""
     plan = solve(EMPTY, COLLECTOR, vehicle=vehicle).plan
     if plan is None:
         return
+    plans = [plan] * (TRIED_DRAWN + 1)  # so that the last is checked with the scene
+    sweeps = sweep_plans(plans, vehicle)
+    architecture = Architecture()
+    readout = np.zeros((len(plans) + 1, architecture.dimensions), np.float32)
+    weights = initial_weights(architecture, generator(0))
+    masks = masks_of(sweeps)
+    biases = readout[:, 0].copy()
+    memory = Memory("empty", vehicle, plans, sweeps, masks, readout, readout, biases, "labels", weights)
     x, y = plan.states[len(plan.states) // 2, :2]
     box = np.array([[x - 1.0, y - 1.0], [x + 1.0, y - 1.0], [x + 1.0, y + 1.0], [x - 1.0, y + 1.0]])
     blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
-    scene = scene_of(blocked)
-    states, _ = blocked_states(plan, scene, vehicle)
-    if states is not None:
-        repair(COLLECTOR, blocked, plan, states, occupancy_of(blocked), scene, generator(0), vehicle)
+    for strategy in RECALLS:
+        for assist in ("open", "repair"):
+            solve(blocked, COLLECTOR, assist, 1, memory, vehicle=vehicle, strategy=strategy)
 
 
 def _compile_rest(vehicle: Vehicle) -> None:
     """What only the benchmark needs."""
-    compile_repair(vehicle)
+    compile_assists(vehicle)
     for planner in PLANNERS:
         for assist in ("none", "fresh"):
             solve(EMPTY, planner, assist, vehicle=vehicle)

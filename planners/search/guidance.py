@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -39,12 +41,17 @@ def guidance(ways: Sequence[Floats]) -> Guide:
     """
     if not ways:
         raise ValueError("there is no way to guide along: search without a guide")
-    weights: Floats = np.power(RATIO, np.arange(len(ways) + 2))
-    weights /= weights.sum()
     points = [spaced(way, SPACING_M) for way in ways]
+    starts = list(itertools.accumulate((len(each) for each in points), initial=0))
     return Guide(
-        np.concatenate(points),
-        np.cumsum([0] + [len(each) for each in points], dtype=np.int32),
-        weights[:-2],
-        float(weights[-2]),
+        points[0] if len(points) == 1 else np.concatenate(points),
+        np.array(starts, np.int32),
+        *_probabilities(len(ways)),
     )
+
+
+@functools.lru_cache(maxsize=16)
+def _probabilities(ways: int) -> tuple[Floats, float]:
+    weights: Floats = np.power(RATIO, np.arange(ways + 2))
+    weights /= weights.sum()
+    return weights[:-2].copy(), float(weights[-2])

@@ -21,7 +21,7 @@ from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.collision import Scene, state_is_free
 from planners.world.dynamics import load
 from planners.world.jit import lean
-from planners.world.occupancy import Grid
+from planners.world.occupancy import Bits
 from planners.world.problem import Floats, Plan, Problem
 from planners.world.trigonometry import length
 from planners.world.vehicle import CAR, Vehicle, state_size
@@ -48,25 +48,16 @@ REPAIR = RepairSettings()
 
 
 @lean
-def _fill_blocked(states: Floats, vehicle: Vehicle, scene: Scene, most: int, blocked: Flags) -> int:
-    count = 0
+def _fill_blocked(states: Floats, vehicle: Vehicle, scene: Scene, blocked: Flags) -> None:
     for i in range(states.shape[0]):
         blocked[i] = not state_is_free(load(states, i, vehicle), vehicle, scene)
-        count += blocked[i]
-        if count > most:
-            return i + 1
-    return states.shape[0]
 
 
-def blocked_states(
-    stored: Plan, scene: Scene, vehicle: Vehicle = CAR, most: int | None = None
-) -> tuple[Flags | None, int]:
-    """Which of a plan's states are not free, ``[T]``, and how many were checked; None: more than ``most``."""
-    count = len(stored.states)
-    blocked = np.empty(count, np.bool_)
-    limit = count if most is None else most
-    checked = int(_fill_blocked(np.ascontiguousarray(stored.states), vehicle, scene, limit, blocked))
-    return (blocked if checked == count else None), checked
+def blocked_states(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[Flags, int]:
+    """Which of a plan's states are not free, ``[T]``, and how many were checked."""
+    blocked = np.empty(len(stored.states), np.bool_)
+    _fill_blocked(np.ascontiguousarray(stored.states), vehicle, scene, blocked)
+    return blocked, len(blocked)
 
 
 def free_prefix(stored: Plan, blocked: Flags) -> Plan | None:
@@ -110,7 +101,7 @@ def repair(
     problem: Problem,
     stored: Plan,
     blocked: Flags,
-    grid: Grid,
+    occupied: Bits,
     scene: Scene,
     rng: np.random.Generator,
     vehicle: Vehicle = CAR,
@@ -118,8 +109,8 @@ def repair(
 ) -> Outcome:
     """Make a plan for ``problem`` of a ``stored`` one that begins at its start, ``blocked [T]`` in places.
 
-    The planner called ``name`` searches, the occupancy ``grid`` shows it the way around. Status when that
-    fails: ``BUDGET_SPENT``.
+    The planner called ``name`` searches, the ``occupied`` cells ``[64]`` show it the way around. Status when
+    that fails: ``BUDGET_SPENT``.
     """
     began = perf_counter()
     way = np.ascontiguousarray(stored.states)
@@ -137,7 +128,7 @@ def repair(
         to_goal = at == len(way) - 1
         disc = goal if to_goal else np.array([way[at, 0], way[at, 1], settings.rejoin_radius_m])
         target = (float(disc[0]), float(disc[1]))
-        around = grid_path(grid, (x, y), target, float(disc[2]))
+        around = grid_path(occupied, (x, y), target, float(disc[2]))
         guide = guidance([drive.states] if around is None else [around, drive.states])
         local = replace(problem, goal=target, goal_radius=float(disc[2]))
         limits = Limits(expansions=settings.expansions)

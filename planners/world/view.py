@@ -5,19 +5,18 @@ from __future__ import annotations
 from time import perf_counter
 
 from planners.world.collision import Scene, scene_of
-from planners.world.occupancy import Bits, Drawing, Grid, drawing_of, grid_of
+from planners.world.occupancy import Bits, Drawing, drawing_of
 from planners.world.problem import Problem
 
 
 class View:
-    """The drawing, the grid and the scene of a canonical problem. One at a time: they share buffers."""
+    """The drawing and the scene of a canonical problem. One view at a time: drawings share buffers."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.seconds: dict[str, float] = {}  # by part
         self.began = self._last = perf_counter()
         self._drawing: Drawing | None = None
-        self._grid: Grid | None = None
         self._scene: Scene | None = None
 
     def lap(self, part: str) -> None:
@@ -38,14 +37,6 @@ class View:
     def bits(self) -> Bits:
         """Bits ``[64]`` of the cells that are not free."""
         return self.drawing.occupied
-
-    @property
-    def grid(self) -> Grid:
-        """The same as a grid ``[64, 64]``."""
-        if self._grid is None:
-            self._grid = grid_of(self.bits)
-            self.lap("occupancy")
-        return self._grid
 
     @property
     def scene(self) -> Scene:

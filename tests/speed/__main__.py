@@ -18,6 +18,7 @@ SECTIONS: Final = {
     "vehicles": "tests.speed.vehicles",
     "peers": "tests.speed.peers.comparison",
     "assists": "tests.speed.assists",
+    "latency": "tests.speed.latency",
     "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",
     "hallucination": "tests.speed.hallucination",

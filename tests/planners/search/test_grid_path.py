@@ -6,14 +6,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from planners.search.grid_path import grid_path
-from planners.world.occupancy import CELL, GRID, occupancy_of
+from planners.world.occupancy import CELL, GRID, drawing_of, occupancy_of
 from planners.world.problem import BOUNDS
 from planners.world.vehicle import CAR
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 
 def path_of(problem):
-    return grid_path(occupancy_of(problem), problem.start[:2], problem.goal, problem.goal_radius)
+    return grid_path(drawing_of(problem).occupied, problem.start[:2], problem.goal, problem.goal_radius)
 
 
 def cells_of(points):

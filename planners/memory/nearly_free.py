@@ -1,0 +1,54 @@
+"""Of some stored plans the one that is nearly free: what repair mends, and an open box goes on from."""
+
+from __future__ import annotations
+
+import math
+
+from planners.memory.labels import START_TOLERANCE, PlanSweeps
+from planners.world.collision import Scene, box_is_free
+from planners.world.jit import lean
+from planners.world.problem import Integers
+
+SHARE = 4  # one box in so many is tried: sweeps have coarse steps first, so these lie evenly along the plan
+
+
+@lean
+def least_blocked(
+    order: Integers, sweeps: PlanSweeps, scene: Scene, start: tuple[float, float, float]
+) -> tuple[int, int]:
+    """The plan of ``order`` with the fewest blocked boxes (-1: none begins there), and the checks made.
+
+    Plans are turned rigidly about their first position to the start's heading; of equal ones the first.
+    """
+    boxes = sweeps.boxes
+    best = -1
+    fewest = 0
+    checks = 0
+    for i in order:
+        px = sweeps.first_poses[i, 0]
+        py = sweeps.first_poses[i, 1]
+        if abs(px - start[0]) > START_TOLERANCE or abs(py - start[1]) > START_TOLERANCE:
+            continue
+        cos = math.cos(start[2] - sweeps.first_poses[i, 2])
+        sin = math.sin(start[2] - sweeps.first_poses[i, 2])
+        first = sweeps.starts[i]
+        blocked = 0
+        for j in range(first, first + (sweeps.starts[i + 1] - first + SHARE - 1) // SHARE):
+            if best >= 0 and blocked >= fewest:
+                break
+            dx = boxes[j, 0] - px
+            dy = boxes[j, 1] - py
+            checks += 1
+            blocked += not box_is_free(
+                px + cos * dx - sin * dy,
+                py + sin * dx + cos * dy,
+                cos * boxes[j, 2] - sin * boxes[j, 3],
+                sin * boxes[j, 2] + cos * boxes[j, 3],
+                boxes[j, 4],
+                boxes[j, 5],
+                scene,
+            )
+        if best < 0 or blocked < fewest:
+            best = i
+            fewest = blocked
+    return best, checks
