@@ -130,7 +130,10 @@ def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
     settings = chunk.settings
     source = source_at(next(Path(f) for f in settings.worlds if world_class(f) == chunk.class_name))
     folder = chunk.run.path / "worlds" / chunk.class_name
-    counts = {"collect": CUT_AN_EXPERIENCE * settings.experiences, "test": settings.test_problems}
+    counts = {
+        "collect": max(CUT_AN_EXPERIENCE * settings.experiences, settings.wanted),
+        "test": settings.test_problems,
+    }
     skipped: list[str] = []
     for purpose, part in PARTS.items():
         asked = ImportSettings(

@@ -21,6 +21,7 @@ SECTIONS: Final = {
     "latency": "tests.speed.latency",
     "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",
+    "curation": "tests.speed.curation",
     "hallucination": "tests.speed.hallucination",
     "growth": "tests.speed.growth",
 }
