@@ -29,7 +29,7 @@ from storage.experiences import read_experiences
 from storage.files import read_text
 from storage.hallucinated import read_hallucinated_problems, read_labelled
 from storage.hallucinators import load_hallucinator
-from storage.layout import RunFolder, open_data_folder
+from storage.layout import RunFolder, Table, open_data_folder
 from storage.memories import load_memory
 from storage.recalls import read_recalls
 from storage.results import read_attempts
@@ -42,6 +42,7 @@ from tasks.train import memory_names
 from tasks.worlds import source_of
 
 LABELS_EVERY: Final = 50  # hallucinated problems whose grid and labels are drawn again
+COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
 SHOWN: Final = 20  # faults listed
 
 Findings = tuple[Counter[str], list[str]]  # what was checked, and what is wrong
@@ -85,8 +86,10 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
         raise RunError(f"{run.settings}: {error}") from None
     vehicle = vehicle_named(settings.vehicle)
     for name in memory_names(settings):
-        if run.experiences(name).exists():
-            yield partial(_experiences, run.experiences(name), vehicle)
+        shards = [path for table in COLLECTED for path in run.shards(table, name)]
+        for path in (run.experiences(name), *shards):
+            if path.exists():
+                yield partial(_experiences, path, vehicle)
         for path in run.shards("hallucinated", name):
             yield partial(_hallucinated, run, settings, name, path)
         if run.hallucinator(name).exists():

@@ -115,6 +115,7 @@ def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder
         tags = database.execute("SELECT run_uuid, key, value FROM tags").fetchall()
         metrics = {name for (name,) in database.execute("SELECT DISTINCT key FROM metrics")}
         inputs = database.execute("SELECT count(*) FROM datasets").fetchone()[0]
+        models = database.execute("SELECT name, source_run_id FROM logged_models").fetchall()
     stages = {run: value for run, key, value in tags if key == "motion_memory.stage"}
     parents = {run: value for run, key, value in tags if key == "mlflow.parentRunId"}
     (parent,) = [run for run, stage in stages.items() if stage == "run"]
@@ -124,6 +125,8 @@ def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder
     assert parents == {run: parent for run in stages if run != parent}
     assert {"loss", "hit_1", "hit_5", "trap/gust/none/mean_ms"} <= metrics
     assert inputs == 7
+    assert [name for name, _ in models] == ["memory"] * 3
+    assert {stages[run].split()[1] for _, run in models} == {"combined", "random", "trap"}
 
 
 def test_the_report_is_there(runs: tuple[RunFolder, RunFolder]) -> None:
