@@ -15,7 +15,7 @@ from planners.maps.regions import Blocks, Part, blocks_of, lie_in
 from planners.maps.surroundings import WINDOW, Surroundings
 from planners.search.grid_path import grid_path
 from planners.world.faults import problem_fault
-from planners.world.occupancy import occupancy_of
+from planners.world.occupancy import drawing_of
 from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Floats, Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import CAR, Vehicle
@@ -105,7 +105,7 @@ def is_drivable(problem: Problem, vehicle: Vehicle = CAR) -> bool:
     """Whether a cut problem makes sense, and a way over its grid, not too long, reaches the goal."""
     if problem_fault(problem, vehicle) is not None:
         return False
-    way = grid_path(occupancy_of(problem), problem.start[:2], problem.goal, problem.goal_radius)
+    way = grid_path(drawing_of(problem).occupied, problem.start[:2], problem.goal, problem.goal_radius)
     if way is None:
         return False
     return float(np.hypot(*np.diff(way, axis=0).T).sum()) <= LONGEST_WAY * CANONICAL_DISTANCE
