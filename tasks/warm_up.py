@@ -34,7 +34,7 @@ from planners.world.problem import (
 from planners.world.randomness import generator
 from planners.world.vehicle import Vehicle, vehicle_named
 from tasks.engine import Client
-from tasks.settings import COLLECTOR
+from tasks.settings import COLLECTOR, DEFAULT_MIXTURE
 
 EMPTY: Final = Problem(
     "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
@@ -56,16 +56,15 @@ def _compile_collecting(vehicle: Vehicle) -> None:
 
 
 def _compile_hallucination(vehicle: Vehicle) -> None:
-    """Drawing problems, and what hallucinate makes of them."""
+    """Drawing problems, and what hallucinate makes of them unless it is asked for another mixture."""
     controls = np.tile([vehicle.max_acceleration, 0.0], (140, 1))
     plan = Plan(simulate(start_state(EMPTY, vehicle), controls, vehicle), controls)
     end = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
     experience = Experience(replace(EMPTY, goal=end), plan, vehicle)
     for name in CLASSES:
         draw = problem_class(name, vehicle=vehicle).draw_obstacles
-        for method in ("rearrange", "maximal", "minimal"):
-            made = next(hallucinate(experience, {method: 1.0}, draw, generator(0)))
-            label_problems([made.problem], experience.sweep)
+        made = next(hallucinate(experience, dict(DEFAULT_MIXTURE), draw, generator(0)))
+        label_problems([made.problem], experience.sweep)
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 

@@ -84,6 +84,7 @@ def methods_table(data: str) -> Table:
                         pass
                 obstacles = (thread_time() - began) / PROBLEMS / len(part)
             chunk = hallucination_chunks(data, settings)[0]
+            hallucinate_chunk(replace(chunk, last=chunk.first + 1))  # compiles
             began = thread_time()
             problems = hallucinate_chunk(chunk)["problems"]
             whole = (thread_time() - began) / problems
