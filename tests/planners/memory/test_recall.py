@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -119,6 +120,20 @@ def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
 def test_exhaustive_finds_a_free_plan_if_and_only_if_there_is_one(memory, problem_in, seed, k, count):
     problem = problem_in(seed, count)
     assert (recalled_by(memory, problem, "exhaustive", k).free >= 0) == free_in(memory, problem).any()
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), first=st.integers(1, 7), count=st.integers(0, 12))
+def test_a_large_memory_finds_a_free_plan_if_and_only_if_there_is_one(
+    memory, problem_in, seed, k, first, count
+):
+    problem = problem_in(seed, count)
+    free = free_in(memory, problem)
+    with mock.patch("planners.memory.recall.ASKED_FIRST", first):
+        for strategy in ("exhaustive", "hybrid"):
+            found = recalled_by(memory, problem, strategy, k)
+            assert (found.free >= 0) == free.any()
+            assert len(set(found.plans)) == len(found.plans) <= k
+            assert found.free < 0 or (free[found.free] and found.free in found.plans)
 
 
 @given(seed=SEEDS, k=st.integers(1, 12), off=st.sampled_from([0.0, 0.01]))
