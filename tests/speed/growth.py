@@ -45,7 +45,7 @@ from planners.world.randomness import generator
 from planners.world.view import View
 from storage.memories import load_memory, save_memory
 from tests.speed.assists import KEPT, MEASURING
-from tests.speed.many_plans import collected_memory, collected_plans, synthetic_memory
+from tests.speed.many_plans import collected_memory, collected_plans, place_of, synthetic_memory
 
 NAME = "random"
 SIZES = (100, 1_000, 10_000)
@@ -66,7 +66,7 @@ def memory_of_size(size: int, difficulty: str, folder: Path) -> Memory:
     memory = collected_memory(source, plans[:collected], folder)  # views of the arrays
     if size == collected:
         return memory
-    place = folder / f"memory-{NAME}-{difficulty}-{size}"
+    place = place_of(source, size, folder)
     if not place.exists():
         save_memory(place, synthetic_memory(memory, size))
     return load_memory(place)
@@ -241,7 +241,7 @@ def report(
         add_recalls(recalls, memory, problems, free)
         if size >= SIZES[-1]:
             add_rankings(rankings, memory, problems, free)
-        add_loading(loading, folder / f"memory-{NAME}-{difficulty}-{size}", size)
+        add_loading(loading, place_of(problem_class(NAME, difficulty), size, folder), size)
     for each in (recalls, rankings, loading):
         console.print(each)
 

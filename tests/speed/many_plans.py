@@ -21,6 +21,7 @@ from planners.world.problem import Plan
 from planners.world.vehicle import CAR, state_size
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
+from tasks.caching import key_of
 from tests.speed.assists import COLLECTING, memory_of
 
 TAUGHT = 1_000  # plans that the encoder is trained on
@@ -35,7 +36,7 @@ _ARRAYS = ("states", "controls", "starts", "dt")
 
 def collected_plans(source: ProblemClass, count: int, folder: Path) -> StoredPlans:
     """Plans of the first problems that Follow solves, from where they are kept if they are there."""
-    place = folder / f"plans-{source.name}-{source.difficulty}-{count}"
+    place = folder / f"plans-{source.name}-{source.difficulty}-{count}-{key_of(COLLECTING)}"
     try:
         return StoredPlans(*(np.load(place / f"{name}.npy", mmap_mode="c") for name in _ARRAYS))
     except FileNotFoundError:
@@ -55,9 +56,14 @@ def collected_plans(source: ProblemClass, count: int, folder: Path) -> StoredPla
     return stored
 
 
+def place_of(source: ProblemClass, count: int, folder: Path) -> Path:
+    """Where the memory of that many plans is kept."""
+    return folder / f"{source.name}-{source.difficulty}-{count}-{key_of(COLLECTING, LEARNING, HALLUCINATED)}"
+
+
 def collected_memory(source: ProblemClass, plans: Sequence[Plan], folder: Path) -> Memory:
     """The memory of these plans, its encoder trained on the first, from where it is kept if it is there."""
-    place = folder / f"memory-{source.name}-{source.difficulty}-{len(plans)}"
+    place = place_of(source, len(plans), folder)
     try:
         return load_memory(place)
     except StorageError:
