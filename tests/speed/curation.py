@@ -151,7 +151,7 @@ def main(asked: list[str]) -> None:
     place = Path(asked[1]) if asked[:1] == ["--picture"] else None
     folders = [Path(name) for name in (asked[2:] if place else asked)]
     classes = [imported(folder) for folder in folders] or [generated(name) for name in CLASSES]
-    Console(width=150).print(table(classes))
+    Console(width=170).print(table(classes))
     if place:
         draw(classes, place)
 
