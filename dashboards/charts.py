@@ -1,9 +1,6 @@
-"""Figures of planning times, retrieval and training: tables in, a matplotlib figure out, nothing else."""
+"""Figures of retrieval, training and improved plans: tables in, a matplotlib figure out, nothing else."""
 
 from __future__ import annotations
-
-import math
-from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -11,73 +8,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, PercentFormatter, StrMethodFormatter
 
-from dashboards.statistics import PLANNERS, ranked
+from dashboards.statistics import PLANNERS
 from dashboards.style import (
     BLUE,
     GREEN,
     GREY,
     INK,
     NOTE_SIZE,
-    ORANGE,
-    SKY,
     VERMILLION,
-    YELLOW,
     message_figure,
     new_figure,
+    planner_title,
     tidy,
 )
-
-PLANNING_TIME_NOTE: Final = (
-    "Planning time is everything from receiving the obstacles to returning a plan: drawing the grid, "
-    "encoding, recall, checking recalled plans, the planner's own structures, search. One problem at a time, "
-    "one thread, compiled code warm. Failures keep their time."
-)
-CONTROLS_NOTE: Final = (
-    "closed, open, repair: with the recall that is best for the memory, and as many plans as said. enc.: "
-    "with what the encoder recalls alone, as in the paper. fresh guide, a control: no memory, the planner is "
-    "led along a way over the occupancy grid."
-)
-PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
-
-_ENCODER: Final = "centroid"
-_BARS: Final = {  # assist, whether the encoder alone recalled, top k
-    ("none", False, 0): ("none", GREY),
-    ("closed", False, 5): ("closed\n5", BLUE),
-    ("open", False, 5): ("open\n5", VERMILLION),
-    ("repair", False, 5): ("repair\n5", GREEN),
-    ("closed", True, 1): ("enc.\nclosed\n1", SKY),
-    ("closed", True, 5): ("enc.\nclosed\n5", SKY),
-    ("open", True, 1): ("enc.\nopen\n1", ORANGE),
-    ("open", True, 5): ("enc.\nopen\n5", ORANGE),
-    ("fresh", False, 0): ("fresh\nguide", YELLOW),
-}
-
-
-def planning_times(summary: pd.DataFrame) -> Figure:
-    """Mean planning time alone, with the memory and its best recall, with the encoder's, and a control.
-
-    A row a planner, a column a class.
-    ``summary`` is ``statistics.summarise``'s. Whiskers are its 95 % intervals; each bar but the baseline's
-    carries the change of the mean against the baseline, and the baseline's its time.
-    """
-    title = "Mean planning time with and without memory"
-    if summary.empty:
-        return message_figure(title, "No attempts to show: run the benchmark first.")
-    planners = ranked(summary["planner"], PLANNERS)
-    panels = list(summary["panel"].unique())
-    whiskers = "Whiskers: 95 % bootstrap intervals of the mean, problems resampled."
-    note = f"{PLANNING_TIME_NOTE}\n{CONTROLS_NOTE}\n{whiskers}"
-    figure = new_figure(max(5.6, 4.3 * len(panels) + 0.5), 2.3 * len(planners) + 1.5, title, note)
-    grid = figure.subplots(len(planners), len(panels), squeeze=False)
-    for i, planner in enumerate(planners):
-        for j, panel in enumerate(panels):
-            _bars(grid[i, j], summary[(summary["planner"] == planner) & (summary["panel"] == panel)])
-            if i == 0:
-                count = summary.loc[summary["panel"] == panel, "problems"].max()
-                grid[i, j].set_title(f"{panel}\n{count:,} problems", fontsize=10, color=INK, pad=8)
-        name = PLANNER_TITLES.get(planner, planner)
-        grid[i, 0].set_ylabel(f"{name}\nmean planning time, ms", fontsize=9, color=INK)
-    return figure
 
 
 def retrieval_curves(curve: pd.DataFrame) -> Figure:
@@ -159,9 +102,7 @@ def anytime_curves(history: pd.DataFrame) -> Figure:
             axes.fill_between(
                 rows["seconds"], rows["low_s"], rows["high_s"], color=colour, alpha=0.15, linewidth=0
             )
-            axes.plot(
-                rows["seconds"], rows["mean_s"], color=colour, label=PLANNER_TITLES.get(planner, planner)
-            )
+            axes.plot(rows["seconds"], rows["mean_s"], color=colour, label=planner_title(planner))
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
@@ -173,59 +114,6 @@ def anytime_curves(history: pd.DataFrame) -> Figure:
     figure.axes[0].set_ylabel("mean driving time, s", fontsize=9, color=INK)
     figure.axes[0].legend(loc="upper right", frameon=False, fontsize=9)
     return figure
-
-
-def _bars(axes: Axes, rows: pd.DataFrame) -> None:
-    """The bars of one panel; a configuration without attempts is said to be missing."""
-    by_key = {
-        (row["assist"], row["recall"] == _ENCODER, int(row["top_k"])): row for _, row in rows.iterrows()
-    }
-    top = max((by_key[key]["mean_high_ms"] for key in _BARS if key in by_key), default=1.0)
-    axes.set_ylim(0.0, 1.22 * top)
-    for x, (key, (_, colour)) in enumerate(_BARS.items()):
-        if key not in by_key:
-            axes.text(x, 0.04 * top, "no attempts", rotation=90, ha="center", fontsize=8, color=GREY)
-            continue
-        mean, low, high = (
-            float(by_key[key][column]) for column in ("mean_ms", "mean_low_ms", "mean_high_ms")
-        )
-        reduction = float(by_key[key]["reduction"])
-        axes.bar(x, mean, width=0.72, color=colour)
-        axes.errorbar(x, mean, [[mean - low], [high - mean]], color=INK, linewidth=1.0, capsize=2.5)
-        axes.annotate(
-            _duration(mean) if key == ("none", False, 0) else _change(reduction),
-            (x, high),
-            (0, 4),
-            textcoords="offset points",
-            ha="center",
-            fontsize=8.5,
-            color=INK,
-            fontweight="bold" if reduction < 0.0 else "normal",  # slower than without memory stands out
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-        )
-    axes.set_xticks(range(len(_BARS)), [label for label, _ in _BARS.values()])
-    axes.set_xlim(-0.7, len(_BARS) - 0.4)
-    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
-    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:,.6g}"))
-    tidy(axes)
-    axes.tick_params(axis="x", length=0, labelsize=8.5)
-
-
-def _duration(milliseconds: float) -> str:
-    """Three digits in the unit that suits them: 83.4 µs, 4.90 ms, 1.26 s."""
-    units = (("s", 1e3), ("ms", 1.0), ("µs", 1e-3))
-    unit, size = next((each for each in units if milliseconds >= each[1]), units[-1])
-    value = milliseconds / size
-    decimals = 2 if value <= 0.0 else max(0, 2 - math.floor(math.log10(value)))
-    return f"{value:.{min(2, decimals)}f} {unit}"
-
-
-def _change(reduction: float) -> str:
-    """What a bar says of its mean against the baseline's: −61 %, −98.9 %, +15 %; a dash without baseline."""
-    if math.isnan(reduction):
-        return "–"
-    decimals = 1 if reduction > 0.97 else 0
-    return f"{-100.0 * reduction:+.{decimals}f} %".replace("-", "−")
 
 
 def _retrieval(axes: Axes, rows: pd.DataFrame, colour: str) -> None:

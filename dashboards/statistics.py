@@ -1,90 +1,155 @@
 """What the attempt rows say: times, solved shares and reductions, paired by problem.
 
-Failures stay in every figure with the time they took; a mean over survivors is never formed.
+Failures stay in every figure: with the time they took in means and quantiles, as slower than every success
+where two attempts are compared. A mean over survivors is never formed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
-from typing import Any, Final
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from dashboards.intervals import (
+    RESAMPLES,
+    bootstrap,
+    interquartile_mean,
+    interval,
+    quantile_interval,
+    ratio,
+)
+from dashboards.signs import holm, signs
 from planners.world.problem import Floats
+from storage.configurations import BASELINE, Configuration, configured
 
-RESAMPLES: Final = 2000  # the ends of a 95 % interval then stand on 50 resamples each
-CONFIDENCE: Final = 0.95
 COMBINED: Final = "combined"  # the memory of all classes; its attempts form a panel of their own
-
 PANELS: Final = ("curves", "random", "trap")
 PLANNERS: Final = ("rrt", "gust", "follow")
-ASSISTS: Final = (
-    "none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair",
-)  # fmt: skip
-RECALLS: Final = ("exhaustive", "hybrid", "mask", "centroid", "random")
-
-_CHUNK_VALUES: Final = 2_000_000  # resampled counts held at once: 16 MB
 
 
-def panels(attempts: pd.DataFrame) -> dict[str, pd.DataFrame]:
+class Panel(NamedTuple):
+    """All attempts of one class with its own memory, or of all classes with the combined one."""
+
+    name: str
+    rows: pd.DataFrame  # with a column ``cell``: the flat place in [problems, columns] that the row is for
+    problems: int
+    columns: list[tuple[str, Configuration]]  # planner and configuration, in reading order
+
+    def matrix(self, column: str) -> Floats:
+        """A number of each row, ``[problems, columns]``; NaN where not attempted, the mean where repeated."""
+        size = self.problems * len(self.columns)
+        cells = self.rows["cell"].to_numpy()
+        sums = np.bincount(cells, self.rows[column].to_numpy(float), minlength=size).astype(np.float64)
+        counts = np.bincount(cells, minlength=size).astype(np.float64)
+        return ratio(sums, counts).reshape(self.problems, -1)
+
+    def milliseconds(self) -> Floats:
+        """Planning times, failures with the time they took."""
+        return 1e3 * self.matrix("planning_seconds")
+
+    def censored(self) -> Floats:
+        """Planning times in milliseconds, infinite where an attempt failed: all that is known is "longer"."""
+        solved = self.matrix("solved")
+        return np.where(solved < 1.0, np.inf, self.milliseconds())
+
+    def column(self, planner: str, wanted: Configuration) -> int | None:
+        """The place of a planner's configuration, if it was attempted."""
+        return self.columns.index((planner, wanted)) if (planner, wanted) in self.columns else None
+
+    def baseline(self, values: Floats) -> Floats:
+        """Each column's values ``[problems, columns]`` of its planner without memory; NaN if not there."""
+        places = [self.column(planner, BASELINE) for planner, _ in self.columns]
+        nothing = np.full(self.problems, np.nan)
+        return np.column_stack([nothing if i is None else values[:, i] for i in places])
+
+
+def panels(attempts: pd.DataFrame) -> Iterator[Panel]:
     """Attempt rows by panel: each class with its own memory, then all with the combined memory, if any.
 
     Attempts without memory belong to both.
     """
-    combined = attempts["memory"] == COMBINED
-    alone = attempts["memory"].isna()
-    own = attempts[alone | ~combined]
-    found = {name: own[own["problem_class"] == name] for name in ranked(own["problem_class"], PANELS)}
+    rows, known = configured(attempts)
+    combined = (rows["memory"] == COMBINED).to_numpy(bool)
+    alone = rows["memory"].isna().to_numpy()
+    planners, classes = rows["planner"].astype("category"), rows["problem_class"].astype("category")
+    rows = rows.assign(planner=planners, problem_class=classes)
+    own = rows[alone | ~combined]
+    for name in ranked(classes.cat.categories, PANELS):
+        of_class = own[own["problem_class"] == name]
+        if len(of_class):
+            yield _panel(name, of_class, known)
     if (combined & ~alone).any():
-        found[COMBINED] = attempts[alone | combined]
-    return found
+        yield _panel(COMBINED, rows[alone | combined], known)
 
 
 def summarise(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
-    """One row per panel, planner, assist, recall and top_k, in reading order.
+    """One row per panel, planner and configuration, in reading order, with the columns of ``COLUMNS``.
 
-    Columns ``panel, planner, assist, recall, top_k, problems, solved, mean_ms, mean_low_ms, mean_high_ms,
-    median_ms, p90_ms, reduction, reduction_low, reduction_high, recalled, collision_checks``. Shares and
-    reductions are fractions; ``reduction`` is that of mean planning time against the same planner's ``none``
-    on the problems that both attempted (NaN where there are none), with a bootstrap interval that resamples
-    problems.
+    Times are milliseconds; ``_low`` and ``_high`` are the ends of bootstrap 95 % intervals; shares and
+    reductions are fractions. ``reduction``: of mean planning time against the same planner without memory on
+    the problems that both attempted (NaN where there are none). ``slower, slowdown, p_value``: of
+    ``signs.Signs``, the last corrected by Holm for all comparisons of the table.
     """
+    tables = [_summarise(panel, seed, resamples) for panel in panels(attempts)]
+    if not tables:
+        return pd.DataFrame(columns=list(COLUMNS))
+    summary = pd.concat(tables, ignore_index=True)
+    return summary.assign(p_value=holm(summary["p_value"].to_numpy(float)))[list(COLUMNS)]
+
+
+def summarise_continual(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
+    """``summarise`` for each number of experiences in the column ``experiences``, and that column before."""
     tables = [
-        _summarise_panel(name, rows, seed, resamples)
-        for name, rows in panels(attempts.assign(**_asked(attempts))).items()
+        summarise(rows, seed, resamples).assign(experiences=count)
+        for count, rows in attempts.groupby("experiences")
     ]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(_COLUMNS))
+    summary = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(COLUMNS))
+    return summary.reindex(columns=["experiences", *COLUMNS])
 
 
-def bootstrap(milliseconds: Floats, baseline: Floats, seed: int, resamples: int) -> tuple[Floats, Floats]:
-    """Resampled means and reductions, each ``[resamples, C]``, of times against baseline, both ``[n, C]``.
+def compare(
+    attempts: pd.DataFrame,
+    pairs: Sequence[tuple[Configuration, Configuration]],
+    column: str = "planning_seconds",
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> pd.DataFrame:
+    """How much less of ``column`` the second configuration of each pair needs than the first.
 
-    One row is one problem, NaN where it was not attempted. Every resample draws the same problems for all
-    columns, so what a problem is hard for falls on all alike. NaN where a resample has nothing to compare.
+    One row per panel, planner and pair of which both were attempted: ``panel, planner, before, after``
+    (labels), ``reduction`` of the mean on the same problems as a fraction, ``reduction_low, reduction_high``.
     """
-    generator = np.random.default_rng(seed)
-    n, columns = milliseconds.shape
-    there = ~np.isnan(milliseconds)
-    both = there & ~np.isnan(baseline)
-    summands = np.concatenate(
-        [
-            np.where(there, milliseconds, 0.0),
-            there,
-            np.where(both, milliseconds, 0.0),
-            np.where(both, baseline, 0.0),
-        ],
-        axis=1,
-    )
-    sums = np.empty((resamples, 4 * columns))
-    chunk = max(1, _CHUNK_VALUES // n)
-    for first in range(0, resamples, chunk):
-        size = min(chunk, resamples - first)
-        drawn = generator.integers(n, size=(size, n)) + n * np.arange(size)[:, None]
-        counts = np.bincount(drawn.ravel(), minlength=size * n).reshape(size, n)
-        sums[first : first + size] = counts.astype(np.float64) @ summands
-    total, attempted, with_memory, without = np.split(sums, 4, axis=1)
-    return _ratio(total, attempted), 1.0 - _ratio(with_memory, without)
+    tables = []
+    for panel in panels(attempts):
+        found = [
+            (planner, before, after, i, j)
+            for planner in dict.fromkeys(planner for planner, _ in panel.columns)
+            for before, after in pairs
+            if (i := panel.column(planner, before)) is not None
+            and (j := panel.column(planner, after)) is not None
+        ]
+        if found:
+            values = panel.matrix(column)
+            first = values[:, [i for *_, i, _ in found]]
+            second = values[:, [j for *_, j in found]]
+            low, high = interval(bootstrap(second, first, seed, resamples).reductions)
+            tables.append(
+                pd.DataFrame(
+                    {
+                        "panel": panel.name,
+                        "planner": [each[0] for each in found],
+                        "before": [each[1].label for each in found],
+                        "after": [each[2].label for each in found],
+                        "reduction": _reduction(second, first),
+                        "reduction_low": low,
+                        "reduction_high": high,
+                    }
+                )
+            )
+    names = ["panel", "planner", "before", "after", "reduction", "reduction_low", "reduction_high"]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=names)
 
 
 def ranked(names: Iterable[Hashable], known: tuple[str, ...]) -> list[str]:
@@ -93,82 +158,70 @@ def ranked(names: Iterable[Hashable], known: tuple[str, ...]) -> list[str]:
     return [name for name in known if name in distinct] + sorted(distinct.difference(known))
 
 
-_COLUMNS: Final = (
-    "panel", "planner", "assist", "recall", "top_k", "problems", "solved", "mean_ms", "mean_low_ms",
-    "mean_high_ms", "median_ms", "p90_ms", "reduction", "reduction_low", "reduction_high", "recalled",
-    "collision_checks",
+COLUMNS: Final = (
+    "panel", "planner", "configuration", "assist", "recall", "top_k", "problems", "solved",
+    "mean_ms", "mean_low_ms", "mean_high_ms",
+    "interquartile_mean_ms", "interquartile_mean_low_ms", "interquartile_mean_high_ms",
+    "median_ms", "median_low_ms", "median_high_ms", "p90_ms", "p90_low_ms", "p90_high_ms",
+    "reduction", "reduction_low", "reduction_high", "slower", "slowdown", "p_value",
+    "recalled", "collision_checks",
 )  # fmt: skip
 
 
-def _asked(attempts: pd.DataFrame) -> dict[str, pd.Series[Any]]:
-    """What was recalled, and how: nothing and not at all without assistance, so one baseline a planner."""
-    assisted = attempts["assist"] != "none"
-    return {
-        "top_k": attempts["top_k"].where(assisted, 0).astype(int),
-        "recall": attempts["recall"].where(assisted).fillna(""),
-    }
-
-
-def _summarise_panel(panel: str, rows: pd.DataFrame, seed: int, resamples: int) -> pd.DataFrame:
-    """The summary of one panel: one row per planner and configuration."""
-    keys = ["planner", "assist", "recall", "top_k"]
-    rows = rows.assign(
-        milliseconds=1e3 * rows["planning_seconds"],
-        solved=rows["solved"].astype(float),
-        was_recalled=(rows["source"] == "recalled").astype(float),
+def _panel(name: str, rows: pd.DataFrame, known: dict[str, Configuration]) -> Panel:
+    """Find each row's place; problems are sorted, so that the order of the rows cannot change a result."""
+    meant = list(known.values())
+    planners = ranked(rows["planner"].unique(), PLANNERS)
+    place = {planner: i for i, planner in enumerate(planners)}
+    first = rows["planner"].cat.rename_categories(
+        {each: place.get(each, -1) for each in rows["planner"].cat.categories}
     )
-    grouped = rows.groupby(keys, sort=False)
-    table = grouped.agg(
-        problems=("problem_id", "nunique"),
-        solved=("solved", "mean"),
-        median_ms=("milliseconds", "median"),
-        p90_ms=("milliseconds", lambda times: times.quantile(0.9)),
-        recalled=("was_recalled", "mean"),
-        collision_checks=("collision_checks", "mean"),
+    wanted = first.astype(int).to_numpy() * len(meant) + rows["configuration"].cat.codes.to_numpy(int)
+    there, column = np.unique(wanted, return_inverse=True)
+    problem, problems = pd.factorize(rows["problem_id"], sort=True)
+    cells = problem * len(there) + column
+    columns = [(planners[i // len(meant)], meant[i % len(meant)]) for i in there.tolist()]
+    return Panel(name, rows.assign(cell=cells), len(problems), columns)
+
+
+def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
+    """The summary of one panel; its p-values are not corrected yet."""
+    times = panel.milliseconds()
+    baseline = panel.baseline(times)
+    resampled = bootstrap(times, baseline, seed, resamples, interquartile=True)
+    table = pd.DataFrame([each._asdict() for _, each in panel.columns])
+    table["configuration"] = [each.label for _, each in panel.columns]
+    table["planner"] = [planner for planner, _ in panel.columns]
+    table["panel"] = panel.name
+    table["problems"] = (~np.isnan(times)).sum(axis=0)
+    table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
+    recalled = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
+    table["recalled"] = np.nanmean(panel._replace(rows=recalled).matrix("recalled"), axis=0)
+    table["collision_checks"] = np.nanmean(panel.matrix("collision_checks"), axis=0)
+    table["mean_ms"] = np.nanmean(times, axis=0)
+    table["mean_low_ms"], table["mean_high_ms"] = interval(resampled.means)
+    table["interquartile_mean_ms"] = [interquartile_mean(column) for column in times.T]
+    table["interquartile_mean_low_ms"], table["interquartile_mean_high_ms"] = interval(
+        resampled.interquartile_means
     )
-    planner_rank = {name: i for i, name in enumerate(ranked(rows["planner"], PLANNERS))}
-    assist_rank = {name: i for i, name in enumerate(ranked(rows["assist"], ASSISTS))}
-    recall_rank = {name: i for i, name in enumerate(ranked(rows["recall"], RECALLS))}
-    order = sorted(
-        table.index,
-        key=lambda key: (planner_rank[key[0]], assist_rank[key[1]], recall_rank[key[2]], key[3]),
-    )
-    table = table.loc[order]
-
-    # Sorted by problem, so that the order of the rows cannot change the result.
-    times = rows.pivot_table(
-        index="problem_id", columns=keys, values="milliseconds", aggfunc="mean"
-    ).sort_index()
-    measured = times[order].to_numpy(dtype=float)
-    nothing = np.full(len(times), np.nan)
-    baseline = np.column_stack(
-        [
-            times[key].to_numpy(float) if (key := (planner, "none", "", 0)) in table.index else nothing
-            for planner, *_ in order
-        ]
-    )
-    means, reductions = bootstrap(measured, baseline, seed, resamples)
-    both = ~np.isnan(measured) & ~np.isnan(baseline)
-    spent = np.where(both, measured, 0.0).sum(axis=0)
-    table["reduction"] = 1.0 - _ratio(spent, np.where(both, baseline, 0.0).sum(axis=0))
-    table["reduction_low"], table["reduction_high"] = _interval(reductions)
-    table["mean_ms"] = np.nanmean(measured, axis=0)
-    table["mean_low_ms"], table["mean_high_ms"] = _interval(means)
-    return table.reset_index().assign(panel=panel)[list(_COLUMNS)]
+    for name, share in (("median", 0.5), ("p90", 0.9)):
+        table[f"{name}_ms"] = np.nanquantile(times, share, axis=0)
+        ends = np.array([quantile_interval(column, share) for column in times.T])
+        table[f"{name}_low_ms"], table[f"{name}_high_ms"] = ends.T
+    table["reduction"] = _reduction(times, baseline)
+    table["reduction_low"], table["reduction_high"] = interval(resampled.reductions)
+    censored = panel.censored()
+    compared = [
+        signs(mine, other) for mine, other in zip(censored.T, panel.baseline(censored).T, strict=True)
+    ]
+    of_baseline = [each == BASELINE for _, each in panel.columns]
+    for name in ("slower", "slowdown", "p_value"):
+        table[name] = [getattr(each, name) for each in compared]
+        table.loc[of_baseline, name] = np.nan
+    return table
 
 
-def _ratio(above: Floats, below: Floats) -> Floats:
-    """``above / below``, NaN where there is nothing below."""
-    quotient = np.full(above.shape, np.nan)
-    np.divide(above, below, out=quotient, where=below > 0.0)
-    return quotient
-
-
-def _interval(resampled: Floats) -> tuple[Floats, Floats]:
-    """Ends ``[C]`` of the percentile interval of ``[resamples, C]``; NaN for a column without data."""
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    ends = np.full((2, resampled.shape[1]), np.nan)
-    filled = ~np.isnan(resampled).all(axis=0)
-    if filled.any():
-        ends[:, filled] = np.nanquantile(resampled[:, filled], [tail, 1.0 - tail], axis=0)
-    return ends[0], ends[1]
+def _reduction(values: Floats, baseline: Floats) -> Floats:
+    """One less the ratio of the means ``[C]`` over the problems that both attempted."""
+    both = ~np.isnan(values) & ~np.isnan(baseline)
+    return 1.0 - ratio(np.where(both, values, 0.0).sum(axis=0), np.where(both, baseline, 0.0).sum(axis=0))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -25,11 +28,18 @@ INK: Final = "#333333"
 PALE: Final = "#E4E4E4"
 
 NOTE_SIZE: Final = 8.0
+PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
+LEGEND_COLUMNS: Final = 6
 _DPI: Final = 160
 _NOTE_LETTERS_AN_INCH: Final = 16.5  # at NOTE_SIZE, with room to spare
 
 # Identifiers in an SVG are drawn from this instead of the clock: the same rows give the same file.
 matplotlib.rcParams["svg.hashsalt"] = "motion-memory"
+
+
+def planner_title(planner: str) -> str:
+    """A planner's name as it is written."""
+    return PLANNER_TITLES.get(planner, planner)
 
 
 def new_figure(width: float, height: float, title: str, note: str = "") -> Figure:
@@ -45,6 +55,20 @@ def new_figure(width: float, height: float, title: str, note: str = "") -> Figur
         note = "\n".join(textwrap.fill(paragraph, letters) for paragraph in note.splitlines())
         figure.supxlabel(note, x=0.012, ha="left", fontsize=NOTE_SIZE, color="#555555", linespacing=1.4)
     return figure
+
+
+def panels_below_legend(figure: Figure, rows: int, columns: int, entries: Mapping[str, Any]) -> Any:
+    """Axes ``[rows, columns]`` below a strip with a legend of ``entries``, label to what it stands for."""
+    lines = math.ceil(len(entries) / LEGEND_COLUMNS)
+    strip = 0.2 * lines / (figure.get_figheight() / rows)
+    layout = figure.add_gridspec(rows + 1, columns, height_ratios=[strip, *[1.0] * rows])
+    legend = figure.add_subplot(layout[0, :])
+    legend.set_axis_off()
+    legend.legend(
+        list(entries.values()), list(entries), loc="center left", ncols=LEGEND_COLUMNS, frameon=False,
+        fontsize=NOTE_SIZE + 0.5, borderaxespad=0.0,
+    )  # fmt: skip
+    return np.array([[figure.add_subplot(layout[i + 1, j]) for j in range(columns)] for i in range(rows)])
 
 
 def message_figure(title: str, message: str) -> Figure:
@@ -71,6 +95,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     A file appears whole or not at all, and the same figure gives the same bytes. StorageError: no room, no
     permission.
     """
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # the layout is found: it takes longer than the drawing
     paths = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = folder / f"{name}.{kind}"

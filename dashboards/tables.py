@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -12,58 +12,65 @@ from rich import box
 from rich.console import Group
 from rich.table import Table
 
-from dashboards.statistics import ASSISTS, PLANNERS, RECALLS, ranked
+from dashboards.statistics import PLANNERS, ranked
+from dashboards.verdicts import Claim
 from planners.world.problem import Floats
+from storage.configurations import Configuration
 
 NOTHING: Final = "–"
 _HEADINGS: Final = (
-    "planner", "assist", "solved %", "mean ms", "median", "90 %", "reduction % [95 %]", "recalled",
-    "checks",
+    "planner", "configuration", "solved", "mean", "median", "90 %", "reduction % [95 %]", "slower",
+    "hits", "checks",
 )  # fmt: skip
-_RETRIEVAL_HEADINGS: Final = (
+FULL_HEADINGS: Final = (
+    "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
+    "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
+    "interquartile mean ms [95 %]", "recalled %", "collision checks",
+)  # fmt: skip
+RETRIEVAL_HEADINGS: Final = (
     "class", "memory", "protocol", "recall", "origin@1", "origin@5", "hit@1", "hit@5", "oracle", "none",
     "count",
 )  # fmt: skip
-_NAMES: Final = {
-    "planner",
-    "assist",
-    "class",
-    "memory",
-    "protocol",
-    "recall",
-}  # words, set to the left
+NAMES: Final = {"planner", "configuration", "panel", "class", "memory", "protocol", "recall"}  # to the left
 
 _Rows = list[list[str]]
 
 
-def configuration(assist: str, recall: str, top_k: int) -> str:
-    """The name of a configuration in tables, as ``closed 5 centroid``, ``random-open 5``, or ``none``."""
-    strategy = f" {recall}" if recall not in ("", "random") else ""  # the assist says that it is random
-    return f"{assist} {top_k}{strategy}" if top_k else assist
-
-
 def summary_table(summary: pd.DataFrame) -> Group:
     """The summary (``statistics.summarise``) for a terminal at least 110 columns wide: a table a class."""
-    return Group(*[_rich(title, _HEADINGS, groups) for title, groups in _panels(summary)])
+    return Group(
+        *[
+            _rich(f"{title}; times in ms; solved, slower, hits in %", _HEADINGS, groups)
+            for title, groups in titled_rows(summary, _cells)
+        ]
+    )
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
-    """The summary as Markdown: a heading and a table a class."""
+    """The whole summary as Markdown: a heading and a table a class."""
     return "\n".join(
-        f"### {title}\n\n{_markdown(_HEADINGS, [cells for group in groups for cells in group])}"
-        for title, groups in _panels(summary)
+        f"### {title}\n\n{_markdown(FULL_HEADINGS, [cells for group in groups for cells in group])}"
+        for title, groups in titled_rows(summary, full_cells)
     )
 
 
 def retrieval_table(retrieval: pd.DataFrame) -> Table:
     """Retrieval (``retrieval.summarise_retrieval``) for a terminal, in per cent of the problems."""
-    return _rich("Retrieval, % of problems", _RETRIEVAL_HEADINGS, _retrieval_groups(retrieval))
+    return _rich("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
     """Retrieval as a Markdown table, in per cent of the problems."""
-    lines = [cells for group in _retrieval_groups(retrieval) for cells in group]
-    return _markdown(_RETRIEVAL_HEADINGS, lines)
+    lines = [cells for group in retrieval_groups(retrieval) for cells in group]
+    return _markdown(RETRIEVAL_HEADINGS, lines)
+
+
+def claims_markdown(claims: Sequence[Claim]) -> str:
+    """What became of each claim of the paper, as a Markdown list."""
+    return "".join(
+        f"- **{claim.verdict}**: {claim.text} ({claim.where}) Here: {claim.ours}. *Rule: {claim.rule}*\n"
+        for claim in claims
+    )
 
 
 def as_csv(table: pd.DataFrame) -> str:
@@ -71,8 +78,10 @@ def as_csv(table: pd.DataFrame) -> str:
     return str(table.to_csv(index=False, lineterminator="\n"))
 
 
-def _panels(summary: pd.DataFrame) -> list[tuple[str, list[_Rows]]]:
-    """Per panel its title and its rows of cells, grouped by planner.
+def titled_rows(
+    summary: pd.DataFrame, cells: Callable[[pd.Series[Any], int], list[str]]
+) -> list[tuple[str, list[_Rows]]]:
+    """Per panel its title and its rows of cells, grouped by planner; ``cells`` gives those after the names.
 
     Every planner appears in every panel with every configuration that any panel has for it, so that what was
     not attempted is seen to be missing.
@@ -81,42 +90,61 @@ def _panels(summary: pd.DataFrame) -> list[tuple[str, list[_Rows]]]:
     for panel in summary["panel"].unique():
         rows = summary[summary["panel"] == panel]
         decimals = _decimals(rows[["mean_ms", "median_ms"]].to_numpy(dtype=float))
-        by_key = {
-            (row["planner"], row["assist"], row["recall"], row["top_k"]): row for _, row in rows.iterrows()
-        }
+        by_key = {(row["planner"], row["configuration"]): row for _, row in rows.iterrows()}
+        width = len(cells(rows.iloc[0], decimals))
         groups = []
         for planner in ranked(summary["planner"], PLANNERS):
-            wanted = summary[summary["planner"] == planner]
-            assists, recalls = ranked(wanted["assist"], ASSISTS), ranked(wanted["recall"], RECALLS)
-            keys = {
-                (assists.index(assist), recalls.index(recall), assist, recall, k)
-                for assist, recall, k in zip(wanted["assist"], wanted["recall"], wanted["top_k"], strict=True)
-            }
+            wanted = summary.loc[summary["planner"] == planner, list(Configuration._fields)].drop_duplicates()
+            asked = [Configuration(*each) for each in wanted.itertuples(index=False, name=None)]
             groups.append(
                 [
-                    [planner, configuration(*key), *_cells(by_key.get((planner, *key)), decimals)]
-                    for _, _, *key in sorted(keys)
+                    [planner, each.label]
+                    + ([NOTHING] * width if (row := by_key.get((planner, each.label))) is None
+                       else cells(row, decimals))
+                    for each in sorted(asked, key=lambda each: each.rank)
                 ]
-            )
+            )  # fmt: skip
         titled.append((f"{panel}, {int(rows['problems'].max()):,} problems", groups))
     return titled
 
 
-def _cells(row: pd.Series[Any] | None, decimals: int) -> list[str]:
-    """The figures of one configuration."""
-    if row is None:
-        return [NOTHING] * (len(_HEADINGS) - 2)
+def full_cells(row: pd.Series[Any], decimals: int) -> list[str]:
+    """All figures of one configuration, as ``FULL_HEADINGS`` without the two names."""
     baseline = row["assist"] == "none"
+
+    def with_interval(name: str) -> str:
+        value, low, high = (
+            f"{row[column]:,.{decimals}f}" for column in (f"{name}_ms", f"{name}_low_ms", f"{name}_high_ms")
+        )
+        return f"{value} [{low}, {high}]"
+
     return [
         _percent(row["solved"]),
-        *[f"{row[column]:,.{decimals}f}" for column in ("mean_ms", "median_ms", "p90_ms")],
+        with_interval("mean"),
         NOTHING if baseline else _reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
+        _share(row["slower"]),
+        NOTHING if math.isnan(row["slowdown"]) else f"{row['slowdown']:.2f} ×",
+        _p_value(row["p_value"]),
+        *[with_interval(name) for name in ("median", "p90", "interquartile_mean")],
         NOTHING if baseline else _percent(row["recalled"]),
         _count(row["collision_checks"]),
     ]
 
 
-def _retrieval_groups(retrieval: pd.DataFrame) -> list[_Rows]:
+def _cells(row: pd.Series[Any], decimals: int) -> list[str]:
+    """The figures of one configuration that fit a terminal."""
+    baseline = row["assist"] == "none"
+    return [
+        _percent(row["solved"]),
+        *[f"{row[column]:,.{decimals}f}" for column in ("mean_ms", "median_ms", "p90_ms")],
+        NOTHING if baseline else _reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
+        _share(row["slower"]),
+        NOTHING if baseline else _percent(row["recalled"]),
+        _count(row["collision_checks"]),
+    ]
+
+
+def retrieval_groups(retrieval: pd.DataFrame) -> list[_Rows]:
     """Lines of a class and memory; under the ways to recall, what plans picked blindly reach."""
     groups = []
     for _, of_memory in retrieval.groupby(["panel", "memory"], sort=False):
@@ -157,6 +185,16 @@ def _percent(fraction: float) -> str:
     return f"{100.0 * fraction:.1f}"
 
 
+def _share(fraction: float) -> str:
+    return NOTHING if math.isnan(fraction) else _percent(fraction)
+
+
+def _p_value(value: float) -> str:
+    if math.isnan(value):
+        return NOTHING
+    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+
+
 def _decimals(milliseconds: Floats) -> int:
     """Decimals for all times of a panel, so that their points align: two digits of the least, 3 at most."""
     least, most = float(np.nanmin(milliseconds)), float(np.nanmax(milliseconds))
@@ -189,7 +227,7 @@ def _rich(title: str, headings: Sequence[str], groups: Sequence[_Rows]) -> Table
         padding=(0, 1, 0, 0),
     )
     for heading in headings:
-        table.add_column(heading, justify="left" if heading in _NAMES else "right", no_wrap=True)
+        table.add_column(heading, justify="left" if heading in NAMES else "right", no_wrap=True)
     for group in groups:
         for i, cells in enumerate(group):
             table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1)
@@ -202,10 +240,10 @@ def _markdown(headings: Sequence[str], rows: _Rows) -> str:
 
     def line(cells: Sequence[str]) -> str:
         padded = [
-            cell.ljust(width) if heading in _NAMES else cell.rjust(width)
+            cell.ljust(width) if heading in NAMES else cell.rjust(width)
             for heading, cell, width in zip(headings, cells, widths, strict=True)
         ]
         return f"| {' | '.join(padded)} |\n"
 
-    rule = ["-" * w if h in _NAMES else "-" * (w - 1) + ":" for h, w in zip(headings, widths, strict=True)]
+    rule = ["-" * w if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(headings, widths, strict=True)]
     return line(headings) + line(rule) + "".join(line(cells) for cells in rows)

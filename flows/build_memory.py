@@ -10,9 +10,11 @@ from tasks.logbook import log_memories
 from tasks.recalls import is_recalled, recall_chunks, recall_problems
 from tasks.report import report_retrieval, show_retrieval
 from tasks.settings import RunSettings
+from tasks.stages import timed
 
 
 @flow(name="build-memory", task_runner=task_runner())
+@timed
 def build_memory(settings: RunSettings, data: str) -> None:
     """Join encoder, centroids and plans into one archive a memory, and measure what it recalls."""
     chunks = memory_chunks(data, settings)

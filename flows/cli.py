@@ -106,6 +106,25 @@ def verify_folder(folder: Path, *, sample: float = 0.02, workers: int | None = N
 
 
 @app.command
+def export(run: Path, *, format: str, out: Path) -> None:
+    """Write the attempts of a run for other tools.
+
+    Parameters
+    ----------
+    run
+        Folder of the run, in the data folder's runs.
+    format
+        ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv (.csv).
+    out
+        Where to write it.
+
+    """
+    from tasks.export import export_run
+
+    export_run(run, format, out)
+
+
+@app.command
 def plan(
     problem: Path,
     *,

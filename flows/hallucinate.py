@@ -14,9 +14,11 @@ from tasks.hallucinate import (
 )
 from tasks.learn_hallucination import is_learned, learn_hallucination, learning_chunks
 from tasks.settings import RunSettings
+from tasks.stages import timed
 
 
 @flow(name="hallucinate", task_runner=task_runner())
+@timed
 def hallucinate(settings: RunSettings, data: str) -> None:
     """Make many problems for each plan, label them, and label them once more for the combined memory."""
     fan_out(learn_hallucination, learning_chunks(data, settings), "learn to hallucinate", is_learned)

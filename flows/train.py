@@ -7,10 +7,12 @@ from prefect import flow
 from tasks.engine import fan_out, task_runner
 from tasks.logbook import log_training
 from tasks.settings import RunSettings
+from tasks.stages import timed
 from tasks.train import epochs_done, is_trained, train_chunks, train_encoder
 
 
 @flow(name="train", task_runner=task_runner())
+@timed
 def train(settings: RunSettings, data: str) -> None:
     """Train one encoder for each class, and one for all of them if wanted, epoch by epoch."""
     chunks = train_chunks(data, settings)

@@ -47,6 +47,16 @@ class RunFolder:
         """Pictures."""
         return self.path / "figures"
 
+    @property
+    def report(self) -> Path:
+        """The report as one page."""
+        return self.path / "report.html"
+
+    @property
+    def stages(self) -> Path:
+        """When each stage ran, how long, and where."""
+        return self.path / "stages.json"
+
     def summary(self, suffix: str) -> Path:
         """The summary in one of its forms, such as ``summary("json")``."""
         return self.path / f"summary.{suffix}"

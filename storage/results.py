@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +19,25 @@ def write_attempts(path: Path, rows: Sequence[dict[str, Any]], key: str = "") ->
     write_table(path, table_of(rows, ATTEMPTS, "attempt"), key)
 
 
-def read_attempts(place: Path) -> pd.DataFrame:
+def read_attempts(place: Path, without: Sequence[str] = ()) -> pd.DataFrame:
     """All attempts of a file, or of every file below a folder in the order of their names.
 
-    Missing texts are None, missing numbers NaN; ``recalled`` holds one int32 array a row.
+    Missing texts are None, missing numbers NaN; ``recalled`` holds one int32 array a row, which takes most of
+    the time: columns ``without`` which one can do are left out.
     """
-    table = pa.concat_tables([read_table(path, ATTEMPTS) for path in tables_below(place, "benchmark")])
+    table = pa.concat_tables(list(_tables(place, without)))
     frame: pd.DataFrame = table.to_pandas()
     return frame
+
+
+def attempt_frames(place: Path, without: Sequence[str] = ()) -> Iterator[pd.DataFrame]:
+    """The same a file at a time, for who cannot hold them all."""
+    return (table.to_pandas() for table in _tables(place, without))
+
+
+def _tables(place: Path, without: Sequence[str]) -> Iterator[pa.Table]:
+    for path in tables_below(place, "benchmark"):
+        yield read_table(path, ATTEMPTS).drop_columns(list(without))
 
 
 def tables_below(place: Path, stage: str) -> list[Path]:

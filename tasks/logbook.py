@@ -12,7 +12,6 @@ from typing import Any
 
 import pandas as pd
 
-from dashboards.tables import configuration
 from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
@@ -23,7 +22,10 @@ from tasks.settings import RunSettings
 from tasks.sweep import swept
 from tasks.tracking import Tracker
 
-_SHOWN = ("solved", "mean_ms", "median_ms", "p90_ms", "reduction", "recalled", "collision_checks")
+_SHOWN = (
+    "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
+    "collision_checks",
+)  # fmt: skip
 
 
 @functools.cache
@@ -85,19 +87,18 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
     log, run = tracker(data), run_folder(data, settings)
     key = key_of([chunk.key for chunk in benchmark_chunks(data, settings)])
     with _child(data, settings, "benchmark") as run_id:
+        log.artifacts(run_id, run.figures, "figures")
+        for path in (run.summary("csv"), run.summary("md"), run.report):
+            log.artifacts(run_id, path)
         if log.is_logged(run_id, key):
             return
         rows: dict[str, float] = {}
         for row in report.summary.to_dict("records"):
-            asked = configuration(row["assist"], row["recall"], row["top_k"]).replace(" ", "-")
-            place = f"{row['panel']}/{row['planner']}/{asked}"
+            place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
             rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
         rows |= _retrieval_metrics(report.retrieval)
         log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
         log.dataset(run_id, "attempts", run.results, key, "benchmark")
-        log.artifacts(run_id, run.figures, "figures")
-        for suffix in ("csv", "md"):
-            log.artifacts(run_id, run.summary(suffix))
         log.mark_logged(run_id, key)
 
 

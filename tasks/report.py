@@ -1,29 +1,58 @@
-"""Report: the tables and charts of a run, from its rows alone."""
+"""Report: tables, figures and the page of a run, from its rows alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import pandas as pd
 from rich.console import Console
 
-from dashboards.charts import planning_times, retrieval_curves
+from dashboards.bars import ablation, controls, planning_times, time_split
+from dashboards.charts import retrieval_curves
+from dashboards.claims import claims
+from dashboards.curves import continual_improvement, performance_profile, solved_against_time
+from dashboards.distributions import performance_profile as profile_curve
+from dashboards.distributions import solved_against_time as solved_curve
+from dashboards.distributions import time_split as split_of
+from dashboards.evidence import Evidence
 from dashboards.retrieval import retrieval_curve, summarise_retrieval
-from dashboards.statistics import summarise
+from dashboards.statistics import summarise, summarise_continual
 from dashboards.style import save
 from dashboards.sweep import sweep_table
-from dashboards.tables import as_csv, retrieval_markdown, retrieval_table, summary_markdown, summary_table
-from storage.files import whole_file
+from dashboards.tables import (
+    as_csv,
+    claims_markdown,
+    retrieval_markdown,
+    retrieval_table,
+    summary_markdown,
+    summary_table,
+)
+from dashboards.verdicts import Claim
+from storage.files import read_text, whole_file
+from storage.layout import open_data_folder
 from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.caching import Chunk, run_folder
+from tasks.page import page_of
 from tasks.recalls import recall_chunks
 from tasks.settings import RunSettings
 from tasks.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
+NOT_NEEDED: Final = ("recalled",)
+MEASURED: Final = (
+    "preset",
+    "classes",
+    "worlds",
+    "planners",
+    "assists",
+    "test_problems",
+    "combined",
+    "strict",
+)
 
 
 class Report(NamedTuple):
@@ -31,28 +60,72 @@ class Report(NamedTuple):
 
     summary: pd.DataFrame  # ``dashboards.statistics.summarise``
     retrieval: pd.DataFrame  # ``dashboards.retrieval.summarise_retrieval``
+    claims: list[Claim]
 
 
 def report_run(data: str, settings: RunSettings) -> Report:
-    """Write tables and charts into the run's folder; a StorageError where the run has no rows."""
+    """Write tables, charts and the page into the run's folder; a StorageError where the run has no rows."""
     run = run_folder(data, settings)
-    summary = summarise(read_attempts(run.results))
-    retrieval = report_retrieval(data, settings)
+    attempts, grown = read_attempts(run.results, NOT_NEEDED), continual_rows(data, settings)
+    summary, recalls = summarise(attempts), _recall_rows(data, settings)
+    found = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, grown)))
     _write(run.summary("csv"), as_csv(summary))
-    _write(run.summary("md"), f"{summary_markdown(summary)}\n{retrieval_markdown(retrieval)}")
-    save(planning_times(summary), run.figures, "planning-times")
-    return Report(summary, retrieval)
+    texts = [summary_markdown(summary), retrieval_markdown(found.retrieval), claims_markdown(found.claims)]
+    _write(run.summary("md"), "\n".join(texts))
+    figures = {
+        "planning-times": planning_times(summary),
+        "controls": controls(summary),
+        "solved-against-time": solved_against_time(solved_curve(attempts)),
+        "performance-profile": performance_profile(profile_curve(attempts)),
+        "time-split": time_split(split_of(attempts)),
+    }
+    if (summary["recall"] == "random").any():
+        figures["ablation"] = ablation(summary)
+    if len(grown):
+        figures["continual-improvement"] = continual_improvement(summarise_continual(grown))
+    for name, figure in figures.items():
+        save(figure, run.figures, name)
+    html = page_of(run, settings, attempts, summary, found.retrieval, found.claims)
+    _write(run.report, html)
+    return found
+
+
+def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
+    """Attempts of all runs that differ from this one in their number of ``experiences``, a column here.
+
+    Which planners, assists and problems they measured may differ too. Empty where there is no other number.
+    """
+    found: dict[int, pd.DataFrame] = {}
+    for run in [*open_data_folder(data).runs(), run_folder(data, settings)]:  # this run last: it comes first
+        if not (run.settings.exists() and run.results.exists()):
+            continue
+        try:
+            asked = RunSettings.from_json(read_text(run.settings))
+        except ValueError:  # of another version
+            continue
+        may_differ = {name: getattr(settings, name) for name in (*MEASURED, "experiences")}
+        if replace(asked, **may_differ) == settings:
+            found[asked.experiences] = read_attempts(run.results, NOT_NEEDED)
+    if len(found) < 2:
+        return pd.DataFrame()
+    tables = [rows.assign(experiences=count) for count, rows in sorted(found.items())]
+    return pd.concat(tables, ignore_index=True)
 
 
 def report_retrieval(data: str, settings: RunSettings) -> pd.DataFrame:
     """Write the table and the chart of what the memories recall; gives the table."""
     run = run_folder(data, settings)
-    shards = [run.shard("recalls", chunk.class_name, chunk.index) for chunk in recall_chunks(data, settings)]
-    curve = retrieval_curve(read_recalls(shards))
+    curve = retrieval_curve(_recall_rows(data, settings))
     retrieval = summarise_retrieval(curve)
     _write(run.path / "retrieval.csv", as_csv(retrieval))
     save(retrieval_curves(curve), run.figures, "retrieval")
     return retrieval
+
+
+def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
+    run = run_folder(data, settings)
+    shards = [run.shard("recalls", chunk.class_name, chunk.index) for chunk in recall_chunks(data, settings)]
+    return read_recalls(shards)
 
 
 def show(report: Report) -> None:

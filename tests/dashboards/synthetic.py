@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-Asked = tuple[str, str, int]  # assist, recall, top k
+from storage.configurations import BASELINE, Configuration
 
-STANDARD: list[Asked] = [
-    ("none", "", 0), ("closed", "exhaustive", 5), ("open", "exhaustive", 5), ("repair", "exhaustive", 5),
-    ("closed", "centroid", 1), ("closed", "centroid", 5), ("open", "centroid", 1), ("open", "centroid", 5),
-    ("fresh", "", 0),
-]  # fmt: skip
-BASELINE: Asked = ("none", "", 0)
-CLOSED: Asked = ("closed", "exhaustive", 1)
+STANDARD = [
+    BASELINE,
+    *(Configuration(assist, "centroid", k) for assist in ("closed", "open") for k in (1, 5)),
+    *(Configuration(assist, "exhaustive", 5) for assist in ("closed", "open", "repair")),
+    Configuration("fresh", "", 0),
+]
+CLOSED_1 = STANDARD[1]
+ABLATION = [Configuration("random-open", "random", 1), Configuration("random-open", "random", 5)]
+PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
 
 
 def attempts(
     classes: tuple[str, ...] = ("curves", "random", "trap"),
     planners: tuple[str, ...] = ("rrt", "gust", "follow"),
-    configurations: list[Asked] = STANDARD,
+    configurations: Sequence[Configuration] = STANDARD,
     problems: int = 40,
     speed_up: float = 4.0,
     seed: int = 0,
@@ -37,22 +40,31 @@ def attempts(
             seconds = 1e-3 * hardness[i] * rng.lognormal(0.0, 0.3) / (1.0 if assist == "none" else speed_up)
             solved = bool(rng.random() < 0.95)
             recalled = assist not in ("none", "fresh") and rng.random() < 0.5
+            parts = 0.9 * seconds * rng.dirichlet(np.ones(len(PARTS)))
             rows.append(
                 {
                     "problem_id": f"{name}-{i}",
                     "problem_class": name,
                     "planner": planner,
                     "assist": assist,
-                    "recall": recall or None,
                     "top_k": top_k,
+                    "recall": recall or None,
                     "memory": None if assist in ("none", "fresh") else memory or name,
+                    "status": "solved" if solved else "budget-spent",
                     "solved": solved,
                     "source": ("recalled" if recalled else "searched") if solved else None,
                     "planning_seconds": seconds,
+                    **{f"{part}_seconds": share for part, share in zip(PARTS, parts, strict=True)},
                     "collision_checks": int(1e6 * seconds),
                 }
             )
     return pd.DataFrame(rows)
+
+
+def meant(row: Mapping[Any, Any]) -> Configuration:
+    """The configuration of an attempt row."""
+    recall = row["recall"] if isinstance(row["recall"], str) else ""
+    return Configuration(row["assist"], recall, row["top_k"])
 
 
 def recalls(

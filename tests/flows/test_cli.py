@@ -13,7 +13,7 @@ from flows.cli import app, call
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
-    "optimise", "solve", "import-worlds", "sweep", "experience-curve",
+    "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve",
 )  # fmt: skip
 
 
@@ -54,6 +54,10 @@ COMMANDS = (
         (["optimise", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
         (["optimise", "p.json"], 1, "p.json does not exist"),
         (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
+        (["export", "nowhere", "--format", "xml", "--out", "a.csv"], 2, "Unknown format 'xml'. Known: ompl,"),
+        (["export", "nowhere", "--format", "csv", "--out", "a.db"], 2, "a.db does not end in .csv"),
+        (["export", "nowhere", "--format", "ompl", "--out", "."], 2, ". is there already; give a new folder"),
+        (["export", "nowhere", "--format", "csv", "--out", "a.csv"], 1, "nowhere is no run"),
         (["verify", "nowhere"], 1, "nowhere is no data folder"),
         (["verify", "nowhere", "--sample", "2"], 2, "Sample is 2.0"),
         (["run", "--preset", "smoke", "--data", "/proc/nowhere"], 1, "/proc/nowhere cannot be used"),

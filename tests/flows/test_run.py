@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from storage.layout import DataFolder, RunFolder
 from storage.memories import load_memory
 from storage.recalls import read_recalls
 from tasks.settings import ABLATION, ASSISTS
+from tasks.stages import stages_of
 from tests.flows.same_rows import assert_same_rows, rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -129,11 +131,41 @@ def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder
     assert {stages[run].split()[1] for _, run in models} == {"combined", "random", "trap"}
 
 
+FIGURES = {
+    "planning-times", "controls", "ablation", "solved-against-time", "performance-profile", "time-split",
+    "retrieval", "problems-trap", "training-combined",
+}  # fmt: skip
+
+
 def test_the_report_is_there(runs: tuple[RunFolder, RunFolder]) -> None:
     drawn = {path.name for path in runs[0].figures.iterdir()}
     assert {"planning-times.png", "retrieval.png", "problems-trap.png", "training-combined.png"} <= drawn
     assert {"embeddings-trap.png", "embeddings-combined.png"} <= drawn
     assert "follow" in runs[0].summary("md").read_text()
+    html = runs[0].report.read_text()
+    assert all(f'<figure id="{name}">' in html for name in FIGURES)
+    assert html.count('<div class="claim') == 19
+    assert all(f"<dt>{name}</dt>" in html for name in ("commit", "host", "benchmark", "seed", "numba"))
+
+
+def test_every_stage_is_on_record(runs: tuple[RunFolder, RunFolder]) -> None:
+    stages = ["collect", "hallucinate", "train", "build_memory", "benchmark", "report"]
+    for run, times in zip(runs, (2, 1), strict=True):  # the first was run again
+        records = stages_of(run)
+        assert [record["stage"] for record in records] == times * stages
+        assert all(record["seconds"] > 0.0 and record["versions"]["numpy"] for record in records)
+
+
+def test_every_figure_is_an_artifact_in_mlflow_and_prefect(runs: tuple[RunFolder, RunFolder]) -> None:
+    data = runs[0].path.parents[1]
+    logged = {path.relative_to(path.parents[1]) for path in (data / "mlartifacts").rglob("*.*")}
+    assert {Path("figures") / f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")} <= logged
+    assert Path("artifacts/report.html") in logged
+    with closing(sqlite3.connect(data / "prefect" / "prefect.db")) as database:
+        found = database.execute("SELECT DISTINCT key, type FROM artifact").fetchall()
+    kinds = {str(key).removeprefix(f"{runs[0].path.name}-"): kind for key, kind in found if key}
+    assert {name: kinds[name] for name in FIGURES} == dict.fromkeys(FIGURES, "image")
+    assert (kinds["report"], kinds["summary"], kinds["claims"]) == ("markdown", "markdown", "table")
 
 
 def test_verify_finds_no_fault_and_then_the_one_that_is_planted(

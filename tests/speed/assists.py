@@ -20,7 +20,6 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from dashboards.tables import configuration
 from planners.memory.build_memory import build_memory
 from planners.memory.experience import Experience
 from planners.memory.hallucination.mixture import hallucinate
@@ -35,6 +34,7 @@ from planners.world.classes import CLASSES, ProblemClass, problem_class
 from planners.world.collision import scene_of
 from planners.world.problem import Floats, Problem
 from planners.world.randomness import generator
+from storage.configurations import Configuration
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
 from tasks.caching import key_of
@@ -174,7 +174,7 @@ def add(result: Table, planner: str, rows: Rows) -> None:
         ]
         result.add_row(
             planner,
-            configuration(each[0], each[1] or "", each[2]),
+            Configuration(each[0], each[1] or "", each[2]).label,
             f"{100.0 * np.mean([a.solved for a in made]):.1f}",
             *(f"{value:.2f}" for value in (mine.mean(), np.median(mine), np.quantile(mine, 0.9))),
             *differences,

@@ -1,0 +1,85 @@
+"""A run's report as one page: which pictures it shows, and what it says of how the run was made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from dashboards.distributions import endings
+from dashboards.page import Picture, page
+from dashboards.verdicts import Claim
+from storage.layout import RunFolder
+from tasks.settings import RunSettings
+from tasks.stages import stage_seconds, stages_of
+
+CAPTIONS: Final = {  # in the order of the page; other figures follow by name
+    "planning-times": "Mean planning time with and without memory",
+    "controls": "Other ways to recall, repair, and controls",
+    "continual-improvement": "Mean planning time as experience grows",
+    "ablation": "Plans recalled or picked blindly",
+    "solved-against-time": "Problems solved within a time",
+    "performance-profile": "Performance profile",
+    "time-split": "Where planning time goes",
+    "retrieval": "How often a recalled plan is free",
+}
+
+
+def page_of(
+    run: RunFolder,
+    settings: RunSettings,
+    attempts: pd.DataFrame,
+    summary: pd.DataFrame,
+    retrieval: pd.DataFrame,
+    claims: Sequence[Claim],
+) -> str:
+    """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from."""
+    problems = attempts["problem_id"].nunique()
+    return page(
+        f"Motion Memory: {settings.run_name}",
+        f"{len(attempts):,} attempts at {problems:,} unseen problems of {', '.join(settings.class_names)}: "
+        f"{', '.join(settings.planners)} without memory and with {settings.experiences} experiences a class.",
+        summary=summary,
+        retrieval=retrieval,
+        endings=endings(attempts),
+        claims=claims,
+        pictures=_pictures(run),
+        made=_made(run, settings, attempts),
+    )
+
+
+def _pictures(run: RunFolder) -> list[Picture]:
+    """Every figure once, as PNG or SVG, whichever is smaller."""
+    smaller: dict[str, Path] = {}
+    for path in sorted(run.figures.glob("*.[ps][nv]g"), key=lambda path: path.stat().st_size):
+        smaller.setdefault(path.stem, path)
+    return [Picture(smaller[name], CAPTIONS.get(name, _words(name))) for name in sorted(smaller, key=_place)]
+
+
+def _place(name: str) -> tuple[int, str]:
+    known = list(CAPTIONS)
+    return (known.index(name) if name in known else len(known), name)
+
+
+def _words(name: str) -> str:
+    """A caption from a file's name: ``problems-trap`` is "Problems: trap"."""
+    what, _, of = name.partition("-")
+    return f"{what.capitalize()}: {of}" if of else what.capitalize()
+
+
+def _made(run: RunFolder, settings: RunSettings, attempts: pd.DataFrame) -> dict[str, dict[str, str]]:
+    """Where the rows come from: host and commit of the rows themselves, settings, stages, versions."""
+    records = stages_of(run)
+    rows = {name: ", ".join(sorted(set(attempts[name].dropna()))) or "unknown" for name in ("host", "commit")}
+    measured = next((each for each in reversed(records) if each["stage"] == "benchmark"), None)
+    of_machine = {name: str(measured[name]) for name in ("processor", "system")} if measured else {}
+    seconds = {name: f"{value:,.1f} s" for name, value in stage_seconds(records).items()}
+    return {
+        "Rows": {"run": settings.run_name, **rows, **of_machine},
+        "Stages": seconds or {"times": "not recorded"},
+        "Settings": {name: str(value) for name, value in asdict(settings).items()},
+        "Versions": dict(measured["versions"]) if measured else {"versions": "not recorded"},
+    }

@@ -1,0 +1,71 @@
+"""How long each stage of a run took, when, on which machine and with which versions: ``stages.json``."""
+
+from __future__ import annotations
+
+import functools
+import platform
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Final
+
+from storage.files import read_json, write_json
+from storage.layout import RunFolder
+from tasks.attempts import commit
+from tasks.caching import run_folder
+from tasks.settings import RunSettings
+
+PACKAGES: Final = (
+    "numpy", "numba", "scipy", "pandas", "pyarrow", "torch", "onnxruntime", "python-fcl", "shapely",
+    "prefect", "mlflow",
+)  # fmt: skip
+
+
+def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, str], None]:
+    """Wrap a stage so that each time it ends, a record of it is added to its run's folder."""
+
+    @functools.wraps(stage)
+    def wrapped(settings: RunSettings, data: str) -> None:
+        began, clock = datetime.now(UTC), time.perf_counter()
+        stage(settings, data)
+        seconds = time.perf_counter() - clock
+        run = run_folder(data, settings)
+        made = {"stage": stage.__name__, "began": began.isoformat(timespec="seconds"), "seconds": seconds}
+        write_json(run.stages, [*stages_of(run), made | machine()])
+
+    return wrapped
+
+
+def stages_of(run: RunFolder) -> list[dict[str, Any]]:
+    """The records of a run's stages, oldest first; a stage that was continued has several."""
+    return list(read_json(run.stages)) if run.stages.exists() else []
+
+
+def stage_seconds(records: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Seconds that each stage took in all."""
+    names = dict.fromkeys(record["stage"] for record in records)
+    return {name: sum(each["seconds"] for each in records if each["stage"] == name) for name in names}
+
+
+@functools.cache
+def machine() -> dict[str, Any]:
+    """What the measured times depend on: host, processor, operating system, versions, commit."""
+    return {
+        "host": platform.node(),
+        "processor": _processor(),
+        "system": platform.platform(),
+        "commit": commit(),
+        "versions": {"python": platform.python_version()} | {name: version(name) for name in PACKAGES},
+    }
+
+
+def _processor() -> str:
+    """Model and number of cores."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{len(models)} × {models[0]}" if models else platform.processor() or platform.machine()
