@@ -104,8 +104,14 @@ def _write(out: Path, found: Mapping[Part, Imported]) -> None:
                 (folder / part).mkdir()
                 write_problems(folder / part / PROBLEMS_FILE, imported.problems)
         return
-    problems: list[Problem] = [problem for imported in found.values() for problem in imported.problems]
-    write_problems(out, problems)
+    problems: dict[str, Problem] = {}
+    for problem in (problem for imported in found.values() for problem in imported.problems):
+        if problem.id in problems:
+            raise RunError(
+                f'Both parts have a problem "{problem.id}"; ask for one --part, or --out a folder.'
+            )
+        problems[problem.id] = problem
+    write_problems(out, list(problems.values()))
 
 
 def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | None) -> None:

@@ -9,10 +9,10 @@ import pytest
 
 from flows.cli import call
 from storage.imported import read_imported
-from storage.problems import read_problems
+from storage.problems import read_problems, write_problems
 from tasks.settings import for_preset
 from tasks.worlds import read_worlds_chunk, source_key, source_of, world_chunks
-from tests.storage.samples import box
+from tests.storage.samples import box, problem_with
 from tests.storage.worlds.samples import town_cells, write_map, write_ros, write_scene
 
 CELLS = town_cells(rows=200, columns=160)
@@ -126,6 +126,16 @@ def test_options_that_would_change_nothing_are_refused(
     ]:
         assert call(["import-worlds", str(tmp_path / path), *out, *option]) == 2
         assert option[0] in capsys.readouterr().err
+
+
+def test_two_parts_with_the_same_problem_do_not_become_one_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for part in ("train", "test"):
+        write_problems(tmp_path / "mine" / part / "p.json", [problem_with([box(20, 20)])])
+    assert call(["import-worlds", str(tmp_path / "mine"), "--out", str(tmp_path / "p.jsonl")]) == 1
+    assert 'Both parts have a problem "p-1"' in capsys.readouterr().err
+    assert call(["import-worlds", str(tmp_path / "mine"), "--out", str(tmp_path / "yours")]) == 0
 
 
 def test_skipped_worlds_are_listed_and_under_strict_stop(
