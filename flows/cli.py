@@ -334,6 +334,7 @@ def _do(stage: str, options: Options) -> None:
         strict=options.strict,
         vehicle=options.vehicle,
         optimised=options.optimised,
+        continual=options.continual,
         experiences=options.experiences,
         candidates=options.candidates,
         problems_per_experience=options.problems_per_experience,

@@ -43,6 +43,8 @@ class Options:
         Address of a Dask scheduler to use instead, like tcp://host:8786.
     strict
         Stop at a bad world instead of skipping it.
+    continual
+        Measure with 20, 40 ... % of the experiences too: none, paper (GUST on curves) or all.
     optimised
         Make collected plans shorter and clearer before they are kept: about a second each.
     experiences
@@ -90,6 +92,7 @@ class Options:
     workers: int | None = None
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
+    continual: str | None = None
     optimised: Annotated[bool, Parameter(negative=())] = False
     experiences: int | None = None
     candidates: int | None = None

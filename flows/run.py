@@ -7,6 +7,7 @@ from prefect import flow
 from flows.benchmark import benchmark
 from flows.build_memory import build_memory
 from flows.collect import collect
+from flows.continual import continual
 from flows.hallucinate import hallucinate
 from flows.report import report
 from flows.train import train
@@ -17,11 +18,12 @@ from tasks.settings import RunSettings
 
 @flow(name="run")
 def run(settings: RunSettings, data: str) -> None:
-    """Collect, hallucinate, train, build the memories, benchmark them, and report."""
+    """Collect, hallucinate, train, build memories, benchmark; again with less experience if asked; report."""
     with cluster(), run_logged(data, settings):
         collect(settings, data)
         hallucinate(settings, data)
         train(settings, data)
         build_memory(settings, data)
         benchmark(settings, data)
+        continual(settings, data)
         report(settings, data)

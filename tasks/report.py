@@ -52,6 +52,8 @@ MEASURED: Final = (
     "test_problems",
     "combined",
     "strict",
+    "candidates",
+    "continual",
 )
 
 

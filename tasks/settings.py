@@ -43,6 +43,9 @@ ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
 )
 COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
 ABLATION_PLANNER: Final = "gust"
+CONTINUAL: Final = ("none", "paper", "all")  # the second: one planner on one class, as published
+CONTINUAL_PLANNER: Final = "gust"
+CONTINUAL_CLASS: Final = "curves"
 DEFAULT_VEHICLE: Final = "car"
 TAUGHT: Final = 1_000  # plans a class that the encoder is trained on; a larger memory grows beyond them
 COMBINED: Final = "combined"  # the memory that does not distinguish the classes
@@ -66,6 +69,7 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "learning": asdict(Learning()),
     "hallucination": DEFAULT_MIXTURE,
     "candidates": 0,
+    "continual": "none",
 }
 
 
@@ -96,6 +100,8 @@ class RunSettings:
         0  # solved problems a class of which the experiences are chosen; few: the first are kept
     )
 
+    continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
+
     @property
     def wanted(self) -> int:
         """Solved problems a class to collect."""
@@ -120,9 +126,9 @@ class RunSettings:
     def digest(self) -> str:
         """Eight hexadecimal digits that tell settings with different results apart."""
         asked = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
-        del asked["strict"]
+        del asked["strict"], asked["continual"]
         for name, default in _LATER.items():  # runs with these were made, and named, before there was another
-            if asked[name] == default:
+            if asked.get(name) == default:
                 del asked[name]
         return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
 
@@ -175,12 +181,13 @@ class _Preset(NamedTuple):
     test_problems: int
     epochs: int
     combined: bool
+    continual: str
 
 
 PRESETS: Final = {
-    "smoke": _Preset(6, 20, 20, 20, 2, False),
-    "laptop": _Preset(100, 1_000, 200, 1_000, 10, False),
-    "paper": _Preset(100, 1_000, 1_000, 10_000, 10, True),
+    "smoke": _Preset(6, 20, 20, 20, 2, False, "none"),
+    "laptop": _Preset(100, 1_000, 200, 1_000, 10, False, "none"),
+    "paper": _Preset(100, 1_000, 1_000, 10_000, 10, True, "paper"),
 }
 
 
@@ -201,6 +208,7 @@ def for_preset(
     strict: bool = False,
     vehicle: str = DEFAULT_VEHICLE,
     optimised: bool = False,
+    continual: str | None = None,
     learning: Mapping[str, Any] | None = None,
     hallucination: Sequence[str] | None = None,
 ) -> RunSettings:
@@ -220,6 +228,7 @@ def for_preset(
     check_known("difficulty", [difficulty], DIFFICULTIES)
     check_known("objective", [objective], get_args(Objective))
     check_known("vehicle", [vehicle], VEHICLES)
+    check_known("continual improvement", [continual or base.continual], CONTINUAL)
     if not asked and not worlds:
         raise UsageError(f"No class to work on. Name some of: {', '.join(CLASSES)}.")
     if not named:
@@ -258,6 +267,7 @@ def for_preset(
         learning=_learning(learning or {}),
         hallucination=DEFAULT_MIXTURE if hallucination is None else mixture_of(hallucination),
         candidates=max(base.candidates, kept) if candidates is None else candidates,
+        continual=continual or base.continual,
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))

@@ -1,0 +1,26 @@
+"""Continual improvement: how planning gets faster with experience."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from flows.benchmark import benchmark
+from flows.build_memory import build_memory
+from flows.collect import collect
+from flows.hallucinate import hallucinate
+from flows.train import train
+from tasks.continual import runs_of_continual
+from tasks.logbook import run_logged
+from tasks.settings import RunSettings
+
+
+@flow(name="continual")
+def continual(settings: RunSettings, data: str) -> None:
+    """Collect, hallucinate, train, build and benchmark with a fifth, two fifths ... of the experiences."""
+    for fewer in runs_of_continual(settings):
+        with run_logged(data, fewer):
+            collect(fewer, data)
+            hallucinate(fewer, data)
+            train(fewer, data)
+            build_memory(fewer, data)
+            benchmark(fewer, data)
