@@ -23,7 +23,7 @@ from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, ru
 from tasks.settings import RunError, RunSettings, world_class
 
 Purpose = Literal["collect", "test"]
-CUT_AN_EXPERIENCE: Final = 4  # problems cut to collect from for each experience wanted: some are not solved
+CUT_A_PLAN: Final = 2  # problems cut to collect from for each solved one that is wanted: some are not solved
 PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}
 
 
@@ -131,7 +131,7 @@ def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
     source = source_at(next(Path(f) for f in settings.worlds if world_class(f) == chunk.class_name))
     folder = chunk.run.path / "worlds" / chunk.class_name
     counts = {
-        "collect": max(CUT_AN_EXPERIENCE * settings.experiences, settings.wanted),
+        "collect": CUT_A_PLAN * settings.wanted,
         "test": settings.test_problems,
     }
     skipped: list[str] = []

@@ -164,7 +164,7 @@ def test_a_run_collects_and_tests_on_a_map_or_on_what_was_cut_from_it(
     if kind == "folder":
         worlds = tmp_path / "cut" / "town"
         assert call(["import-worlds", str(town), "--problems", "12", "--out", str(worlds)]) == 0
-    settings = for_preset("smoke", worlds=[str(worlds)], experiences=3, test_problems=12)
+    settings = for_preset("smoke", worlds=[str(worlds)], experiences=3, candidates=6, test_problems=12)
     assert settings.class_names == ("town",)
     data = str(tmp_path / "data")
     (chunk,) = world_chunks(data, settings)
