@@ -26,7 +26,10 @@ def curate_chunk(chunk: Chunk) -> dict[str, Any]:
     vehicle = vehicle_named(settings.vehicle)
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
     candidates = [each for shard in shards for each in read_experiences(shard, vehicle)][: settings.wanted]
-    kept = curate(candidates, settings.experiences, vehicle).tolist()
+    kept = curate(candidates, settings.taught, vehicle).tolist()
+    if settings.grown:  # the others join these: which ones hardly matters
+        others = sorted(set(range(len(candidates))) - set(kept))
+        kept += others[: settings.experiences - len(kept)]
     merge_experiences(shards, run.shard("curated", name, 0), kept, chunk.key)
     return {"candidates": len(candidates), "kept": len(kept)}
 

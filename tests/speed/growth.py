@@ -18,11 +18,10 @@ from __future__ import annotations
 
 import argparse
 import gc
-import importlib.util
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from time import thread_time
 
@@ -33,28 +32,23 @@ from rich.progress import track
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from planners.memory.encoder import Floats32
-from planners.memory.inverted_lists import best_listed, list_readout
 from planners.memory.labels import Flags, free_plans
 from planners.memory.recall import RECALLS, Memory, default_recall, recall
-from planners.memory.scores import best_plans
 from planners.world.classes import problem_class
 from planners.world.collision import scene_of
-from planners.world.problem import Integers, Problem
+from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.view import View
 from storage.memories import load_memory, save_memory
 from tests.speed.assists import KEPT, MEASURING
 from tests.speed.many_plans import collected_memory, collected_plans, place_of, synthetic_memory
+from tests.speed.rankers import CANDIDATES, rankers
 
 NAME = "random"
 SIZES = (100, 1_000, 10_000)
 MOST_COLLECTED = 100_000
 COUNT = 300  # problems
 K = 5
-CANDIDATES = 16  # plans asked of the encoder's ranking alone
-
-Ranker = Callable[[Floats32], Integers]
 
 
 def memory_of_size(size: int, difficulty: str, folder: Path) -> Memory:
@@ -111,56 +105,6 @@ def add_recalls(rows: Table, memory: Memory, problems: list[Problem], free: Flag
         oracle = f"{100 * free.any(1).mean():.1f}"
         rows.add_row(f"{len(memory.plans):,}", shown, *shares, oracle, *quantiles(seconds[name]))
     rows.add_section()
-
-
-def rankers(memory: Memory) -> dict[str, tuple[Ranker, float]]:
-    """Ways to find the plans that score best for an embedding, and the seconds that it took to make each."""
-    vectors, biases = memory.vectors, memory.biases
-    made: dict[str, tuple[Ranker, float]] = {
-        "all scored": (lambda e: best_plans(vectors, biases, e, CANDIDATES, never_none=True), 0.0)
-    }
-    began = thread_time()
-    lists = list_readout(vectors, biases)
-    made["inverted lists"] = (lambda e: best_listed(lists, e, CANDIDATES), thread_time() - began)
-    rows = np.ascontiguousarray(np.column_stack((vectors, biases))[1:], np.float32)
-    squares = np.square(rows).sum(1)
-    # lengthened to a common length: the nearest rows are then those of the largest inner product
-    even = np.ascontiguousarray(np.column_stack((rows, np.sqrt(squares.max() - squares))), np.float32)
-    if importlib.util.find_spec("usearch"):
-        from usearch.index import Index
-
-        began = thread_time()
-        graph = Index(ndim=even.shape[1], metric="l2sq", dtype="f32", connectivity=16, expansion_search=64)
-        graph.add(np.arange(len(even)), even, threads=1)
-        search = lambda e: graph.search(np.r_[e, _ONE_ZERO], CANDIDATES, threads=1).keys.astype(np.int64)  # noqa: E731
-        made["usearch HNSW"] = (search, thread_time() - began)
-    if importlib.util.find_spec("faiss"):
-        import faiss
-
-        faiss.omp_set_num_threads(1)
-        began = thread_time()
-        hnsw = faiss.IndexHNSWFlat(even.shape[1], 16)
-        hnsw.hnsw.efSearch = 64
-        hnsw.add(even)
-        made["faiss HNSW"] = (
-            lambda e: hnsw.search(np.r_[e, _ONE_ZERO][None], CANDIDATES)[1][0],
-            thread_time() - began,
-        )
-        began = thread_time()
-        ivf = faiss.IndexIVFFlat(
-            faiss.IndexFlatIP(rows.shape[1]), rows.shape[1], len(lists.centres), faiss.METRIC_INNER_PRODUCT
-        )
-        ivf.train(rows)
-        ivf.add(rows)
-        ivf.nprobe = 32
-        made["faiss IVF"] = (
-            lambda e: ivf.search(np.r_[e, _ONE_ZERO[:1]][None], CANDIDATES)[1][0],
-            thread_time() - began,
-        )
-    return made
-
-
-_ONE_ZERO = np.array([1.0, 0.0], np.float32)
 
 
 def add_rankings(rows: Table, memory: Memory, problems: list[Problem], free: Flags) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planners.memory.curation import curate
 from storage.experiences import read_experiences
 from storage.hallucinated import read_labelled
 from storage.layout import RunFolder
@@ -16,7 +17,8 @@ from tasks import growth, settings
 from tasks.benchmark import benchmark_chunk, benchmark_chunks
 from tasks.build_memory import build_chunk, memory_chunks
 from tasks.caching import keep_settings, run_folder
-from tasks.collect import chunks_wanted, collect_chunk, keep_experiences
+from tasks.collect import chunks_wanted, collect_chunk
+from tasks.curate import curate_chunk, curation_chunks, keep_experiences
 from tasks.hallucinate import hallucinate_chunk, hallucination_chunks, relabel_chunk, relabel_chunks
 from tasks.recalls import recall_chunk, recall_chunks
 from tasks.settings import COMBINED, for_preset
@@ -27,6 +29,7 @@ CLASSES = ("curves", "trap")
 SETTINGS = replace(
     for_preset("smoke", classes=list(CLASSES), planners=["follow"], epochs=1),
     experiences=EXPERIENCES,
+    candidates=EXPERIENCES + 2,
     problems_per_experience=5,
     test_problems=3,
     combined=True,
@@ -43,7 +46,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
         done = {}
         while chunks := chunks_wanted(data, SETTINGS, done):
             done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-        keep_experiences(data, SETTINGS, done)
+        curated = curation_chunks(data, SETTINGS, done)
+        for chunk in curated:
+            curate_chunk(chunk)
+        keep_experiences(data, SETTINGS, curated, [])
         for chunks_of_stage, do in (
             (hallucination_chunks, hallucinate_chunk),
             (relabel_chunks, relabel_chunk),
@@ -75,3 +81,13 @@ def test_plans_are_recalled_that_no_encoder_was_taught(run: RunFolder) -> None:
     assert set(recalls["protocol"]) == {"fresh"}
     assert {len(free) for free in recalls["free"]} == {EXPERIENCES}
     assert all(sorted(order) == list(range(EXPERIENCES)) for order in recalls["order"])
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_those_that_are_taught_were_chosen_and_no_experience_is_kept_twice(run: RunFolder, name: str) -> None:
+    shards = run.shards("candidates", name)
+    candidates = [each for shard in shards for each in read_experiences(shard)][: EXPERIENCES + 2]
+    kept = [each.problem.id for each in read_experiences(run.experiences(name))]
+    assert len(set(kept)) == EXPERIENCES
+    chosen = [candidates[i].problem.id for i in curate(candidates, TAUGHT)]
+    assert kept[:TAUGHT] == chosen
