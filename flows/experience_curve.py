@@ -10,6 +10,7 @@ from flows.hallucinate import hallucinate
 from flows.train import train
 from tasks.engine import cluster
 from tasks.experience_curve import report_curve, runs_of_curve
+from tasks.logbook import run_logged
 from tasks.settings import RunSettings
 
 
@@ -19,8 +20,9 @@ def experience_curve(settings: RunSettings, data: str) -> None:
     runs = runs_of_curve(settings)
     with cluster():
         for run in runs:
-            collect(run, data)
-            hallucinate(run, data)
-            train(run, data)
-            build_memory(run, data)
+            with run_logged(data, run):
+                collect(run, data)
+                hallucinate(run, data)
+                train(run, data)
+                build_memory(run, data)
     report_curve(data, runs)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import pandas as pd
 from rich.console import Console
@@ -13,19 +12,18 @@ from dashboards.experience_curve import experience_chart, experience_rows, exper
 from dashboards.style import save
 from storage.recalls import read_recalls
 from tasks.caching import run_folder
+from tasks.continual import runs_of_continual
 from tasks.recalls import recall_chunks
 from tasks.report import COLUMNS
-from tasks.settings import RunSettings, UsageError
-
-STEPS: Final = 5  # memories, the largest with all experiences of the settings
+from tasks.settings import COMBINED, RunSettings
 
 
 def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
-    """The same run with a fifth, two fifths ... all of its experiences; UsageError for too few of them."""
-    if settings.experiences < STEPS:
-        raise UsageError(f"{settings.experiences} experiences: give {STEPS} or more for a curve.")
-    counts = [settings.experiences * step // STEPS for step in range(1, STEPS + 1)]
-    return [replace(settings, experiences=count, combined=False) for count in counts]
+    """The run with a fifth, two fifths ... and all of its experiences; UsageError for too few of them.
+
+    The smaller ones are those of continual improvement: what either has made serves the other.
+    """
+    return [*runs_of_continual(replace(settings, continual="all")), settings]
 
 
 def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
@@ -41,6 +39,6 @@ def _rows(data: str, run: RunSettings) -> pd.DataFrame:
     shards = [
         folder.shard("recalls", chunk.class_name, chunk.index)
         for chunk in recall_chunks(data, run)
-        if chunk.index > 0
+        if chunk.index > 0 and chunk.class_name != COMBINED  # those with fewer experiences have none
     ]
     return experience_rows(read_recalls(shards))
