@@ -36,27 +36,23 @@ from planners.world.randomness import generator
 from storage.experiences import read_experiences
 from storage.files import whole_file
 from storage.hallucinators import load_hallucinator
-from tasks.caching import Chunk, keep_settings, run_folder
-from tasks.collect import chunks_wanted, collect_chunk, keep_experiences
+from tasks.caching import run_folder
 from tasks.hallucinate import (
     hallucinate_chunk,
     hallucination_chunks,
 )
 from tasks.learn_hallucination import learn_chunk, learning_chunks
 from tasks.settings import RunSettings, for_preset
+from tests.tasks.collected import collect
 
 SEED = 81
 PROBLEMS = 200  # a plan, for the table of methods
 PICTURED = "random", 5  # class, and number of the experience
 
 
-def collect(settings: RunSettings, data: str) -> None:
+def prepare(settings: RunSettings, data: str) -> None:
     """The experiences of a run, and what learned hallucination needs."""
-    keep_settings(data, settings)
-    done: dict[Chunk, dict[str, int]] = {}
-    while chunks := chunks_wanted(data, settings, done):
-        done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-    keep_experiences(data, settings, done)
+    collect(data, settings)
     for chunk in learning_chunks(data, settings):
         learn_chunk(chunk)
 
@@ -67,10 +63,10 @@ def methods_table(data: str) -> Table:
     for name in CLASSES:
         for method in METHODS:
             settings = replace(
-                for_preset("laptop", classes=[name], seed=SEED, hallucination=[method]),
+                for_preset("laptop", classes=[name], seed=SEED, candidates=100, hallucination=[method]),
                 problems_per_experience=PROBLEMS,
             )
-            collect(settings, data)
+            prepare(settings, data)
             source = problem_class(name)
             run = run_folder(data, settings)
             weights = load_hallucinator(run.hallucinator(name)) if method == "learned" else None
@@ -98,8 +94,8 @@ def whole_stage(data: str) -> Table:
         "hallucination", "for a plan", "all", "seconds", "MB in Parquet", "MB a process", title="Two cores"
     )
     for mixture in (["rearrange"], [f"{method}=0.25" for method in METHODS]):
-        settings = for_preset("paper", seed=SEED, hallucination=mixture)
-        collect(settings, data)
+        settings = for_preset("paper", seed=SEED, candidates=100, hallucination=mixture)
+        prepare(settings, data)
         chunks = hallucination_chunks(data, settings)
         with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
             list(pool.map(_load, range(2)))
@@ -134,8 +130,8 @@ def _draw(axes: Axes, problem: Problem, placed: Problem, experience: Experience,
 def draw_methods(folder: Path, data: str) -> None:
     """Draw ``hallucination.png``: a collected problem, and one of each method's for its plan."""
     name, which = PICTURED
-    settings = for_preset("laptop", classes=[name], seed=SEED, hallucination=["learned"])
-    collect(settings, data)
+    settings = for_preset("laptop", classes=[name], seed=SEED, candidates=100, hallucination=["learned"])
+    prepare(settings, data)
     run = run_folder(data, settings)
     experiences = read_experiences(run.experiences(name))
     experience, draw = experiences[which], problem_class(name).draw_obstacles

@@ -15,11 +15,11 @@ from planners.memory.hallucination.mixture import METHODS
 from storage.errors import StorageError
 from storage.hallucinated import read_hallucinated_problems, read_labelled, read_methods
 from tasks import hallucinate
-from tasks.caching import Chunk, keep_settings, run_folder
-from tasks.collect import chunks_wanted, collect_chunk, keep_experiences
+from tasks.caching import run_folder
 from tasks.hallucinate import hallucinate_chunk, hallucination_chunks
 from tasks.learn_hallucination import is_learned, learn_chunk, learning_chunks
-from tasks.settings import RunSettings, for_preset
+from tasks.settings import for_preset
+from tests.tasks.collected import collect
 
 SETTINGS = replace(
     for_preset("smoke", classes=["trap"], difficulty="easy", hallucination=METHODS),
@@ -33,19 +33,11 @@ def _small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hallucinate, "CHUNK_PROBLEMS", 24)  # three chunks of two plans
 
 
-def _collected(data: Path, settings: RunSettings) -> None:
-    keep_settings(str(data), settings)
-    done: dict[Chunk, dict[str, int]] = {}
-    while chunks := chunks_wanted(str(data), settings, done):
-        done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-    keep_experiences(str(data), settings, done)
-
-
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with everything that hallucinating needs."""
     data = tmp_path_factory.mktemp("data")
-    _collected(data, SETTINGS)
+    collect(str(data), SETTINGS)
     for chunk in learning_chunks(str(data), SETTINGS):
         assert not is_learned(chunk)
         learn_chunk(chunk)
@@ -104,6 +96,6 @@ def test_a_network_is_trained_only_for_who_asks(data: Path) -> None:
 
 
 def test_without_its_network_learned_hallucination_says_what_to_do(tmp_path: Path) -> None:
-    _collected(tmp_path, SETTINGS)
+    collect(str(tmp_path), SETTINGS)
     with pytest.raises(StorageError, match="holds no hallucinator"):
         hallucinate_chunk(hallucination_chunks(str(tmp_path), SETTINGS)[0])

@@ -18,15 +18,14 @@ from storage.problems import write_problems
 from storage.results import read_attempts
 from tasks.benchmark import benchmark_chunk, benchmark_chunks
 from tasks.build_memory import build_chunk, memory_chunks
-from tasks.caching import keep_settings, run_folder
-from tasks.collect import chunks_wanted, collect_chunk
-from tasks.curate import curate_chunk, curation_chunks, keep_experiences
+from tasks.caching import run_folder
 from tasks.draw import draw_chunk, figure_chunks
 from tasks.hallucinate import hallucinate_chunk, hallucination_chunks
 from tasks.settings import ASSISTS, for_preset
 from tasks.solve import Assistant, plan_one, solve_many
 from tasks.train import train_chunk, train_chunks
 from tasks.verify import verify_folder
+from tests.tasks.collected import collect
 
 PLANNER = "follow"
 SETTINGS = replace(
@@ -42,14 +41,7 @@ SETTINGS = replace(
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     data = str(tmp_path_factory.mktemp("data"))
-    keep_settings(data, SETTINGS)
-    done = {}
-    while chunks := chunks_wanted(data, SETTINGS, done):
-        done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-    curated = curation_chunks(data, SETTINGS, done)
-    for chunk in curated:
-        curate_chunk(chunk)
-    keep_experiences(data, SETTINGS, curated, [])
+    collect(data, SETTINGS)
     for chunks_of_stage, do in (
         (hallucination_chunks, hallucinate_chunk),
         (train_chunks, train_chunk),
