@@ -40,7 +40,7 @@ def run(options: Options = NO_OPTIONS) -> None:
 
 @app.command
 def collect(options: Options = NO_OPTIONS) -> None:
-    """Draw problems, solve them, and keep the first N of each class with their plans."""
+    """Draw problems, solve them, and keep the N of each class whose plans are of most use."""
     _do("collect", options)
 
 
