@@ -43,7 +43,7 @@ PAPER_BARS: Final = (("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("o
 PANEL_WIDTH: Final = 2.6  # inches: four panels across a page stay readable in print
 _WHISKERS: Final = "Whiskers: 95 % bootstrap intervals of the mean, problems resampled."
 _CONTROLS_NOTE: Final = (
-    "closed, open, repair: with the best recalled plans (their number, and what recalled them: exhaustive, "
+    "closed, open, repair: with the best recalled plans (their number, and what recalled them: exh., "
     "all plans are checked; mask, by the cells that they sweep; centroid, the encoder). fresh, a control: no "
     "memory, a way over the occupancy grid guides the planner."
 )
@@ -225,7 +225,8 @@ def _stack(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:
 
 def _tick(configuration: Configuration) -> str:
     """A word a line; centroids go without saying."""
-    return re.sub("[ -]", "\n", configuration.label.removesuffix(" centroid"))
+    label = configuration.label.removesuffix(" centroid").replace("exhaustive", "exh.")
+    return re.sub("[ -]", "\n", label)
 
 
 def _duration(milliseconds: float) -> str:

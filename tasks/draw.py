@@ -1,4 +1,4 @@
-"""Draw: some problems of each class with what was recalled and found."""
+"""Draw: some problems of each class with what was recalled, repaired and found."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tasks.worlds import source_of
 
 SHOWN_PLANNER: Final = "gust"
 SHOWN_TOP_K: Final = 5
-SHOWN_SOURCES: Final = ("recalled", "searched")
+SHOWN: Final = {"recalled": "open", "repaired": "repair", "searched": "open"}  # source, and the assist
 SHOWN_EACH: Final = 2
 
 
@@ -55,15 +55,14 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
     vehicle = vehicle_named(settings.vehicle)
     memory = load_memory(chunk.run.memory(name), vehicle)
     rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
-    rows = rows[(rows["assist"] == "open") & (rows["top_k"] == SHOWN_TOP_K)]
-    rows = rows[rows["recall"] == default_recall(memory)]
-    places = {identity: index for index, identity in enumerate(rows["problem_id"])}
+    rows = rows[(rows["recall"] == default_recall(memory)) & (rows["top_k"] == SHOWN_TOP_K)]
+    places = {identity: index for index, identity in enumerate(rows["problem_id"].unique())}
     source = source_of(chunk.data, settings, name)
-    for kind in SHOWN_SOURCES:
-        shown = rows[rows["source"] == kind].head(SHOWN_EACH)
+    for kind, assist in SHOWN.items():
+        shown = rows[(rows["source"] == kind) & (rows["assist"] == assist)].head(SHOWN_EACH)
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
             problem = source.problem("test", places[identity])
-            attempt = solve(problem, planner, "open", SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
+            attempt = solve(problem, planner, assist, SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.1f} ms"
             yield Example(
                 problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption, vehicle

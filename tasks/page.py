@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +19,7 @@ from tasks.stages import stage_seconds, stages_of
 
 CAPTIONS: Final = {  # in the order of the page; other figures follow by name
     "planning-times": "Mean planning time with and without memory",
-    "controls": "Other ways to recall, repair, and controls",
+    "controls": "Mean planning time with the best recall and repair, beside a control",
     "continual-improvement": "Mean planning time as experience grows",
     "ablation": "Plans recalled or picked blindly",
     "solved-against-time": "Problems solved within a time",
@@ -80,6 +81,6 @@ def _made(run: RunFolder, settings: RunSettings, attempts: pd.DataFrame) -> dict
     return {
         "Rows": {"run": settings.run_name, **rows, **of_machine},
         "Stages": seconds or {"times": "not recorded"},
-        "Settings": {name: str(value) for name, value in asdict(settings).items()},
+        "Settings": {name: json.dumps(value) for name, value in asdict(settings).items()},
         "Versions": dict(measured["versions"]) if measured else {"versions": "not recorded"},
     }

@@ -74,7 +74,7 @@ def test_blind_picks_stand_beside_what_they_are_to_be_compared_with() -> None:
     summary = summarise(attempts(("curves",), ("gust",), [*STANDARD, *ABLATION]), resamples=10)
     figure = ablation(summary)
     labels = [label.get_text().replace("\n", " ") for label in figure.axes[0].get_xticklabels()]
-    alike = ["open 5 exhaustive", "open 1", "open 5"]
+    alike = ["open 5 exh.", "open 1", "open 5"]
     assert labels == ["none", *alike, "random open 1", "random open 5"]
 
 
