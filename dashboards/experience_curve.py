@@ -42,8 +42,8 @@ def experience_rows(recalls: pd.DataFrame) -> pd.DataFrame:
                 "problems": len(by_problem),
                 "seeds": of_class["training_seed"].nunique(),
                 "hit": hit,
-                "low": hit - error,
-                "high": hit + error,
+                "low": max(0.0, hit - error),
+                "high": min(1.0, hit + error),
                 "oracle": free.any(axis=1).mean(),
             }
         )
