@@ -120,8 +120,10 @@ def time_split(split: pd.DataFrame) -> Figure:
 
 
 def paper_configurations(summary: pd.DataFrame) -> list[Configuration]:
-    """The five configurations of the paper's panels; recalled by centroid, else as the rows have it."""
-    known = sorted(_configurations(summary), key=lambda each: each.recall not in ("", "centroid"))
+    """The five configurations of the paper's panels: recalled by centroid, if anything is."""
+    known = _configurations(summary)
+    if any(each.recall == "centroid" for each in known):
+        known = [each for each in known if each.recall in ("", "centroid")]
     found = [next((each for each in known if (each.assist, each.top_k) == bar), None) for bar in PAPER_BARS]
     return [
         each or Configuration(assist, "centroid" if k else "", k)

@@ -21,6 +21,7 @@ CAPTIONS: Final = {  # in the order of the page; other figures follow by name
     "planning-times": "Mean planning time with and without memory",
     "controls": "Mean planning time with the best recall and repair, beside a control",
     "continual-improvement": "Mean planning time as experience grows",
+    "experience-curve": "What is recalled as experience grows",
     "ablation": "Plans recalled or picked blindly",
     "solved-against-time": "Problems solved within a time",
     "performance-profile": "Performance profile",

@@ -38,7 +38,7 @@ from storage.results import read_attempts
 from tasks.caching import Chunk, run_folder
 from tasks.page import page_of
 from tasks.recalls import recall_chunks
-from tasks.settings import RunSettings
+from tasks.settings import COMBINED, RunSettings
 from tasks.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
@@ -95,11 +95,13 @@ def report_run(data: str, settings: RunSettings) -> Report:
 def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
     """Attempts of all runs that differ from this one in their number of ``experiences``, a column here.
 
-    Which planners, assists and problems they measured may differ too. Empty where there is no other number.
+    Which planners, assists and problems they measured may differ too: a planner on a class is here if several
+    runs measured it, and so are the attempts with the combined memory. Empty where there is no other number.
     """
-    found: dict[int, pd.DataFrame] = {}
-    for run in [*open_data_folder(data).runs(), run_folder(data, settings)]:  # this run last: it comes first
-        if not (run.settings.exists() and run.results.exists()):
+    own = run_folder(data, settings)
+    places = {settings.experiences: own.results}
+    for run in open_data_folder(data).runs():
+        if run.path == own.path or not (run.settings.exists() and run.results.exists()):
             continue
         try:
             asked = RunSettings.from_json(read_text(run.settings))
@@ -107,11 +109,18 @@ def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
             continue
         may_differ = {name: getattr(settings, name) for name in (*MEASURED, "experiences")}
         if replace(asked, **may_differ) == settings:
-            found[asked.experiences] = read_attempts(run.results, NOT_NEEDED)
-    if len(found) < 2:
+            places.setdefault(asked.experiences, run.results)
+    if len(places) < 2:
         return pd.DataFrame()
-    tables = [rows.assign(experiences=count) for count, rows in sorted(found.items())]
-    return pd.concat(tables, ignore_index=True)
+    tables = [
+        read_attempts(place, NOT_NEEDED).assign(experiences=count) for count, place in sorted(places.items())
+    ]
+    rows = pd.concat(tables, ignore_index=True)
+    combined = rows["memory"] == COMBINED
+    if rows.loc[combined, "experiences"].nunique() < 2:
+        rows = rows[~combined]
+    measured = rows.groupby(["problem_class", "planner"])["experiences"].transform("nunique")
+    return rows[measured > 1]
 
 
 def report_retrieval(data: str, settings: RunSettings) -> pd.DataFrame:

@@ -70,7 +70,7 @@ def test_what_was_not_attempted_is_seen_to_be_missing(attempt_rows: pd.DataFrame
     text = summary_markdown(summarise(attempt_rows[~missing], resamples=10))
     trap = text[text.index("### trap") :].splitlines()
     open_rows = [line for line in trap if "| open" in line]
-    assert len(open_rows) == 6
+    assert len(open_rows) == 9
     assert all(line.count(NOTHING) == len(FULL_HEADINGS) - 2 for line in open_rows)
 
 
