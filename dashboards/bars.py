@@ -195,17 +195,17 @@ def _bars(axes: Axes, rows: pd.DataFrame, bars: Sequence[Configuration]) -> None
 
 
 def colour_of(configuration: Configuration) -> str:
-    """A colour for a configuration, the same in every figure; lighter where the encoder recalled alone."""
+    """A colour for a configuration, the same in every figure; lighter with one recalled plan."""
     if configuration.recall == "random":
         return PURPLE
     colours = {
         "none": (GREY, GREY),
-        "closed": (BLUE, SKY),
-        "open": (VERMILLION, ORANGE),
+        "closed": (SKY, BLUE),
+        "open": (ORANGE, VERMILLION),
         "repair": (GREEN, GREEN),
         "fresh": (YELLOW, YELLOW),
     }
-    return colours.get(configuration.assist, (INK, INK))[configuration.recall == "centroid"]
+    return colours.get(configuration.assist, (INK, INK))[configuration.top_k > 1]
 
 
 def _stack(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:

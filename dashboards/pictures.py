@@ -89,7 +89,7 @@ def draw_plan(
     axes.plot(*states[-1, :2], marker="X", color=colour, markersize=8, markeredgecolor="white", zorder=7)
 
 
-def gallery(examples: Sequence[Example], title: str = "Recalled and found plans") -> Figure:
+def gallery(examples: Sequence[Example], title: str = "Recalled, repaired and found plans") -> Figure:
     """Problems with the plans recalled for them, free or in collision, and the plan that was found."""
     if not examples:
         return message_figure(title, "No problems to show: run the benchmark first.")

@@ -29,7 +29,9 @@ PALE: Final = "#E4E4E4"
 
 NOTE_SIZE: Final = 8.0
 PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
-LEGEND_COLUMNS: Final = 6
+_LEGEND_LINE: Final = 0.55  # inches of an entry beside its label
+_LEGEND_HEIGHT: Final = 0.2  # inches of a line of entries
+_LEGEND_LETTER: Final = 0.075  # inches
 _DPI: Final = 160
 _NOTE_LETTERS_AN_INCH: Final = 16.5  # at NOTE_SIZE, with room to spare
 
@@ -58,14 +60,18 @@ def new_figure(width: float, height: float, title: str, note: str = "") -> Figur
 
 
 def panels_below_legend(figure: Figure, rows: int, columns: int, entries: Mapping[str, Any]) -> Any:
-    """Axes ``[rows, columns]`` below a strip with a legend of ``entries``, label to what it stands for."""
-    lines = math.ceil(len(entries) / LEGEND_COLUMNS)
-    strip = 0.2 * lines / (figure.get_figheight() / rows)
+    """Axes ``[rows, columns]`` below a legend of ``entries``, by label, which adds to the height."""
+    widest = max(len(label) for label in entries)
+    fit = max(1, int((figure.get_figwidth() - 0.8) / (_LEGEND_LINE + widest * _LEGEND_LETTER)))
+    lines = math.ceil(len(entries) / fit)
+    height = figure.get_figheight()
+    strip = _LEGEND_HEIGHT * lines / (height / rows)
+    figure.set_figheight(height + _LEGEND_HEIGHT * lines)
     layout = figure.add_gridspec(rows + 1, columns, height_ratios=[strip, *[1.0] * rows])
     legend = figure.add_subplot(layout[0, :])
     legend.set_axis_off()
     legend.legend(
-        list(entries.values()), list(entries), loc="center left", ncols=LEGEND_COLUMNS, frameon=False,
+        list(entries.values()), list(entries), loc="center left", ncols=fit, frameon=False,
         fontsize=NOTE_SIZE + 0.5, borderaxespad=0.0,
     )  # fmt: skip
     return np.array([[figure.add_subplot(layout[i + 1, j]) for j in range(columns)] for i in range(rows)])

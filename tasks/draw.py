@@ -63,7 +63,7 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
             problem = source.problem("test", places[identity])
             attempt = solve(problem, planner, assist, SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
-            caption = f"{identity}: {kind}, {1000.0 * seconds:.1f} ms"
+            caption = f"{identity}: {kind}, {1000.0 * seconds:.2f} ms"
             yield Example(
                 problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption, vehicle
             )
