@@ -49,16 +49,17 @@ def test_experiences_come_back_exactly_and_give_the_same_bytes(
     assert path.read_bytes() == before
 
 
-def test_merged_shards_hold_the_first_rows_in_order(tmp_path: Path) -> None:
+def test_merged_shards_hold_the_chosen_rows_in_their_order(tmp_path: Path) -> None:
     found = [Experience(problem_with([box(20 + i, 20)], identity=f"p-{i}"), plan(5 + i)) for i in range(5)]
     shards = [tmp_path / "0000.parquet", tmp_path / "0001.parquet"]
     store(shards[0], found[:3], "a")
     store(shards[1], found[3:], "b")
-    assert merge_experiences(shards, tmp_path / "all.parquet", 4, "all") == 4
-    assert same(read_experiences(tmp_path / "all.parquet"), found[:4])
-    assert merge_experiences(shards, tmp_path / "all.parquet", 100) == 5
+    merge_experiences(shards, tmp_path / "all.parquet", [4, 0, 2], "all")
+    assert same(read_experiences(tmp_path / "all.parquet"), [found[i] for i in (4, 0, 2)])
+    with pytest.raises(StorageError, match="more than the 5 rows there are; run collect"):
+        merge_experiences(shards, tmp_path / "all.parquet", [0, 5])
     with pytest.raises(StorageError, match="run collect"):
-        merge_experiences([], tmp_path / "none.parquet", 4)
+        merge_experiences([], tmp_path / "none.parquet", [])
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
@@ -85,7 +86,7 @@ def test_experiences_of_two_vehicles_are_not_merged(tmp_path: Path) -> None:
     for shard, vehicle in zip(shards, (CAR, CAR_1_TRAILER), strict=True):
         store(shard, [Experience(problem_with(), plan(3, 0, vehicle), vehicle)], vehicle=vehicle)
     with pytest.raises(StorageError, match="several vehicles"):
-        merge_experiences(shards, tmp_path / "all.parquet", 2)
+        merge_experiences(shards, tmp_path / "all.parquet", [0, 1])
 
 
 def test_what_was_written_when_there_was_but_the_car_is_read(tmp_path: Path) -> None:
