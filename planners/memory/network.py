@@ -18,6 +18,12 @@ def unpacked(bits: Tensor) -> Tensor:
     return ((bits[:, :, None] >> shifts) & 1).to(torch.float32).view(-1, 1, GRID, GRID)
 
 
+def prelu(value: Tensor, slope: Tensor) -> Tensor:
+    """``value`` where it is positive, else ``slope`` times it; torch's own takes twice as long backwards."""
+    positive = functional.relu(value)
+    return torch.addcmul(positive, slope, value - positive)
+
+
 def embed(parameters: Parameters, bits: Tensor) -> Tensor:
     """Embeddings ``[n, D]`` of packed grids uint8 ``[n, 512]``."""
     convolutions, linears = layer_counts(parameters)
@@ -27,12 +33,12 @@ def embed(parameters: Parameters, bits: Tensor) -> Tensor:
         weight, bias = parameters[f"{name}.weight"], parameters[f"{name}.bias"]
         stride, padding = (PATCH, 0) if i == 0 else (1, 1)
         value = functional.conv2d(value, weight, bias, stride=stride, padding=padding)
-        value = functional.prelu(value, parameters[f"{name}.slope"].flatten())
+        value = prelu(value, parameters[f"{name}.slope"])
     value = value.flatten(1)
     for i in range(linears):
         value = functional.linear(value, parameters[f"linear.{i}.weight"], parameters[f"linear.{i}.bias"])
         if i + 1 < linears:
-            value = functional.prelu(value, parameters[f"linear.{i}.slope"])
+            value = prelu(value, parameters[f"linear.{i}.slope"])
     return value
 
 

@@ -55,7 +55,7 @@ def grow_rrt(
         from_x, from_y, x, y = guided(
             guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, settings.guide_lead, rng
         )
-        vertex = nearest(tree.buckets, from_x, from_y)
+        vertex = max(nearest(tree.buckets, from_x, from_y), 0)  # the root, where all others are dead ends
         extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
         if counts[GOAL_VERTEX] >= 0:
             return

@@ -5,8 +5,10 @@ from hypothesis import strategies as st
 
 from planners.search.outcome import Guide, Limits, Status
 from planners.search.registry import PLANNERS, plan
+from planners.search.tree import SIZE, allocate_tree
 from planners.world.authority import faults
 from planners.world.randomness import generator
+from planners.world.vehicle import CAR, state_size
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 EVERY = pytest.mark.parametrize("name", PLANNERS)
@@ -58,6 +60,25 @@ def test_a_full_tree_makes_room_for_a_new_one_until_all_expansions_are_used(name
     assert outcome.status is Status.BUDGET_SPENT
     assert outcome.expansions == limits.expansions
     assert outcome.nodes <= limits.nodes
+
+
+@EVERY
+@pytest.mark.parametrize("half_m", [2.5, 3.5])
+def test_a_tree_of_nothing_but_dead_ends_grows_from_its_root(name, half_m):
+    walls = [
+        (half_m, 0, 0.2, half_m),
+        (-half_m, 0, 0.2, half_m),
+        (0, half_m, half_m, 0.2),
+        (0, -half_m, half_m, 0.2),
+    ]
+    problem = problem_of([box(x, y, 0.0, length, width) for x, y, length, width in walls])
+    limits = Limits(expansions=5000)
+    outcome = plan(name, problem, generator(0), limits=limits)
+    assert outcome.status is Status.BUDGET_SPENT
+    tree = allocate_tree(limits.nodes, state_size(CAR))
+    parents = tree.parents[1 : tree.counts[SIZE]]
+    assert (parents >= 0).all()
+    assert (np.abs(tree.states[: tree.counts[SIZE], :2]) < half_m).all()
 
 
 @EVERY
