@@ -23,6 +23,7 @@ KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and
 CONNECT_SECONDS: Final = 5
 CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
+LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which reads files
 
 Client: Any = distributed.Client  # Dask has no types
 LocalCluster: Any = distributed.LocalCluster
@@ -127,12 +128,15 @@ def fan_out(
     sizes = [units(chunk) for chunk in chunks]
     with progress(description, sum(sizes)) as show:
         pending = dict(zip(range(len(chunks)), futures, strict=True))
-        done = 0
+        done = begun = 0
+        looked = time.monotonic()
         while pending:
             for i in [i for i, future in pending.items() if future.wrapped_future.done()]:
                 _check(pending.pop(i), chunks[i], description)
                 done += sizes[i]
-            show(max(done, min(partly_done(), sum(sizes))))
+            if time.monotonic() - looked >= LOOK_SECONDS:
+                begun, looked = partly_done(), time.monotonic()
+            show(max(done, min(begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
     return [future.result() for future in futures]
 

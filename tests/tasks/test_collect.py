@@ -8,6 +8,7 @@ import pytest
 
 from planners.world.authority import faults
 from storage.experiences import read_experiences
+from storage.imported import write_imported
 from storage.problems import write_problems
 from tasks.caching import Chunk, keep_settings, run_folder
 from tasks.collect import chunks_wanted, collect_chunk
@@ -69,14 +70,14 @@ def test_without_more_candidates_the_first_are_kept(tmp_path: Path) -> None:
 
 
 def test_a_folder_with_fewer_worlds_than_candidates_makes_do(tmp_path: Path, plain: list) -> None:
-    (tmp_path / "few" / "train").mkdir(parents=True)
-    (tmp_path / "few" / "test").mkdir()
+    for part in ("train", "test"):
+        write_problems(tmp_path / "few" / part / "problems.parquet", [each.problem for each in plain])
     settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "few"),))
     place = run_folder(str(tmp_path / "data"), settings).worlds("few", "train")
-    write_problems(place, [each.problem for each in plain])
+    write_imported(place, [each.problem for each in plain])
     assert len(collected(tmp_path / "data", settings)) == 4
     wanting = replace(settings, experiences=5)
-    write_problems(
+    write_imported(
         run_folder(str(tmp_path / "data"), wanting).worlds("few", "train"), [each.problem for each in plain]
     )
     with pytest.raises(RunError, match="Class few: 4 of 4 problems solved, 5 are wanted"):
