@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from planners.memory.labels import Flags
 from planners.world.problem import Integers, Problem
 from storage.columns import Bits, bits_column, bits_of, problem_columns, problems_of
 from storage.errors import StorageError
@@ -23,6 +24,11 @@ class Labelled(NamedTuple):
     plan_index: Integers  # int32 [n] the plan a problem was made for; -1: for none
     labels: Bits  # uint8 [n, ceil(N / 8)] which plans are free
     plans: int  # N
+
+    @property
+    def free(self) -> Flags:
+        """The labels as truth values ``[n, N]``."""
+        return np.unpackbits(self.labels, axis=1, count=self.plans).astype(bool)
 
 
 def write_hallucinated(

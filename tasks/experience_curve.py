@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pandas as pd
-from rich.console import Console
 
 from dashboards.experience_curve import experience_chart, experience_rows, experience_table
 from dashboards.style import save
@@ -14,7 +13,7 @@ from storage.recalls import read_recalls
 from tasks.caching import run_folder
 from tasks.continual import runs_of_continual
 from tasks.recalls import recall_chunks
-from tasks.report import COLUMNS
+from tasks.report import console
 from tasks.settings import COMBINED, RunSettings
 
 
@@ -29,8 +28,7 @@ def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
 def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
     """Print the curve of these runs, and draw it beside the figures of the run with all experiences."""
     rows = pd.concat([_rows(data, run) for run in runs], ignore_index=True)
-    console = Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
-    console.print(experience_table(rows))
+    console().print(experience_table(rows))
     save(experience_chart(rows), run_folder(data, runs[-1]).figures, "experience-curve")
 
 

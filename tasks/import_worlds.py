@@ -20,9 +20,8 @@ from storage.problems import LARGEST_SCALE, SMALLEST_SCALE, write_problems
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.progress import progress
-from tasks.settings import RunError, UsageError, check_known
+from tasks.settings import RunError, UsageError, check_known, check_picture
 
-PICTURES: Final = (".png", ".svg", ".pdf")
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
 SHOWN_SKIPPED: Final = 20
@@ -74,8 +73,7 @@ def import_worlds(
     check_known("part", [part], (*PARTS, BOTH))
     if out.suffix not in ("", *PROBLEM_FORMATS):
         raise UsageError(f"{out} is neither a folder's name nor ends in {', '.join(PROBLEM_FORMATS)}.")
-    if drawing is not None and drawing.suffix not in PICTURES:
-        raise UsageError(f"{drawing} is no picture's name. Known: {', '.join(PICTURES)}.")
+    check_picture(drawing)
     source = source_at(path, named)
     _refuse_unused(source, settings, drawing)
     if out.suffix == "":

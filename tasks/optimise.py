@@ -18,8 +18,7 @@ from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.files import whole_file
 from storage.plans import PlanRecord, read_plan, write_plan
 from storage.problems import read_problems
-from tasks.settings import RunError, UsageError, check_known
-from tasks.solve import PICTURES
+from tasks.settings import RunError, UsageError, check_known, check_picture
 
 STRAIGHT: Final = "straight-line"  # what a plan file calls its planner then
 
@@ -70,8 +69,7 @@ def optimise_one(
     begin: Beginning, problem: Path, clearance_weight: float, out: Path | None, drawing: Path | None
 ) -> None:
     """Optimise a plan for the one problem of a file; RunError when it does not converge."""
-    if drawing is not None and drawing.suffix not in PICTURES:
-        raise UsageError(f"{drawing} is no picture's name. Known: {', '.join(PICTURES)}.")
+    check_picture(drawing)
     if not 0.0 <= clearance_weight < float("inf"):
         raise UsageError(f"Clearance weight {clearance_weight}: give 0 or more.")
     problems = read_problems(problem, begin.vehicle)

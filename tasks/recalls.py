@@ -16,7 +16,7 @@ from planners.memory.masks import rank_by_cells
 from planners.memory.recall import Memory, rank
 from planners.memory.training import TrainedEncoder
 from planners.world.collision import scene_of
-from planners.world.occupancy import GRID, Grid, bits_of, occupancy_of
+from planners.world.occupancy import Grid, bits_of, occupancy_of, unpack
 from planners.world.problem import Integers
 from planners.world.vehicle import vehicle_named
 from storage.encoders import load_encoder
@@ -128,7 +128,7 @@ def _held_out(chunk: Chunk) -> Iterator[Asked]:
                 f"{name}-held-out-{i}",
                 class_name,
                 int(problems.plan_index[i]),
-                np.unpackbits(problems.grids[i]).reshape(GRID, GRID),
+                unpack(problems.grids[i]),
                 np.unpackbits(problems.labels[i], count=problems.plans).astype(bool),
             )
 

@@ -141,21 +141,22 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
 
 def show(report: Report) -> None:
     """Print the tables."""
-    _console().print(summary_table(report.summary))
+    console().print(summary_table(report.summary))
     show_retrieval(report.retrieval)
 
 
 def show_retrieval(retrieval: pd.DataFrame) -> None:
     """Print what the memories recall."""
-    _console().print(retrieval_table(retrieval))
+    console().print(retrieval_table(retrieval))
 
 
 def show_sweep(chunks: Sequence[Chunk]) -> None:
     """Print what the variants of a sweep came to."""
-    _console().print(sweep_table(sweep_rows(chunks)))
+    console().print(sweep_table(sweep_rows(chunks)))
 
 
-def _console() -> Console:
+def console() -> Console:
+    """Where tables are printed: as wide as the terminal, or as tables are without one."""
     return Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
 
 

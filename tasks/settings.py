@@ -48,6 +48,7 @@ CONTINUAL_PLANNER: Final = "gust"
 CONTINUAL_CLASS: Final = "curves"
 DEFAULT_VEHICLE: Final = "car"
 TAUGHT: Final = 1_000  # plans a class that the encoder is trained on; a larger memory grows beyond them
+PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
 COMBINED: Final = "combined"  # the memory that does not distinguish the classes
 
 
@@ -96,9 +97,7 @@ class RunSettings:
     optimised: bool = False  # collected plans are made shorter and clearer before they are kept
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
-    candidates: int = (
-        0  # solved problems a class of which the experiences are chosen; few: the first are kept
-    )
+    candidates: int = 0  # solved problems a class that experiences are chosen of; few: the first are kept
 
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
 
@@ -314,6 +313,12 @@ def _learning(asked: Mapping[str, Any]) -> Learning:
         return Learning(**asked)
     except ValueError as error:
         raise UsageError(str(error)) from None
+
+
+def check_picture(path: Path | None) -> None:
+    """UsageError where a path that was asked for does not end as a picture does."""
+    if path is not None and path.suffix not in PICTURES:
+        raise UsageError(f"{path} is no picture's name. Known: {', '.join(PICTURES)}.")
 
 
 def _count(what: str, asked: int | None, otherwise: int) -> int:

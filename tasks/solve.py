@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from dashboards.pictures import picture
 from planners.memory.recall import RECALLS, Memory
@@ -22,9 +21,7 @@ from storage.problems import read_problems
 from storage.results import write_attempts
 from tasks.attempts import attempt_row, check_attempt
 from tasks.model_registry import is_model_uri, load_from
-from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known
-
-PICTURES: Final = (".png", ".svg", ".pdf")
+from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known, check_picture
 
 
 class Assistant:
@@ -95,8 +92,7 @@ class Assistant:
 
 def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None) -> None:
     """Plan for the one problem of a file; RunError when it has another number, or no plan was found."""
-    if drawing is not None and drawing.suffix not in PICTURES:
-        raise UsageError(f"{drawing} is no picture's name. Known: {', '.join(PICTURES)}.")
+    check_picture(drawing)
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")

@@ -8,7 +8,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import pandas as pd
 
 from planners.memory.training import train
@@ -43,10 +42,9 @@ def sweep_chunk(chunk: Chunk) -> dict[str, Any]:
     """Train one variant for one memory, and note how well it ranks the validation problems."""
     settings = chunk.settings
     problems = problems_of_memory(chunk.data, settings, chunk.class_name)
-    labels = np.unpackbits(problems.labels, axis=1, count=problems.plans).astype(bool)
     learning = variants(settings)[chunk.index]
     asked = learning.settings(settings.objective, settings.epochs, settings.seed)
-    trained = train(problems.grids, problems.plan_index, labels, asked)
+    trained = train(problems.grids, problems.plan_index, problems.free, asked)
     best = max(trained.history, key=lambda epoch: epoch.hit_1)
     row = {
         "class": chunk.class_name,

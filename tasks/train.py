@@ -7,8 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from planners.memory.training import Checkpoint, train
 from planners.world.vehicle import vehicle_named
 from storage.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
@@ -29,14 +27,13 @@ def train_chunk(chunk: Chunk) -> dict[str, Any]:
     asked = chunk.settings
     problems = problems_of_memory(chunk.data, asked, chunk.class_name)
     settings = asked.learning.settings(asked.objective, asked.epochs, asked.seed + chunk.index)
-    labels = np.unpackbits(problems.labels, axis=1, count=problems.plans).astype(bool)
     place = _checkpoint(chunk)
 
     def on_epoch(checkpoint: Checkpoint) -> None:
         save_checkpoint(place, checkpoint, chunk.key)
 
     before = load_checkpoint(place, chunk.key)
-    trained = train(problems.grids, problems.plan_index, labels, settings, on_epoch, before)
+    trained = train(problems.grids, problems.plan_index, problems.free, settings, on_epoch, before)
     model = chunk.run.model(chunk.class_name, chunk.index)
     save_encoder(model, trained, vehicle_named(asked.vehicle))
     mark_done(model, chunk.key)

@@ -20,7 +20,7 @@ from planners.memory.labels import free_plans, sweep_plans
 from planners.solve import solve
 from planners.world.authority import faults
 from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
+from planners.world.occupancy import occupancy_of, pack
 from planners.world.randomness import generator
 from planners.world.vehicle import Vehicle, vehicle_named
 from storage.encoders import load_encoder
@@ -117,7 +117,7 @@ def _experiences(path: Path, vehicle: Vehicle) -> Findings:
 
 def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) -> Findings:
     problems, labelled = read_hallucinated_problems(path), read_labelled([path])
-    free = np.unpackbits(labelled.labels, axis=1, count=labelled.plans).astype(bool)
+    free = labelled.free
     experiences = taught_experiences(run, settings, name)
     sweeps = sweep_plans([each.plan for each in experiences], vehicle_named(settings.vehicle))
     made_for = labelled.plan_index
@@ -128,7 +128,7 @@ def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) 
     for i in again:
         if (free_plans(sweeps, scene_of(problems[i])) != free[i]).any():
             wrong.append(f"{path}: {problems[i].id} has other labels than its obstacles say")
-        if (np.packbits(occupancy_of(problems[i])) != labelled.grids[i]).any():
+        if (pack(occupancy_of(problems[i])) != labelled.grids[i]).any():
             wrong.append(f"{path}: {problems[i].id} has another grid than its obstacles say")
     read = {"hallucinated problems read": len(problems), "of these, grids and labels drawn again": len(again)}
     return Counter(read), wrong

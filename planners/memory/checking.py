@@ -6,17 +6,13 @@ answer is that of ``labels.plan_answers``, which needs the scene: some times as 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from planners.memory.labels import START_TOLERANCE, PlanSweeps
-from planners.world.collision import REACH_M, box_meets_piece, make_edges
+from planners.memory.labels import PlanSweeps, plan_joins
+from planners.world.collision import REACH_M, box_meets_piece, make_edges, piece_extent
 from planners.world.jit import inlined, lean
-from planners.world.occupancy import Bits, Drawing
+from planners.world.occupancy import ALL_CELLS, Bits, Drawing
 from planners.world.problem import BOUNDS, Floats, Integers, Problem
-
-_ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 
 
 @inlined
@@ -41,15 +37,7 @@ def _piece_meets(
     boxes: Floats, first_box: int, last_box: int, vertices: Floats, first: int, last: int, edges: Floats
 ) -> tuple[bool, int]:
     """Whether any of the boxes meets a convex piece, and on how many that was tried."""
-    x_min = math.inf
-    y_min = math.inf
-    x_max = -math.inf
-    y_max = -math.inf
-    for i in range(first, last):
-        x_min = min(x_min, vertices[i, 0])
-        x_max = max(x_max, vertices[i, 0])
-        y_min = min(y_min, vertices[i, 1])
-        y_max = max(y_max, vertices[i, 1])
+    x_min, y_min, x_max, y_max = piece_extent(vertices, first, last)
     x_min -= REACH_M
     y_min -= REACH_M
     x_max += REACH_M
@@ -85,20 +73,11 @@ def _first_free(
     narrow = bounds[0] > BOUNDS[0] or bounds[1] > BOUNDS[1] or bounds[2] < BOUNDS[2] or bounds[3] < BOUNDS[3]
     checks = 0
     for i in order:
-        if (
-            abs(sweeps.first_poses[i, 0] - start[0]) > START_TOLERANCE
-            or abs(sweeps.first_poses[i, 1] - start[1]) > START_TOLERANCE
-            or abs(sweeps.first_poses[i, 2] - start[2]) > START_TOLERANCE
-        ):
-            continue
-        if (
-            math.hypot(sweeps.last_positions[i, 0] - goal[0], sweeps.last_positions[i, 1] - goal[1])
-            > goal_radius
-        ):
+        if not plan_joins(sweeps, i, start, goal, goal_radius):
             continue
         first_box = sweeps.starts[i]
         last_box = sweeps.starts[i + 1]
-        outside = masks[i, 0] == _ALL  # it leaves the window: its cells say nothing
+        outside = masks[i, 0] == ALL_CELLS  # it leaves the window: its cells say nothing
         free = not (outside or narrow) or _inside(sweeps.boxes, first_box, last_box, bounds)
         for p in range(piece_starts.shape[0] - 1):
             if not free:

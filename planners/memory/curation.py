@@ -19,7 +19,7 @@ from planners.memory.labelling import label_problems
 from planners.memory.labels import Flags, sweep_plans
 from planners.memory.masks import masks_of
 from planners.world.jit import jit
-from planners.world.occupancy import Bits
+from planners.world.occupancy import ALL_CELLS, Bits
 from planners.world.problem import Floats, Integers
 from planners.world.vehicle import CAR, Vehicle
 
@@ -70,7 +70,7 @@ def similarity(masks: Bits, mask: Bits) -> Floats:
 
     Nothing is like a plan that leaves the window, of which all cells are set.
     """
-    if (mask == ~np.uint64(0)).all():
+    if (mask == ALL_CELLS).all():
         return np.zeros(len(masks))
     both = np.bitwise_count(masks & mask).sum(1, dtype=np.int64)
     either = np.bitwise_count(masks | mask).sum(1, dtype=np.int64)

@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.memory.encoder import Floats32
+from planners.memory.scores import insert
 from planners.world.jit import inlined, lean
 from planners.world.problem import Integers
 from planners.world.randomness import generator
@@ -82,21 +83,6 @@ def _nearest(rows: Floats32, centres: Floats32) -> np.ndarray[tuple[int, ...], n
 
 
 @inlined
-def _insert(item: int, score: float, found: int, items: Integers, scores: Floats32) -> int:
-    """Put an item among the best, if it is; how many there are then. Equal ones stay in order."""
-    if found == items.shape[0] and not score > scores[found - 1]:
-        return found
-    place = min(found, items.shape[0] - 1)
-    while place > 0 and score > scores[place - 1]:
-        scores[place] = scores[place - 1]
-        items[place] = items[place - 1]
-        place -= 1
-    scores[place] = score
-    items[place] = item
-    return min(found + 1, items.shape[0])
-
-
-@inlined
 def _score(row: Floats32, embedding: Floats32) -> float:
     score: float = row[embedding.shape[0]]
     for k in range(embedding.shape[0]):
@@ -115,11 +101,11 @@ def _search(
 ) -> int:
     probes = 0
     for i in range(lists.centres.shape[0]):
-        probes = _insert(i, _score(lists.centres[i], embedding), probes, probed, list_scores)
+        probes = insert(i, _score(lists.centres[i], embedding), probes, probed, list_scores)
     found = 0
     for i in range(probes):
         for r in range(lists.starts[probed[i]], lists.starts[probed[i] + 1]):
-            found = _insert(lists.plans[r], _score(lists.rows[r], embedding), found, best, scores)
+            found = insert(lists.plans[r], _score(lists.rows[r], embedding), found, best, scores)
     return found
 
 

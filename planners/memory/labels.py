@@ -105,6 +105,43 @@ def free_plans(sweeps: PlanSweeps, scene: Scene) -> Flags:
     return free
 
 
+@inlined
+def plan_joins(
+    sweeps: PlanSweeps,
+    i: int,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    goal_radius: float,
+) -> bool:
+    """Whether plan ``i`` begins at a start pose and ends in a goal disc."""
+    if (
+        abs(sweeps.first_poses[i, 0] - start[0]) > START_TOLERANCE
+        or abs(sweeps.first_poses[i, 1] - start[1]) > START_TOLERANCE
+        or abs(sweeps.first_poses[i, 2] - start[2]) > START_TOLERANCE
+    ):
+        return False
+    last = sweeps.last_positions
+    return math.hypot(last[i, 0] - goal[0], last[i, 1] - goal[1]) <= goal_radius
+
+
+@inlined
+def turned_box_is_free(
+    boxes: Floats, j: int, px: float, py: float, cos: float, sin: float, scene: Scene
+) -> bool:
+    """Whether box ``j``, turned about (px, py) by an angle of that cosine and sine, is free."""
+    dx = boxes[j, 0] - px
+    dy = boxes[j, 1] - py
+    return box_is_free(
+        px + cos * dx - sin * dy,
+        py + sin * dx + cos * dy,
+        cos * boxes[j, 2] - sin * boxes[j, 3],
+        sin * boxes[j, 2] + cos * boxes[j, 3],
+        boxes[j, 4],
+        boxes[j, 5],
+        scene,
+    )
+
+
 @jit
 def plan_is_free(
     sweeps: PlanSweeps,
@@ -118,14 +155,7 @@ def plan_is_free(
 
     Also how many footprints were checked to know.
     """
-    pose = sweeps.first_poses[i]
-    if (
-        abs(pose[0] - start[0]) > START_TOLERANCE
-        or abs(pose[1] - start[1]) > START_TOLERANCE
-        or abs(pose[2] - start[2]) > START_TOLERANCE
-    ):
-        return False, 0
-    if math.hypot(sweeps.last_positions[i, 0] - goal[0], sweeps.last_positions[i, 1] - goal[1]) > goal_radius:
+    if not plan_joins(sweeps, i, start, goal, goal_radius):
         return False, 0
     return sweep_is_free(sweeps, i, scene)
 
@@ -151,19 +181,8 @@ def turned_plan_is_free(
     dy = sweeps.last_positions[i, 1] - py
     if math.hypot(px + cos * dx - sin * dy - goal[0], py + sin * dx + cos * dy - goal[1]) > goal_radius:
         return False, 0
-    boxes = sweeps.boxes
     for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
-        dx = boxes[j, 0] - px
-        dy = boxes[j, 1] - py
-        if not box_is_free(
-            px + cos * dx - sin * dy,
-            py + sin * dx + cos * dy,
-            cos * boxes[j, 2] - sin * boxes[j, 3],
-            sin * boxes[j, 2] + cos * boxes[j, 3],
-            boxes[j, 4],
-            boxes[j, 5],
-            scene,
-        ):
+        if not turned_box_is_free(sweeps.boxes, j, px, py, cos, sin, scene):
             return False, j - sweeps.starts[i] + 1
     return True, sweeps.starts[i + 1] - sweeps.starts[i]
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from planners.memory.labels import PlanSweeps
 from planners.world.jit import inlined, lean
-from planners.world.occupancy import GRID, Bits, draw_piece
+from planners.world.occupancy import ALL_CELLS, GRID, Bits, draw_piece
 from planners.world.problem import BOUNDS, Floats, Integers
 
 ROUNDING_M = 1e-6  # boxes are drawn that much larger, so that rounding never loses a cell
 MOST_CELLS = 511  # a plan sweeps some 200: beyond this, one is as blocked as another
-_ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
 _PAIRS = np.uint64(0x5555555555555555)
 _NIBBLES = np.uint64(0x3333333333333333)
 _BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -48,7 +47,7 @@ def _draw_sweeps(sweeps: PlanSweeps, corners: Floats, words: Bits, spans: Floats
                 masks[i, row] |= words[row]
         if not inside:
             for row in range(GRID):
-                masks[i, row] = _ALL
+                masks[i, row] = ALL_CELLS
 
 
 def masks_of(sweeps: PlanSweeps) -> Bits:
@@ -96,7 +95,7 @@ def _rank(masks: Bits, occupied: Bits, ranking: Ranking) -> None:
         for row in range(GRID):
             count += count_bits(masks[i, row] & occupied[row])
         blocked = min(int(np.int64(count)), MOST_CELLS)  # an unsigned one would make floats
-        if masks[i, 0] == _ALL:  # it leaves the window
+        if masks[i, 0] == ALL_CELLS:  # it leaves the window
             blocked = MOST_CELLS
         cells[i] = blocked
         places[blocked + 1] += 1

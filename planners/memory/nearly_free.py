@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from planners.memory.labels import START_TOLERANCE, PlanSweeps
-from planners.world.collision import Scene, box_is_free
+from planners.memory.labels import START_TOLERANCE, PlanSweeps, turned_box_is_free
+from planners.world.collision import Scene
 from planners.world.jit import lean
 from planners.world.problem import Integers
 
@@ -20,7 +20,6 @@ def least_blocked(
 
     Plans are turned rigidly about their first position to the start's heading; of equal ones the first.
     """
-    boxes = sweeps.boxes
     best = -1
     fewest = 0
     checks = 0
@@ -36,18 +35,8 @@ def least_blocked(
         for j in range(first, first + (sweeps.starts[i + 1] - first + SHARE - 1) // SHARE):
             if best >= 0 and blocked >= fewest:
                 break
-            dx = boxes[j, 0] - px
-            dy = boxes[j, 1] - py
             checks += 1
-            blocked += not box_is_free(
-                px + cos * dx - sin * dy,
-                py + sin * dx + cos * dy,
-                cos * boxes[j, 2] - sin * boxes[j, 3],
-                sin * boxes[j, 2] + cos * boxes[j, 3],
-                boxes[j, 4],
-                boxes[j, 5],
-                scene,
-            )
+            blocked += not turned_box_is_free(sweeps.boxes, j, px, py, cos, sin, scene)
         if best < 0 or blocked < fewest:
             best = i
             fewest = blocked

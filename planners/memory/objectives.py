@@ -97,7 +97,7 @@ class Triplet:
     def readout(
         self, own: Mapping[str, Tensor], embeddings: Tensor, rows: Tensor, count: int
     ) -> tuple[Tensor, Tensor]:
-        """The sample's centroids, ranked by distance (``centroids.nearest_readout``)."""
+        """The sample's centroids, ranked by distance (``readout.nearest_readout``)."""
         known = rows >= 0
         sizes = torch.bincount(rows[known], minlength=count)
         sums = embeddings.new_zeros((count, embeddings.shape[1]))

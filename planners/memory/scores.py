@@ -10,30 +10,34 @@ from __future__ import annotations
 import numpy as np
 
 from planners.memory.encoder import Floats32
-from planners.world.jit import lean
+from planners.world.jit import inlined, lean
 from planners.world.problem import Integers
 
 MOST_INSERTED = 1024  # plans that are kept sorted one by one: with more, sorting all is faster
 
 
+@inlined
+def insert(item: int, score: float, found: int, items: Integers, scores: Floats32) -> int:
+    """Put an item among the ``found`` best, if it is; how many there are then. Equal ones stay in order."""
+    if found == items.shape[0] and not score > scores[found - 1]:
+        return found
+    place = min(found, items.shape[0] - 1)
+    while place > 0 and score > scores[place - 1]:
+        scores[place] = scores[place - 1]
+        items[place] = items[place - 1]
+        place -= 1
+    scores[place] = score
+    items[place] = item
+    return min(found + 1, items.shape[0])
+
+
 @lean
 def _select(scores: Floats32, biases: Floats32, best: Integers, highest: Floats32) -> tuple[int, bool]:
     """Fill ``best [k]`` with the plans that score highest; how many, and whether row 0 scores higher."""
-    k = best.shape[0]
     found = 0
     nothing = scores[0] + biases[0]
     for row in range(1, scores.shape[0]):
-        score = scores[row] + biases[row]
-        if found == k and not score > highest[k - 1]:
-            continue
-        place = min(found, k - 1)
-        while place > 0 and score > highest[place - 1]:  # equal ones in order of storing
-            highest[place] = highest[place - 1]
-            best[place] = best[place - 1]
-            place -= 1
-        highest[place] = score
-        best[place] = row - 1
-        found = min(found + 1, k)
+        found = insert(row - 1, scores[row] + biases[row], found, best, highest)
     return found, found == 0 or nothing > highest[0]
 
 

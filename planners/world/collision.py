@@ -103,6 +103,21 @@ def make_edges(vertices: Floats, first: int, last: int, edges: Floats, target: i
         edges[edge, Y] = vertices[i, 1]
 
 
+@inlined
+def piece_extent(vertices: Floats, first: int, last: int) -> tuple[float, float, float, float]:
+    """Least x and y, and greatest x and y, of a piece ``vertices[first : last]``."""
+    x_min = math.inf
+    y_min = math.inf
+    x_max = -math.inf
+    y_max = -math.inf
+    for i in range(first, last):
+        x_min = min(x_min, vertices[i, 0])
+        x_max = max(x_max, vertices[i, 0])
+        y_min = min(y_min, vertices[i, 1])
+        y_max = max(y_max, vertices[i, 1])
+    return x_min, y_min, x_max, y_max
+
+
 @jit
 def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
     """Edges and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
@@ -120,15 +135,7 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
     for p in range(pieces):
         first = piece_starts[p]
         last = piece_starts[p + 1]
-        x_min = math.inf
-        y_min = math.inf
-        x_max = -math.inf
-        y_max = -math.inf
-        for i in range(first, last):
-            x_min = min(x_min, vertices[i, 0])
-            x_max = max(x_max, vertices[i, 0])
-            y_min = min(y_min, vertices[i, 1])
-            y_max = max(y_max, vertices[i, 1])
+        x_min, y_min, x_max, y_max = piece_extent(vertices, first, last)
         column_0 = max(0, math.floor((x_min - REACH_M - bounds[0]) / CELL_M))
         column_1 = min(columns - 1, math.floor((x_max + REACH_M - bounds[0]) / CELL_M))
         row_0 = max(0, math.floor((y_min - REACH_M - bounds[1]) / CELL_M))

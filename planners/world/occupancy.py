@@ -17,7 +17,7 @@ Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint64]]
 GRID = 64  # cells a side, and bits of a word
 CELL = (BOUNDS[2] - BOUNDS[0]) / GRID  # metres a side
 _LEFT, _BOTTOM = BOUNDS[0], BOUNDS[1]
-_ALL = np.uint64(0xFFFFFFFFFFFFFFFF)
+ALL_CELLS = np.uint64(0xFFFFFFFFFFFFFFFF)  # of a row
 _ONE = np.uint64(1)
 _LEAST_PIECES = 256  # convex pieces that the buffers hold at least
 
@@ -49,7 +49,7 @@ def allocate_drawing(pieces: int) -> Drawing:
 @inlined
 def cells_between(first: int, last: int) -> np.uint64:
     """The word whose bits ``first`` to ``last`` are set; both are at least 0 and at most 63."""
-    return np.uint64((_ALL << np.uint64(first)) & (_ALL >> np.uint64(GRID - 1 - last)))
+    return np.uint64((ALL_CELLS << np.uint64(first)) & (ALL_CELLS >> np.uint64(GRID - 1 - last)))
 
 
 @lean
@@ -105,7 +105,7 @@ def _draw_outside(x_min: float, y_min: float, x_max: float, y_max: float, occupi
     for row in range(GRID):
         bottom = _BOTTOM + row * CELL
         inside = bottom >= y_min and bottom + CELL <= y_max
-        occupied[row] = _ALL ^ columns if inside else _ALL
+        occupied[row] = ALL_CELLS ^ columns if inside else ALL_CELLS
 
 
 @lean

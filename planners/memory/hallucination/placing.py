@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.memory.experience import Experience
-from planners.world.collision import box_meets_piece, make_edges
+from planners.world.collision import box_meets_piece, make_edges, piece_extent
 from planners.world.jit import jit
 from planners.world.problem import Floats, Obstacles
 from planners.world.trigonometry import length
@@ -101,15 +101,7 @@ def obstacle_meets(obstacles: Obstacles, o: int, boxes: Floats, widened_m: float
         vertices = obstacles.vertices[obstacles.piece_starts[p] : obstacles.piece_starts[p + 1]]
         count = vertices.shape[0]
         make_edges(vertices, 0, count, edges, 0)
-        x_min = math.inf
-        y_min = math.inf
-        x_max = -math.inf
-        y_max = -math.inf
-        for i in range(count):
-            x_min = min(x_min, vertices[i, 0])
-            x_max = max(x_max, vertices[i, 0])
-            y_min = min(y_min, vertices[i, 1])
-            y_max = max(y_max, vertices[i, 1])
+        x_min, y_min, x_max, y_max = piece_extent(vertices, 0, count)
         t = 0
         while t < boxes.shape[0]:
             skipped = boxes.shape[0]
