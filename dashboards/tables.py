@@ -31,7 +31,19 @@ RETRIEVAL_HEADINGS: Final = (
     "class", "memory", "protocol", "recall", "origin@1", "origin@5", "hit@1", "hit@5", "oracle", "none",
     "count",
 )  # fmt: skip
-NAMES: Final = {"planner", "configuration", "panel", "class", "memory", "protocol", "recall"}  # to the left
+STAGE_HEADINGS: Final = (
+    "stage", "seconds", "chunks", "workers", "between chunks %", "a worker's MB, first chunk", "last chunk",
+)  # fmt: skip
+NAMES: Final = {
+    "stage",
+    "planner",
+    "configuration",
+    "panel",
+    "class",
+    "memory",
+    "protocol",
+    "recall",
+}  # to the left
 
 _Rows = list[list[str]]
 
@@ -63,6 +75,11 @@ def retrieval_markdown(retrieval: pd.DataFrame) -> str:
     """Retrieval as a Markdown table, in per cent of the problems."""
     lines = [cells for group in retrieval_groups(retrieval) for cells in group]
     return _markdown(RETRIEVAL_HEADINGS, lines)
+
+
+def stages_table(rows: Sequence[Sequence[str]]) -> Table:
+    """Stages of a run for a terminal: rows of ``STAGE_HEADINGS``."""
+    return _rich("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
 
 
 def claims_markdown(claims: Sequence[Claim]) -> str:

@@ -19,7 +19,7 @@ from tasks.stages import timed
 def report(settings: RunSettings, data: str) -> None:
     """Turn the rows of a run into tables and figures, print the tables, and log all of it."""
     fan_out(draw_figures, figure_chunks(data, settings), "draw", is_drawn)
-    found = report_run(data, settings)
+    found, run = report_run(data, settings), run_folder(data, settings)
     log_report(data, settings, found)
-    publish(run_folder(data, settings), found.claims)
-    show(found)
+    publish(run, found.claims)
+    show(found, run)

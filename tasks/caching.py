@@ -18,6 +18,7 @@ from storage.errors import StorageError
 from storage.files import read_json, write_json
 from storage.layout import RunFolder, open_data_folder
 from tasks.settings import RunSettings
+from tasks.work import measured
 
 PACKAGES: Final = ("planners", "storage", "tasks")  # an edit in one of them makes every chunk anew
 RETRIES: Final = 1  # a disk or a network may stumble once; whoever fails twice fails
@@ -115,7 +116,7 @@ def chunk_task(function: Callable[[Chunk], dict[str, Any]]) -> Task[[Chunk], dic
         persist_result=True,
         retries=RETRIES,
         retry_delay_seconds=1,
-    )(function)
+    )(measured(function))
 
 
 def _cache_key(chunk: Chunk) -> str:

@@ -18,6 +18,7 @@ from prefect_dask.task_runners import DaskTaskRunner
 from tasks.caching import Chunk
 from tasks.progress import progress
 from tasks.settings import RunError
+from tasks.work import WORK, note
 
 KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
 CONNECT_SECONDS: Final = 5
@@ -122,6 +123,7 @@ def fan_out(
     A chunk whose shard is not ``is_done`` is done again, whatever the cache says. ``units`` are what the bar
     counts; ``partly_done`` tells those of chunks still at work. ChunkError at the first failure.
     """
+    began = time.time()
     futures: list[Any] = [
         task.with_options(refresh_cache=not is_done(chunk)).submit(chunk) for chunk in chunks
     ]
@@ -138,7 +140,9 @@ def fan_out(
                 begun, looked = partly_done(), time.monotonic()
             show(max(done, min(begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
-    return [future.result() for future in futures]
+    results = [future.result() for future in futures]
+    note(description, results, began)
+    return [{name: value for name, value in result.items() if name != WORK} for result in results]
 
 
 def _check(future: Any, chunk: Chunk, description: str) -> None:

@@ -15,7 +15,7 @@ from dashboards.page import Picture, page
 from dashboards.verdicts import Claim
 from storage.layout import RunFolder
 from tasks.settings import RunSettings
-from tasks.stages import stage_seconds, stages_of
+from tasks.stages import stage_cells, stages_of
 
 CAPTIONS: Final = {  # in the order of the page; other figures follow by name
     "planning-times": "Mean planning time with and without memory",
@@ -78,10 +78,14 @@ def _made(run: RunFolder, settings: RunSettings, attempts: pd.DataFrame) -> dict
     rows = {name: ", ".join(sorted(set(attempts[name].dropna()))) or "unknown" for name in ("host", "commit")}
     measured = next((each for each in reversed(records) if each["stage"] == "benchmark"), None)
     of_machine = {name: str(measured[name]) for name in ("processor", "system")} if measured else {}
-    seconds = {name: f"{value:,.1f} s" for name, value in stage_seconds(records).items()}
+    stages = {
+        name: f"{seconds} s; {chunks} chunks by {workers} workers, {between} % of their time between chunks; "
+        f"{first} MB a worker after the first chunk, {last} MB after the last"
+        for name, seconds, chunks, workers, between, first, last in stage_cells(records)
+    }
     return {
         "Rows": {"run": settings.run_name, **rows, **of_machine},
-        "Stages": seconds or {"times": "not recorded"},
+        "Stages": stages or {"times": "not recorded"},
         "Settings": {name: json.dumps(value) for name, value in asdict(settings).items()},
         "Versions": dict(measured["versions"]) if measured else {"versions": "not recorded"},
     }

@@ -27,18 +27,20 @@ from dashboards.tables import (
     claims_markdown,
     retrieval_markdown,
     retrieval_table,
+    stages_table,
     summary_markdown,
     summary_table,
 )
 from dashboards.verdicts import Claim
 from storage.files import read_text, whole_file
-from storage.layout import open_data_folder
+from storage.layout import RunFolder, open_data_folder
 from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.caching import Chunk, run_folder
 from tasks.page import page_of
 from tasks.recalls import recall_chunks
 from tasks.settings import COMBINED, RunSettings
+from tasks.stages import stage_cells, stages_of
 from tasks.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
@@ -139,10 +141,11 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
     return read_recalls(shards)
 
 
-def show(report: Report) -> None:
-    """Print the tables."""
+def show(report: Report, run: RunFolder) -> None:
+    """Print the tables, and how the stages went."""
     console().print(summary_table(report.summary))
     show_retrieval(report.retrieval)
+    console().print(stages_table(stage_cells(stages_of(run))))
 
 
 def show_retrieval(retrieval: pd.DataFrame) -> None:

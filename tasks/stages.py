@@ -11,11 +11,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from dashboards.tables import NOTHING
 from storage.files import read_json, write_json
 from storage.layout import RunFolder
 from tasks.attempts import commit
 from tasks.caching import run_folder
 from tasks.settings import RunSettings
+from tasks.work import Load, loads, whole
 
 PACKAGES: Final = (
     "numpy", "numba", "scipy", "pandas", "pyarrow", "torch", "onnxruntime", "python-fcl", "shapely",
@@ -29,10 +31,16 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
     @functools.wraps(stage)
     def wrapped(settings: RunSettings, data: str) -> None:
         began, clock = datetime.now(UTC), time.perf_counter()
-        stage(settings, data)
+        with loads() as found:
+            stage(settings, data)
         seconds = time.perf_counter() - clock
         run = run_folder(data, settings)
-        made = {"stage": stage.__name__, "began": began.isoformat(timespec="seconds"), "seconds": seconds}
+        made = {
+            "stage": stage.__name__,
+            "began": began.isoformat(timespec="seconds"),
+            "seconds": seconds,
+            "fan_outs": [load._asdict() for load in found],
+        }
         write_json(run.stages, [*stages_of(run), made | machine()])
 
     return wrapped
@@ -40,13 +48,28 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
 
 def stages_of(run: RunFolder) -> list[dict[str, Any]]:
     """The records of a run's stages, oldest first; a stage that was continued has several."""
-    return list(read_json(run.stages)) if run.stages.exists() else []
+    records = read_json(run.stages) if run.stages.exists() else []
+    return [{"fan_outs": []} | record for record in records]  # older ones do not say
 
 
 def stage_seconds(records: Sequence[dict[str, Any]]) -> dict[str, float]:
     """Seconds that each stage took in all."""
     names = dict.fromkeys(record["stage"] for record in records)
     return {name: sum(each["seconds"] for each in records if each["stage"] == name) for name in names}
+
+
+def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
+    """A row of ``dashboards.tables.STAGE_HEADINGS`` for each stage; dashes where no chunk was to be done."""
+    rows = []
+    for name, seconds in stage_seconds(records).items():
+        load = whole([Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]])
+        of_load = [NOTHING] * 5
+        if load is not None:
+            megabytes = [f"{size / 1e6:,.0f}" for size in (load.first_bytes, load.last_bytes)]
+            shares = [f"{load.chunks:,}", str(load.workers), f"{100.0 * load.orchestration:.1f}"]
+            of_load = [*shares, *megabytes]
+        rows.append([name, f"{seconds:,.1f}", *of_load])
+    return rows
 
 
 @functools.cache

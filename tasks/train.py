@@ -54,11 +54,11 @@ def is_trained(chunk: Chunk) -> bool:
 
 
 def train_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each memory and training seed; its units are epochs."""
+    """One chunk for each memory and training seed; its units are epochs. The largest memory comes first."""
     made = [*hallucination_chunks(data, settings), *relabel_chunks(data, settings)]
     return [
         chunk
-        for name in memory_names(settings)
+        for name in reversed(memory_names(settings))  # the longest training would end alone if it came last
         for chunk in chunks_of(
             data,
             settings,
