@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -126,8 +125,10 @@ class Options:
 
 def worker_count(asked: int | None) -> int:
     """How many worker processes; UsageError for fewer than one."""
+    from dask.system import CPU_COUNT  # of this process: with its affinity and its control group
+
     from tasks.settings import UsageError
 
     if asked is not None and asked < 1:
         raise UsageError(f"{asked} workers: give 1 or more.")
-    return asked or os.cpu_count() or 1
+    return asked or int(CPU_COUNT)

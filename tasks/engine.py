@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +11,7 @@ from typing import Any, Final
 
 import dask
 import distributed
+from dask.system import CPU_COUNT
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
@@ -47,7 +47,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     if around is not None:
         yield around
         return
-    with _connected(scheduler) if scheduler else _local(workers or os.cpu_count() or 1) as address:
+    with _connected(scheduler) if scheduler else _local(workers or int(CPU_COUNT)) as address:
         token = _shared.set(address)
         try:
             yield address

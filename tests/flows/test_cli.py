@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from flows.cli import app, call
+from flows.options import worker_count
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
@@ -110,3 +112,12 @@ def test_help_is_quick() -> None:
     )
     assert done.stdout.strip().endswith("False")
     assert time.monotonic() - began < 3.0  # a third of a second on an idle machine
+
+
+def test_without_a_number_there_are_as_many_workers_as_this_process_may_use_cores() -> None:
+    command = [sys.executable, "-c", "from flows.options import worker_count as n; print(n(None))"]
+    core = min(os.sched_getaffinity(0))
+    told = subprocess.run(["taskset", "-c", str(core), *command], capture_output=True, text=True, check=True)
+    assert told.stdout == "1\n"
+    assert 1 <= worker_count(None) <= len(os.sched_getaffinity(0))
+    assert worker_count(7) == 7
