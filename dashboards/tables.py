@@ -32,7 +32,7 @@ RETRIEVAL_HEADINGS: Final = (
     "count",
 )  # fmt: skip
 STAGE_HEADINGS: Final = (
-    "stage", "seconds", "chunks", "workers", "between chunks %", "a worker's MB, first chunk", "last chunk",
+    "stage", "seconds", "chunks", "workers", "between chunks %", "worker's MB at first", "at last",
 )  # fmt: skip
 NAMES: Final = {
     "stage",
@@ -234,7 +234,7 @@ def _reduction(value: float, low: float, high: float) -> str:
 
 
 def _rich(title: str, headings: Sequence[str], groups: Sequence[_Rows]) -> Table:
-    """A table with numbers to the right and a gap between groups, each named on its first line only."""
+    """A table with numbers to the right and a gap after groups of several lines, named on the first only."""
     table = Table(
         title=title,
         title_justify="left",
@@ -247,7 +247,7 @@ def _rich(title: str, headings: Sequence[str], groups: Sequence[_Rows]) -> Table
         table.add_column(heading, justify="left" if heading in NAMES else "right", no_wrap=True)
     for group in groups:
         for i, cells in enumerate(group):
-            table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1)
+            table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1 > 0)
     return table
 
 

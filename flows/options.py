@@ -63,7 +63,8 @@ class Options:
     learning_rate
         The highest of its schedule.
     origin_weight
-        Objective labels: how much the plan a problem was made for should come before others that are free.
+        Objective labels: how much, at first, the plan a problem was made for should come before others that
+        are free; falls to a tenth.
     margin
         Objective triplet: how much farther a dissimilar problem should be than a similar one.
     semi_hard

@@ -25,22 +25,20 @@ class Learner:
         problems: tuple[Grid, Integers, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]],
         weights: Weights,
         own: Weights,
-        objective: Objective,
         weight_decay: float,
         device: torch.device,
     ) -> None:
-        """``weights`` of the encoder and the objective's ``own`` parameters are what it begins with."""
+        """``weights`` of the encoder and an objective's ``own`` parameters are what it begins with."""
         grids, rows, free = problems
         self._bits = torch.from_numpy(np.ascontiguousarray(grids)).to(device)
         self._rows = torch.from_numpy(rows.astype(np.int64)).to(device)
         self._free = torch.from_numpy(free).to(device)
-        self._objective = objective
         self._parameters = FlatParameters(weights | own, device)
         self._optimiser = AdamW(self._parameters.values, weight_decay)
         self._forward = forward_on(device)
         self._best = self._parameters.values.detach().clone()
 
-    def epoch(self, order: Integers, batch: int, steps: int, rate: float) -> float:
+    def epoch(self, objective: Objective, order: Integers, batch: int, steps: int, rate: float) -> float:
         """Learn from the problems ``order`` in batches; the mean loss.
 
         ``rate`` is the highest of a schedule over ``steps`` in all.
@@ -49,19 +47,19 @@ class Learner:
         for part in torch.split(torch.from_numpy(order).to(self._bits.device), batch):
             named = self._parameters.named()
             embeddings = self._forward(named, self._bits[part])
-            loss = self._objective.loss(named, embeddings, self._rows[part], self._free[part])
+            loss = objective.loss(named, embeddings, self._rows[part], self._free[part])
             (gradient,) = torch.autograd.grad(loss, self._parameters.values)
             self._optimiser.step(gradient, one_cycle(self._optimiser.steps, steps, rate))
             losses.append(loss.detach())
         return float(torch.stack(losses).mean())
 
     @torch.no_grad()
-    def scores(self, asked: Integers, sample: Integers) -> Floats32:
+    def scores(self, objective: Objective, asked: Integers, sample: Integers) -> Floats32:
         """Scores ``[len(asked), N]`` of all plans; ``sample``: problems that a readout may be made from."""
         named = self._parameters.named()
         embeddings = embed_all(named, self._bits[sample])
         rows = self._rows[sample]
-        vectors, biases = self._objective.readout(named, embeddings, rows, self._free.shape[1])
+        vectors, biases = objective.readout(named, embeddings, rows, self._free.shape[1])
         return _array((embed_all(named, self._bits[asked]) @ vectors.T + biases)[:, 1:])
 
     def keep(self) -> None:

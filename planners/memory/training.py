@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 OBJECTIVES: Final = ("labels", "triplet")
 CENTROID_SAMPLE = 50  # training problems a plan, for the centroids of an epoch's metrics
+ORIGIN_LEFT: Final = 0.1  # share of the origin's weight in the last epoch
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class TrainingSettings:
     learning_rate: float = 3e-3  # the highest of a one-cycle schedule
     weight_decay: float = 0.1  # decoupled, AdamW
     first_weight: float = 1.0  # of the label objective: that a free plan comes first
-    origin_weight: float = 2.0  # of the label objective: that the plan a problem was made for does
+    origin_weight: float = 40.0  # of the label objective, at first: that the plan a problem was made for does
     margin: float = 1.0  # of the triplet objective
     semi_hard: bool = False  # of the triplet objective: which triplets count
     architecture: Architecture = field(default_factory=Architecture)
@@ -132,7 +133,7 @@ def train(
     rows = np.where(plan_index >= 0, plan_index + 1, np.where(free[:, 0], 0, -1)).astype(np.int32)
     sample = parts.training[first_of_each(rows[parts.training], CENTROID_SAMPLE)]
     steps = -(-len(parts.training) // settings.batch)  # an epoch
-    objective = _objective(settings)
+    objective = _objective(settings, 0)
     weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
     dimensions = settings.architecture.dimensions
     own = objective.initial(free.shape[1], dimensions, generator(settings.seed, "readout"))
@@ -140,13 +141,16 @@ def train(
     began = time.perf_counter() - (history[-1].seconds if history else 0.0)
     with deterministic(settings.threads) as device:
         problems = (grids_packed, rows, free)
-        learner = Learner(problems, weights, own, objective, settings.weight_decay, device)
+        learner = Learner(problems, weights, own, settings.weight_decay, device)
         if checkpoint is not None:
             learner.restore(checkpoint[1:], len(history) * steps)
         while len(history) < settings.epochs and not _is_tired(history, settings.patience):
             order = generator(settings.seed, "epoch", len(history)).permutation(parts.training)
-            loss = learner.epoch(order, settings.batch, settings.epochs * steps, settings.learning_rate)
-            scores = learner.scores(parts.validation, sample)
+            objective = _objective(settings, len(history))
+            loss = learner.epoch(
+                objective, order, settings.batch, settings.epochs * steps, settings.learning_rate
+            )
+            scores = learner.scores(objective, parts.validation, sample)
             known = labels[parts.validation]
             hits = (hit_rate(scores, known, 1), hit_rate(scores, known, 5), float(known.any(1).mean()))
             if hits[0] >= max((epoch.hit_1 for epoch in history), default=0.0):
@@ -178,11 +182,13 @@ def hit_rate(plan_scores: Floats32, labels: Flags, k: int) -> float:
     return float(np.take_along_axis(labels, best, axis=1).any(1).mean())
 
 
-def _objective(settings: TrainingSettings) -> Objective:
+def _objective(settings: TrainingSettings, epoch: int) -> Objective:
+    """What an epoch, counted from 0, minimises: the origin's weight falls in a straight line."""
     from planners.memory.objectives import Labels, Triplet
 
     if settings.objective == "labels":
-        return Labels(settings.first_weight, settings.origin_weight)
+        left = 1.0 - (1.0 - ORIGIN_LEFT) * epoch / max(1, settings.epochs - 1)
+        return Labels(settings.first_weight, left * settings.origin_weight)
     return Triplet(settings.margin, settings.semi_hard)
 
 
