@@ -8,7 +8,7 @@ from tasks.engine import fan_out, task_runner
 from tasks.logbook import log_training
 from tasks.settings import RunSettings
 from tasks.stages import timed
-from tasks.train import epochs_done, is_trained, train_chunks, train_encoder
+from tasks.train import class_epochs, class_epochs_done, is_trained, train_chunks, train_encoder
 
 
 @flow(name="train", task_runner=task_runner())
@@ -17,6 +17,11 @@ def train(settings: RunSettings, data: str) -> None:
     """Train one encoder for each class, and one for all of them if wanted, epoch by epoch."""
     chunks = train_chunks(data, settings)
     results = fan_out(
-        train_encoder, chunks, "train, epochs", is_trained, partly_done=lambda: epochs_done(chunks)
+        train_encoder,
+        chunks,
+        "train, epochs of a class",
+        is_trained,
+        class_epochs,
+        lambda: class_epochs_done(chunks),
     )
     log_training(data, settings, chunks, results)

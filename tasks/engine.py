@@ -20,6 +20,7 @@ from tasks.progress import progress
 from tasks.settings import RunError
 from tasks.work import WORK, note
 
+LIBRARIES: Final = ("OMP", "MKL", "OPENBLAS")  # each worker is one thread
 KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
 CONNECT_SECONDS: Final = 5
 CLOSE_SECONDS: Final = 0.3
@@ -81,6 +82,9 @@ def _local(workers: int) -> Iterator[str]:
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
         "distributed.worker.memory.terminate": False,  # a machine's memory is its owner's business
+        # Dask has its workers give freed memory back at once (MALLOC_TRIM_THRESHOLD_): training then takes
+        # two and a half times as long, most of it in page faults
+        "distributed.nanny.pre-spawn-environ": {f"{library}_NUM_THREADS": 1 for library in LIBRARIES},
     }
     with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(settings):
         local = LocalCluster(

@@ -76,9 +76,18 @@ def train_chunks(data: str, settings: RunSettings) -> list[Chunk]:
     ]
 
 
-def epochs_done(chunks: Sequence[Chunk]) -> int:
-    """How many epochs of these trainings are over."""
-    return sum(_epochs_done(chunk) for chunk in chunks)
+def class_epochs(chunk: Chunk) -> int:
+    """How long a training may take: its epochs, times the classes whose problems it has."""
+    return (chunk.last - chunk.first) * _classes(chunk)
+
+
+def class_epochs_done(chunks: Sequence[Chunk]) -> int:
+    """How much of these trainings is over."""
+    return sum(_epochs_done(chunk) * _classes(chunk) for chunk in chunks)
+
+
+def _classes(chunk: Chunk) -> int:
+    return len(chunk.settings.class_names) if chunk.class_name == COMBINED else 1
 
 
 def _epochs_done(chunk: Chunk) -> int:

@@ -28,6 +28,10 @@ def odd_chunk(chunk: Any) -> dict[str, Any]:
     if chunk.class_name == "killed" and chunk.index == 1 and not (folder / "once").exists():
         (folder / "once").touch()
         os.kill(os.getpid(), signal.SIGKILL)
+    if chunk.class_name == "environment":
+        return {
+            "index": {name: value for name, value in os.environ.items() if name.startswith(("MALLOC", "OMP"))}
+        }
     time.sleep(0.05 * (4 - chunk.index % 4))  # later ones are ready earlier
     with (folder / f"{chunk.class_name}-{chunk.index}").open("a") as done:
         done.write("x")
@@ -45,7 +49,7 @@ def main(data: Path) -> None:
         work = chunk_task(odd_chunk)
 
         @flow(task_runner=engine.task_runner())
-        def go(name: str, is_done: Any) -> list[int]:
+        def go(name: str, is_done: Any) -> list[Any]:
             chunks = chunks_of(str(data), SETTINGS, "odd", name, 8, 1, [])
             return [result["index"] for result in engine.fan_out(work, chunks, f"{name} test", is_done)]
 
@@ -61,6 +65,7 @@ def main(data: Path) -> None:
             (data / "plain-5").write_text("")
             found["one lost"] = go("plain", lambda chunk: chunk.index != 5)
             found["killed"] = go("killed", is_there)
+            found["environment"] = go("environment", is_there)
             for name in ("failing", "deadly"):
                 try:
                     go(name, is_there)

@@ -56,6 +56,10 @@ def test_a_killed_worker_costs_no_chunk(found: dict[str, Any]) -> None:
     assert found["killed"] == list(range(8))
 
 
+def test_workers_are_one_thread_and_keep_freed_memory_for_the_next_batch(found: dict[str, Any]) -> None:
+    assert found["environment"] == [{"OMP_NUM_THREADS": "1"}] * 8
+
+
 def test_a_failing_chunk_is_told_in_one_line(found: dict[str, Any]) -> None:
     assert found["failing"] == "failing test: chunk 2 of failing failed: this is no chunk"
 

@@ -53,12 +53,12 @@ def test_a_training_killed_after_any_epoch_ends_with_the_same_encoder(
         patched.setattr(train, "save_checkpoint", save_and_die)
         with pytest.raises(KeyboardInterrupt):
             train.train_chunk(chunk)
-    assert train.epochs_done([chunk]) == epochs
+    assert train.class_epochs_done([chunk]) == epochs
     assert not train.is_trained(chunk)
     result = train.train_chunk(chunk)
     assert [epoch["epoch"] for epoch in result["epochs"]] == [1, 2, 3]
     assert train.is_trained(chunk)
-    assert train.epochs_done([chunk]) == 3
+    assert train.class_epochs_done([chunk]) == 3
     whole, resumed = (
         load_encoder(chunk_in(tmp_path / name).run.model("trap")) for name in ("whole", "killed")
     )
@@ -70,7 +70,7 @@ def test_a_training_killed_after_any_epoch_ends_with_the_same_encoder(
 def test_a_checkpoint_of_other_problems_is_not_gone_on_from(tmp_path: Path) -> None:
     train.train_chunk(chunk_in(tmp_path))
     other = replace(chunk_in(tmp_path), key="another")
-    assert train.epochs_done([other]) == 0
+    assert train.class_epochs_done([other]) == 0
     assert not train.is_trained(other)
 
 
