@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from dashboards.cells import NAMES
 from dashboards.tables import (
     FULL_HEADINGS,
-    NAMES,
     RETRIEVAL_HEADINGS,
     full_cells,
     retrieval_groups,

@@ -6,18 +6,26 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-import numpy as np
 import pandas as pd
-from rich import box
 from rich.console import Group
 from rich.table import Table
 
+from dashboards.cells import (
+    NOTHING,
+    Rows,
+    count,
+    decimals_of,
+    markdown_table,
+    p_value,
+    percent,
+    reduction,
+    rich_table,
+    share,
+)
 from dashboards.statistics import PLANNERS, ranked
 from dashboards.verdicts import Claim
-from planners.world.problem import Floats
 from storage.configurations import Configuration
 
-NOTHING: Final = "–"
 _HEADINGS: Final = (
     "planner", "configuration", "solved", "mean", "median", "90 %", "reduction % [95 %]", "slower",
     "hits", "checks",
@@ -34,25 +42,13 @@ RETRIEVAL_HEADINGS: Final = (
 STAGE_HEADINGS: Final = (
     "stage", "seconds", "chunks", "workers", "between chunks %", "worker's MB at first", "at last",
 )  # fmt: skip
-NAMES: Final = {
-    "stage",
-    "planner",
-    "configuration",
-    "panel",
-    "class",
-    "memory",
-    "protocol",
-    "recall",
-}  # to the left
-
-_Rows = list[list[str]]
 
 
 def summary_table(summary: pd.DataFrame) -> Group:
     """The summary (``statistics.summarise``) for a terminal at least 110 columns wide: a table a class."""
     return Group(
         *[
-            _rich(f"{title}; times in ms; solved, slower, hits in %", _HEADINGS, groups)
+            rich_table(f"{title}; times in ms; solved, slower, hits in %", _HEADINGS, groups)
             for title, groups in titled_rows(summary, _cells)
         ]
     )
@@ -61,25 +57,25 @@ def summary_table(summary: pd.DataFrame) -> Group:
 def summary_markdown(summary: pd.DataFrame) -> str:
     """The whole summary as Markdown: a heading and a table a class."""
     return "\n".join(
-        f"### {title}\n\n{_markdown(FULL_HEADINGS, [cells for group in groups for cells in group])}"
+        f"### {title}\n\n{markdown_table(FULL_HEADINGS, [cells for group in groups for cells in group])}"
         for title, groups in titled_rows(summary, full_cells)
     )
 
 
 def retrieval_table(retrieval: pd.DataFrame) -> Table:
     """Retrieval (``retrieval.summarise_retrieval``) for a terminal, in per cent of the problems."""
-    return _rich("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
+    return rich_table("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
     """Retrieval as a Markdown table, in per cent of the problems."""
     lines = [cells for group in retrieval_groups(retrieval) for cells in group]
-    return _markdown(RETRIEVAL_HEADINGS, lines)
+    return markdown_table(RETRIEVAL_HEADINGS, lines)
 
 
 def stages_table(rows: Sequence[Sequence[str]]) -> Table:
     """Stages of a run for a terminal: rows of ``STAGE_HEADINGS``."""
-    return _rich("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
+    return rich_table("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
 
 
 def claims_markdown(claims: Sequence[Claim]) -> str:
@@ -97,7 +93,7 @@ def as_csv(table: pd.DataFrame) -> str:
 
 def titled_rows(
     summary: pd.DataFrame, cells: Callable[[pd.Series[Any], int], list[str]]
-) -> list[tuple[str, list[_Rows]]]:
+) -> list[tuple[str, list[Rows]]]:
     """Per panel its title and its rows of cells, grouped by planner; ``cells`` gives those after the names.
 
     Every planner appears in every panel with every configuration that any panel has for it, so that what was
@@ -106,7 +102,7 @@ def titled_rows(
     titled = []
     for panel in summary["panel"].unique():
         rows = summary[summary["panel"] == panel]
-        decimals = _decimals(rows[["mean_ms", "median_ms"]].to_numpy(dtype=float))
+        decimals = decimals_of(rows[["mean_ms", "median_ms"]].to_numpy(dtype=float))
         by_key = {(row["planner"], row["configuration"]): row for _, row in rows.iterrows()}
         width = len(cells(rows.iloc[0], decimals))
         groups = []
@@ -136,15 +132,15 @@ def full_cells(row: pd.Series[Any], decimals: int) -> list[str]:
         return f"{value} [{low}, {high}]"
 
     return [
-        _percent(row["solved"]),
+        percent(row["solved"]),
         with_interval("mean"),
-        NOTHING if baseline else _reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
-        _share(row["slower"]),
+        NOTHING if baseline else reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
+        share(row["slower"]),
         NOTHING if math.isnan(row["slowdown"]) else f"{row['slowdown']:.2f} ×",
-        _p_value(row["p_value"]),
+        p_value(row["p_value"]),
         *[with_interval(name) for name in ("median", "p90", "interquartile_mean")],
-        NOTHING if baseline else _percent(row["recalled"]),
-        _count(row["collision_checks"]),
+        NOTHING if baseline else percent(row["recalled"]),
+        count(row["collision_checks"]),
     ]
 
 
@@ -152,16 +148,16 @@ def _cells(row: pd.Series[Any], decimals: int) -> list[str]:
     """The figures of one configuration that fit a terminal."""
     baseline = row["assist"] == "none"
     return [
-        _percent(row["solved"]),
+        percent(row["solved"]),
         *[f"{row[column]:,.{decimals}f}" for column in ("mean_ms", "median_ms", "p90_ms")],
-        NOTHING if baseline else _reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
-        _share(row["slower"]),
-        NOTHING if baseline else _percent(row["recalled"]),
-        _count(row["collision_checks"]),
+        NOTHING if baseline else reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
+        share(row["slower"]),
+        NOTHING if baseline else percent(row["recalled"]),
+        count(row["collision_checks"]),
     ]
 
 
-def retrieval_groups(retrieval: pd.DataFrame) -> list[_Rows]:
+def retrieval_groups(retrieval: pd.DataFrame) -> list[Rows]:
     """Lines of a class and memory; under the ways to recall, what plans picked blindly reach."""
     groups = []
     for _, of_memory in retrieval.groupby(["panel", "memory"], sort=False):
@@ -186,7 +182,7 @@ def _retrieval_cells(row: pd.Series[Any]) -> list[str]:
         for name in ("origin", "hit")
         for k in (1, 5)
     ]
-    rest = [_percent(row["oracle"]), _percent(row["nothing_recalled"]), f"{row['problems']:,}"]
+    rest = [percent(row["oracle"]), percent(row["nothing_recalled"]), f"{row['problems']:,}"]
     return [*names, *shares, *rest]
 
 
@@ -195,72 +191,4 @@ def _with_deviation(share: float, deviation: float) -> str:
     if math.isnan(share):
         return NOTHING
     digits = 1 if deviation < 0.0995 else 0
-    return _percent(share) + ("" if math.isnan(deviation) else f"±{100.0 * deviation:.{digits}f}")
-
-
-def _percent(fraction: float) -> str:
-    return f"{100.0 * fraction:.1f}"
-
-
-def _share(fraction: float) -> str:
-    return NOTHING if math.isnan(fraction) else _percent(fraction)
-
-
-def _p_value(value: float) -> str:
-    if math.isnan(value):
-        return NOTHING
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
-
-
-def _decimals(milliseconds: Floats) -> int:
-    """Decimals for all times of a panel, so that their points align: two digits of the least, 3 at most."""
-    least, most = float(np.nanmin(milliseconds)), float(np.nanmax(milliseconds))
-    wanted = 3 if least <= 0.0 else 1 - math.floor(math.log10(least))
-    return max(0, min(wanted, 3 if most < 1000.0 else 2))
-
-
-def _count(value: float) -> str:
-    """A mean count in at most six places: 834, 47.3 k, 163 M."""
-    for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
-        if value >= 0.9995 * size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value:.0f}"
-
-
-def _reduction(value: float, low: float, high: float) -> str:
-    if math.isnan(value):
-        return NOTHING
-    return f"{100.0 * value:.1f} [{100.0 * low:5.1f}, {100.0 * high:5.1f}]"
-
-
-def _rich(title: str, headings: Sequence[str], groups: Sequence[_Rows]) -> Table:
-    """A table with numbers to the right and a gap after groups of several lines, named on the first only."""
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        padding=(0, 1, 0, 0),
-    )
-    for heading in headings:
-        table.add_column(heading, justify="left" if heading in NAMES else "right", no_wrap=True)
-    for group in groups:
-        for i, cells in enumerate(group):
-            table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1 > 0)
-    return table
-
-
-def _markdown(headings: Sequence[str], rows: _Rows) -> str:
-    """A Markdown table whose source is aligned too."""
-    widths = [max(len(cells[i]) for cells in [headings, *rows]) for i in range(len(headings))]
-
-    def line(cells: Sequence[str]) -> str:
-        padded = [
-            cell.ljust(width) if heading in NAMES else cell.rjust(width)
-            for heading, cell, width in zip(headings, cells, widths, strict=True)
-        ]
-        return f"| {' | '.join(padded)} |\n"
-
-    rule = ["-" * w if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(headings, widths, strict=True)]
-    return line(headings) + line(rule) + "".join(line(cells) for cells in rows)
+    return percent(share) + ("" if math.isnan(deviation) else f"±{100.0 * deviation:.{digits}f}")

@@ -125,6 +125,23 @@ def export(run: Path, *, format: str, out: Path) -> None:
 
 
 @app.command
+def compare(*runs: Path, out: Path | None = None) -> None:
+    """Compare runs with the first of them, paired by problem: times, checks, solved, with intervals.
+
+    Parameters
+    ----------
+    runs
+        Two folders of runs or more, in the data folder's runs.
+    out
+        Where to write the comparison too: .md, .json or .csv.
+
+    """
+    from tasks.compare import compare as task
+
+    task(runs, out)
+
+
+@app.command
 def plan(
     problem: Path,
     *,

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from dashboards.tables import NOTHING
+from dashboards.cells import NOTHING
 from storage.files import read_json, write_json
 from storage.layout import RunFolder
 from tasks.attempts import commit

@@ -15,7 +15,7 @@ from flows.options import worker_count
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
-    "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve",
+    "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
 )  # fmt: skip
 
 
