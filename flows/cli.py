@@ -136,6 +136,7 @@ def plan(
     vehicle: str = "car",
     seed: int = 1,
     improve_seconds: float = 0.0,
+    explain: bool = False,
     out: Path | None = None,
     picture: Path | None = None,
 ) -> None:
@@ -161,6 +162,8 @@ def plan(
         Everything random follows from it.
     improve_seconds
         Keep improving the plan for this long; 0: the first plan is the answer.
+    explain
+        Say, and mark in the picture, what was recalled, where it collides and what was done then.
     out
         Where to write the plan, .json.
     picture
@@ -170,7 +173,7 @@ def plan(
     from tasks.solve import Assistant, plan_one
 
     assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
-    plan_one(assistant, problem, out, picture)
+    plan_one(assistant, problem, out, picture, explain)
 
 
 @app.command

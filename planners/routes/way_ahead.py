@@ -58,7 +58,7 @@ class WayAhead:
 
         Below 0 in the goal disc, and the less the nearer its middle.
         """
-        costs = np.minimum(self._costs(poses).min(axis=1), self.to_go(poses) + SHORT_M)
+        costs: Floats = np.minimum(self._costs(poses).min(axis=1), self.to_go(poses) + SHORT_M)
         costs += TIGHT_M * np.maximum(ROOM_M - self._at(self._room, poses[:, 0], poses[:, 1]), 0.0)
         arrived = self.arrived(poses)
         costs[arrived] = self._distance(poses)[arrived] - _ARRIVED_M

@@ -81,7 +81,8 @@ def test_in_a_lane_the_car_turns_round_in_several_arcs_without_touching_the_wall
     states = simulate(state, controls, CAR)
     assert is_free_drive(states, CAR, lane)
     assert abs(bearing(states[-1], (-40.0, 25.0))) <= FACING
-    assert states[:, 3].max() > 0.1 and states[:, 3].min() < -0.1
+    assert states[:, 3].max() > 0.1
+    assert states[:, 3].min() < -0.1
 
 
 def test_where_there_is_no_room_no_turn_is_found() -> None:

@@ -14,18 +14,15 @@ from planners.maps.cutting import cut_problems
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.memory.encoder import Architecture, initial_weights
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.routes.route import Route, Router, Stuck
 from planners.routes.way_ahead import WayAhead
 from planners.solve import Attempt, solve
 from planners.world.authority import faults
 from planners.world.problem import GOAL_RADIUS, Problem
-from planners.world.randomness import generator
 from planners.world.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
 from tests.planners.maps.samples import town
+from tests.planners.memories import memory_of
 
 START = (12.0, 150.0, 2.0)
 GOALS = [(250.0, 262.0), (285.0, 40.0)]
@@ -37,17 +34,8 @@ def searched(problem: Problem, vehicle: Vehicle = CAR) -> Attempt:
 
 @pytest.fixture(scope="module")
 def memory() -> Memory:
-    """Plans of the town's problems; their masks and exact checks find them, the encoder knows nothing."""
     world = town()
-    cuts = cut_problems(world, surroundings_of(world), "train", 40, 1)
-    plans = tuple(plan for cut in cuts if (plan := solve(cut.problem, "follow").plan) is not None)
-    sweeps = sweep_plans(plans)
-    network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
-    zeros = np.zeros((len(plans) + 1, 3), np.float32)
-    weights = initial_weights(network, generator(0))
-    return Memory(
-        "town", CAR, plans, sweeps, masks_of(sweeps), zeros, zeros, zeros[:, 0].copy(), "labels", weights
-    )
+    return memory_of([cut.problem for cut in cut_problems(world, surroundings_of(world), "train", 40, 1)])
 
 
 def check(found: Route | Stuck, vehicle: Vehicle = CAR) -> Route:
