@@ -53,19 +53,28 @@ def route_picture(
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
         axes.plot(*places[-1], marker="o", color="white", markeredgecolor=INK, markersize=4.5, zorder=7)
         sources.append(leg.source)
+    several = len(goals) > 1
     for number, goal in enumerate(goals, start=1):
-        axes.plot(*goal, marker="*", color=GREEN, markeredgecolor=INK, markersize=15, zorder=8)
-        if len(goals) > 1:
-            axes.annotate(f"{number}", goal, (8, 6), textcoords="offset points", fontsize=10, color=INK,
-                          fontweight="bold", zorder=9)  # fmt: skip
+        axes.plot(
+            *goal,
+            marker="o" if several else "*",
+            color=GREEN,
+            markeredgecolor=INK,
+            markersize=13 if several else 15,
+            zorder=10,
+            clip_on=False,
+        )
+        if several:
+            axes.annotate(f"{number}", goal, ha="center", va="center_baseline", color="white", zorder=11,
+                          fontsize=9, fontweight="bold", annotation_clip=False)  # fmt: skip
     x, y, heading = world.pose(
         scale * route.problem.start[0], scale * route.problem.start[1], route.problem.start[2]
     )
     axes.plot(x, y, marker=(3, 0, math.degrees(heading) - 90.0), color=INK, markersize=12, zorder=9)
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=INK, marker=(3, 0, -90), linestyle="none", markersize=9, label="start"),
-        Line2D([], [], color=GREEN, marker="*", markeredgecolor=INK, linestyle="none", markersize=11,
-               label="goal" if len(goals) == 1 else "goals in order"),
+        Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
+               markersize=10, label="goals in order" if several else "goal"),
         Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
                label="brakes, stops, turns"),
         *(

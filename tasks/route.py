@@ -26,6 +26,7 @@ from tasks.settings import RunError, UsageError, check_known, check_picture
 from tasks.solve import Assistant
 
 SOURCES: Final = ("recalled", "repaired", "searched")
+WIDEST_M: Final = 10_000.0  # canonical metres: the cell look-up of collision checks grows with the area
 RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of an attempt's planning time
 
 
@@ -97,6 +98,11 @@ def route(
     world = load_map(source, settings)
     scale = settings.scale
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
+    if max(canonical.size) > WIDEST_M:
+        raise UsageError(
+            f"{path} is {max(world.size):,.0f} m wide, at scale {scale:g} a route may cross "
+            f"{scale * WIDEST_M:,.0f} m; cut the map, or correct --scale or --resolution."
+        )
     solver = _Solver(assistant, scale)
     router = Router(
         canonical, solver.recalled, solver.searched, assistant.vehicle, settings.tolerance_m / scale

@@ -83,22 +83,26 @@ class WayAhead:
         return near
 
     def local_goals(self, pose: Floats, most: int) -> list[LocalGoal]:
-        """The best local goals from a pose ``[>= 3]``: at most ``most`` canonical ones, then short ones."""
+        """Local goals from a pose ``[>= 3]``, best first: ``most`` canonical ones or fewer, then short ones.
+
+        The goal is among them where it is near enough.
+        """
         costs = self._costs(pose[np.newaxis])[0]
         found: list[LocalGoal] = []
         headings: list[float] = []
         for i in np.argsort(costs, kind="stable"):
-            if costs[i] == math.inf or len(headings) == most:
+            if costs[i] == math.inf:
                 break
             if i == HEADINGS:
                 canonical = abs(math.dist(pose[:2], self.goal) - CANONICAL_DISTANCE) <= ROLLED_M
                 found.append(LocalGoal(self.goal, canonical, True))
-            elif all(abs(math.remainder(_HEADINGS[i] - each, 2 * math.pi)) >= APART for each in headings):
+            elif len(headings) < most and all(_turn(_HEADINGS[i], each) >= APART for each in headings):
                 headings.append(float(_HEADINGS[i]))
-                ahead = pose[:2] + CANONICAL_DISTANCE * np.array(
-                    [math.cos(headings[-1]), math.sin(headings[-1])]
-                )
-                found.append(LocalGoal((float(ahead[0]), float(ahead[1])), True, False))
+                x = pose[0] + CANONICAL_DISTANCE * math.cos(headings[-1])
+                y = pose[1] + CANONICAL_DISTANCE * math.sin(headings[-1])
+                found.append(LocalGoal((float(x), float(y)), True, False))
+        if LocalGoal(self.goal, True, True) in found:
+            found.append(LocalGoal(self.goal, False, True))  # where it cannot be faced, it can be searched
         way = self.path(pose)
         if way is not None:
             far = np.cumsum(np.hypot(*np.diff(way, axis=0).T))
@@ -146,6 +150,11 @@ class WayAhead:
 
 
 _HEADINGS: Final = np.linspace(-math.pi, math.pi, HEADINGS, endpoint=False)
+
+
+def _turn(one: float, other: float) -> float:
+    """The angle between two headings."""
+    return abs(math.remainder(one - other, 2.0 * math.pi))
 
 
 def _wrapped(angles: Floats) -> Floats:

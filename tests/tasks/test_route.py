@@ -116,6 +116,7 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "-8,6,0", "--to", "150,190"], 2, "at (-8.0, 6.0) the vehicle stands in an obstacle"),
         (["--from", "8,6,0", "--to", "150,1900"], 2, "at (150.0, 1900.0) the goal is occupied"),
         (["--from", "8,6,0", "--to", "150,190", "--scale", "0"], 2, "Scale is 0"),
+        (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide, at scale 1"),
         (["--from", "8,6,0", "--to", "150,190", "--assist", "open"], 2, "needs --memory"),
         (["--from", "8,6,0", "--to", "150,190", "--picture", "r.txt"], 2, "r.txt is no picture's name"),
         (["--from", "8,6,0", "--to", "150,190", "--memory", "small"], 1, "of scale 0.5, asked was 1"),
@@ -149,7 +150,8 @@ def test_a_memory_is_refused_for_a_problem_of_another_scale(
     [
         ("denver_ros.yaml", [
             "--from", "-113,22,0", "--to", "104,107", "--to", "100,-68", "--to", "-98,-68"], 500),
-        ("Berlin_0_256.map", ["--resolution", "2", "--from", "30,360,0", "--to", "480,30"], 500),
+        ("Berlin_0_256.map", [
+            "--from", "15,240,0", "--to", "250,20", "--to", "120,30", "--to", "70,215"], 500),
     ],
 )  # fmt: skip
 def test_half_a_kilometre_through_a_city(
