@@ -26,7 +26,7 @@ from planners.world.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"train": BLUE, "test": ORANGE}
 SHOWN_WINDOWS: Final = 4  # of each part; more hide the map
-_OCCUPIED: Final = "#6B7280"
+OCCUPIED: Final = "#6B7280"
 
 
 def map_picture(
@@ -39,7 +39,8 @@ def map_picture(
         max(len(parts), 1), 2 if parts else 1, width_ratios=[7.0, 3.0] if parts else None
     )
     axes = figure.add_subplot(grid[:, 0])
-    _draw_map(axes, world, blocks_of(world.size, scale * WINDOW))
+    draw_map(axes, world)
+    _draw_blocks(axes, world, blocks_of(world.size, scale * WINDOW))
     for row, part in enumerate(parts):
         _draw_cuts(axes, [cut.pose for cut in cuts[part]], scale, COLOURS[part])
         beside = figure.add_subplot(grid[row, 1])
@@ -47,7 +48,7 @@ def map_picture(
         draw_problem(beside, shown, vehicle)
         beside.set_title(shown.id, fontsize=9, color=COLOURS[part], pad=4)
     handles: list[Line2D | Patch] = [
-        Patch(facecolor=_OCCUPIED, label="occupied"),
+        Patch(facecolor=OCCUPIED, label="occupied"),
         *(Patch(facecolor=COLOURS[part], alpha=0.15, label=f"blocks of {part}") for part in COLOURS),
         *(
             Line2D([], [], color=COLOURS[part], label=f"{len(cuts[part]):,} starts of {part}, some windows")
@@ -62,20 +63,36 @@ def _pieces(problem: Problem) -> int:
     return len(problem.obstacles.piece_starts)
 
 
-def _draw_map(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
+def draw_map(axes: Axes, world: OccupancyMap, colour: str = OCCUPIED) -> None:
+    """What is occupied, in the map's frame, on axes in metres."""
     width, height = world.size
-    left, bottom, turn = world.origin
-    place = Affine2D().rotate(turn).translate(left, bottom) + axes.transData
     picture = np.ma.masked_equal(world.occupied, False)
     axes.imshow(
         picture,
         origin="lower",
         extent=(0.0, width, 0.0, height),
-        cmap=ListedColormap([_OCCUPIED]),
+        cmap=ListedColormap([colour]),
         interpolation="nearest",
-        transform=place,
+        transform=_frame(world) + axes.transData,
         zorder=1,
     )
+    outline = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
+    axes.set_xlim(outline[:, 0].min(), outline[:, 0].max())
+    axes.set_ylim(outline[:, 1].min(), outline[:, 1].max())
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=8, colors=INK)
+    axes.set_xlabel("x, m", fontsize=9)
+    axes.set_ylabel("y, m", fontsize=9)
+
+
+def _frame(world: OccupancyMap) -> Affine2D:
+    """From grid coordinates to the map's frame."""
+    left, bottom, turn = world.origin
+    return Affine2D().rotate(turn).translate(left, bottom)
+
+
+def _draw_blocks(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
+    place = _frame(world) + axes.transData
     for column in range(blocks.columns):
         for row in range(blocks.rows):
             corner = np.array([column * blocks.width, row * blocks.height])
@@ -84,13 +101,6 @@ def _draw_map(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
             )
             colour = COLOURS["test" if (column + row) % 2 else "train"]
             axes.add_patch(Polygon(square, facecolor=colour, alpha=0.12, transform=place, zorder=0))
-    outline = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
-    axes.set_xlim(outline[:, 0].min(), outline[:, 0].max())
-    axes.set_ylim(outline[:, 1].min(), outline[:, 1].max())
-    axes.set_aspect("equal")
-    axes.tick_params(labelsize=8, colors=INK)
-    axes.set_xlabel("x, m", fontsize=9)
-    axes.set_ylabel("y, m", fontsize=9)
 
 
 def _draw_cuts(axes: Axes, poses: Sequence[tuple[float, float, float]], scale: float, colour: str) -> None:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from dashboards.style import GREEN, INK, NOTE_SIZE, ORANGE, SKY, VERMILLION, message_figure, new_figure
+from planners.search.repair import blocked_states
 from planners.world.bodies import footprints
 from planners.world.collision import count_free_prefix, scene_of
 from planners.world.problem import Floats, Plan, Problem, start_state
@@ -31,6 +32,7 @@ class Example(NamedTuple):
     found: Plan | None  # the answer; None where the attempt failed
     caption: str
     vehicle: Vehicle = CAR
+    collisions: bool = False  # mark every state in collision, not only the first
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -118,10 +120,14 @@ def picture(
     recalled: Sequence[Plan] = (),
     vehicle: Vehicle = CAR,
     called: str = "recalled",
+    collisions: bool = False,
 ) -> Figure:
-    """One problem with its plan and, where given, the plans recalled for it, or ``called`` otherwise."""
+    """One problem with its plan and, where given, the plans recalled for it, or ``called`` otherwise.
+
+    ``collisions``: every place where one of these collides is marked.
+    """
     figure = new_figure(6.4, 7.2, problem.id or "Problem")
-    example = Example(problem, recalled, plan, caption, vehicle)
+    example = Example(problem, recalled, plan, caption, vehicle, collisions)
     _draw_example(figure.add_subplot(), example)
     handles = _legend([example], called)
     figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
@@ -162,6 +168,16 @@ def _draw_example(axes: Axes, example: Example) -> None:
         free = count_free_prefix(plan.states, vehicle, scene)
         if free < len(plan.states):
             draw_plan(axes, plan, VERMILLION, linewidth=1.3, first_collision=free, vehicle=vehicle)
+            if example.collisions:
+                blocked, _ = blocked_states(plan, scene, vehicle)
+                axes.scatter(
+                    plan.states[blocked, 0],
+                    plan.states[blocked, 1],
+                    s=7,
+                    color=VERMILLION,
+                    linewidths=0,
+                    zorder=5,
+                )
         else:
             # Wide and below: a rim around the plan found where the recalled one is the answer.
             axes.plot(*plan.states[:, :2].T, color=SKY, linewidth=4.5, zorder=2.5)
@@ -183,4 +199,8 @@ def _legend(examples: Sequence[Example], called: str = "recalled") -> list[Line2
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
                markersize=8, label=f"{called}, collides at the cross"),
     ]  # fmt: skip
+    if any(example.collisions for example in examples):
+        dot = Line2D([], [], color=VERMILLION, marker="o", markersize=3, linestyle="none")
+        dot.set_label(f"{called}, in collision")
+        handles.append(dot)
     return handles if any(example.recalled for example in examples) else handles[:3]

@@ -10,9 +10,9 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Final
+from typing import Annotated, Final
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from flows.options import Options, worker_count
 
@@ -153,6 +153,7 @@ def plan(
     vehicle: str = "car",
     seed: int = 1,
     improve_seconds: float = 0.0,
+    explain: bool = False,
     out: Path | None = None,
     picture: Path | None = None,
 ) -> None:
@@ -178,6 +179,8 @@ def plan(
         Everything random follows from it.
     improve_seconds
         Keep improving the plan for this long; 0: the first plan is the answer.
+    explain
+        Say, and mark in the picture, what was recalled, where it collides and what was done then.
     out
         Where to write the plan, .json.
     picture
@@ -187,7 +190,7 @@ def plan(
     from tasks.solve import Assistant, plan_one
 
     assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
-    plan_one(assistant, problem, out, picture)
+    plan_one(assistant, problem, out, picture, explain)
 
 
 @app.command
@@ -335,6 +338,78 @@ def import_worlds(
 
     settings = task.import_settings(vehicle, strict, problems, seed, scale, resolution, unknown, tolerance)
     task.import_worlds(path, format, out, part, settings, picture)
+
+
+@app.command
+def route(
+    path: Path,
+    *,
+    begin: Annotated[str, Parameter(name="--from", allow_leading_hyphen=True)],
+    end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True)],
+    format: str | None = None,
+    planner: str = "gust",
+    assist: str | None = None,
+    top_k: int = 5,
+    recall: str | None = None,
+    memory: str | None = None,
+    vehicle: str = "car",
+    seed: int = 1,
+    scale: float = 1.0,
+    resolution: float | None = None,
+    unknown: str = "occupied",
+    tolerance: float = 0.0,
+    out: Path | None = None,
+    picture: Path | None = None,
+) -> None:
+    """Drive over a map: local plans from memory where it knows them, one feasible plan in the end.
+
+    Parameters
+    ----------
+    path
+        A map: .map, .yaml (ROS), .npy, .npz.
+    begin
+        Where the vehicle stands in the map's frame: x,y,heading, in metres and radians.
+    end
+        Where it should go: x,y in metres. Given several times: through all of these, in order.
+    format
+        moving-ai, ros or numpy; by default recognised by the file's ending.
+    planner
+        rrt, gust or follow.
+    assist
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. By default repair
+        with a memory, fresh without.
+    top_k
+        How many plans are recalled.
+    recall
+        How they are found: exhaustive, mask, hybrid, centroid, random; by default the best for the memory.
+    memory
+        Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
+    seed
+        Everything random follows from it.
+    scale
+        Metres of the map in a canonical metre, as the memory's: 2 for a robot twice as large.
+    resolution
+        Metres a cell of a .map or NumPy map; default 1.
+    unknown
+        What unknown cells of the map are: occupied or free.
+    tolerance
+        Metres that the outline of what is occupied may move, for fewer pieces; 0: it is exact.
+    out
+        Where to write the plan, .json.
+    picture
+        Where to draw the route, .png, .svg or .pdf.
+
+    """
+    from tasks import route as task
+    from tasks.import_worlds import import_settings
+    from tasks.solve import Assistant
+
+    helped = assist or ("fresh" if memory is None else "repair")
+    assistant = Assistant(planner, helped, top_k, memory, seed, vehicle, recall=recall)
+    settings = import_settings(vehicle, False, None, seed, scale, resolution, unknown, tolerance)
+    task.route(path, format, begin, end, assistant, settings, out, picture)
 
 
 def _do(stage: str, options: Options) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from planners.memory.labels import START_TOLERANCE
 from planners.memory.nearly_free import least_blocked
-from planners.memory.recall import Memory, Recalled, default_recall, recall
+from planners.memory.recall import Memory, Recalled, default_recall, recall, scale_fault
 from planners.search.anytime import improve
 from planners.search.grid_path import grid_path
 from planners.search.guidance import guidance
@@ -132,7 +132,7 @@ def solve(
     ``random-`` before an assist is the strategy ``random``.
 
     Raises ValueError for an unknown planner, assist or strategy, an assist that needs a memory and has none,
-    and a memory of another vehicle.
+    and a memory of another vehicle or scale.
     """
     view = View(problem)
     if planner not in PLANNERS:
@@ -148,6 +148,9 @@ def solve(
                 f"memory of {known.class_name} was built for vehicle {name_of(known.vehicle)}, asked was "
                 f"{name_of(vehicle)}: build one for {name_of(vehicle)}"
             )
+        unfit = scale_fault(known, problem.scale)
+        if unfit is not None:
+            raise ValueError(unfit)
         strategy = "random" if use != assist else strategy or default_recall(known)
         rng = generator(seed, "random-plans", problem.id) if strategy == "random" else None
         recalled = recall(known, view, strategy, top_k, rng)

@@ -91,11 +91,13 @@ def memories_by_seed(chunk: Chunk) -> list[Memory]:
     """The memory of a chunk's taught plans with the encoder of each training seed."""
     name, run, settings = chunk.class_name, chunk.run, chunk.settings
     vehicle = vehicle_named(settings.vehicle)
-    plans = [experience.plan for experience in taught_experiences(run, settings, name)]
+    experiences = taught_experiences(run, settings, name)
+    plans = [experience.plan for experience in experiences]
     classes = settings.class_names if name == COMBINED else (name,)
     metadata = {
         "run": settings.run_name,
         "classes": {each: class_settings(settings, each) for each in classes},
+        "scales": sorted({experience.problem.scale for experience in experiences}),
     }
     return [
         build_memory(

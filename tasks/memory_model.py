@@ -21,7 +21,7 @@ from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
 from planners.memory.labels import plan_answers
-from planners.memory.recall import Memory
+from planners.memory.recall import Memory, scale_fault
 from planners.memory.scores import best_plans
 from planners.solve import turned
 from planners.world.alignment import from_canonical, scaled, to_canonical
@@ -86,9 +86,13 @@ class MemoryModel(PythonModel):
 
     def _problem(self, text: str, number: int) -> Problem:
         try:
-            return problem_of(parse_json(text, "it"), f"problem-{number}", self.vehicle)
+            problem = problem_of(parse_json(text, "it"), f"problem-{number}", self.vehicle)
+            unfit = scale_fault(self.memory, problem.scale)
+            if unfit is not None:
+                raise ValueError(unfit)
         except (StorageError, ValueError) as error:
             raise MlflowException(f"Problem {number}: {error}", INVALID_PARAMETER_VALUE) from None
+        return problem
 
     def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
         asked, alignment = to_canonical(problem)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dashboards.pictures import picture
+from planners.explanation import recollections
 from planners.memory.recall import RECALLS, Memory
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
@@ -20,6 +21,7 @@ from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
 from storage.results import write_attempts
 from tasks.attempts import attempt_row, check_attempt
+from tasks.explain import tell
 from tasks.model_registry import is_model_uri, load_from
 from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known, check_picture
 
@@ -90,8 +92,13 @@ class Assistant:
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
 
 
-def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None) -> None:
-    """Plan for the one problem of a file; RunError when it has another number, or no plan was found."""
+def plan_one(
+    assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None, explained: bool = False
+) -> None:
+    """Plan for the one problem of a file; RunError when it has another number, or no plan was found.
+
+    ``explained``: say and draw what was recalled, where it collides and what was done then.
+    """
     check_picture(drawing)
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
@@ -104,14 +111,23 @@ def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Pat
     if drawing is not None:
         with whole_file(drawing) as temporary:
             caption = f"{assistant.planner}, {assistant.assist}: {told}"
-            figure = picture(problems[0], plan, caption, recalled, assistant.vehicle)
+            figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+    if explained:
+        _explain(assistant, problems[0], attempt, recalled)
     if plan is None:
         raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
     print(f"{told}, {problems[0].scale * plan.length_m:.1f} m, {plan.duration_s:.1f} s")
     for what, place in (("plan", out), ("picture", drawing)):
         if place is not None:
             print(f"{what:8} {place}")
+
+
+def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
+    canonical, _ = to_canonical(problem)
+    memory = assistant.memory_of(problem.class_name)
+    looked_at = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
+    tell(attempt, memory, list(zip(looked_at, recalled, strict=True)), problem.scale)
 
 
 def solve_many(assistant: Assistant, problems: Path, out: Path, plans: Path | None) -> None:

@@ -46,6 +46,13 @@ class OccupancyMap:
         cos, sin = math.cos(turn), math.sin(turn)
         return left + cos * x - sin * y, bottom + sin * x + cos * y, heading + turn
 
+    def grid_pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
+        """A pose of the map's frame in grid coordinates: the inverse of ``pose``."""
+        left, bottom, turn = self.origin
+        cos, sin = math.cos(turn), math.sin(turn)
+        right, up = x - left, y - bottom
+        return cos * right + sin * up, cos * up - sin * right, heading - turn
+
     def coarser(self, cell_m: float) -> OccupancyMap:
         """The same map in cells of about ``cell_m``, occupied where any of the cells in one is."""
         factor = max(1, math.floor(cell_m / self.resolution + 1e-9))

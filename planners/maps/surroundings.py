@@ -64,6 +64,10 @@ class Surroundings:
             self.scale,
         )
 
+    def obstacles(self) -> Obstacles:
+        """All pieces, in grid metres, exactly."""
+        return _obstacles(self.pieces, self.touching)
+
 
 def surroundings_of(world: OccupancyMap, scale: float = 1.0, tolerance_m: float = 0.0) -> Surroundings:
     """A map made ready to have problems cut from it.

@@ -74,6 +74,11 @@ class Memory:
                 )
 
     @functools.cached_property
+    def scales(self) -> tuple[float, ...]:
+        """Of the problems whose plans it holds: metres of the world outside in a canonical metre."""
+        return tuple(self.metadata.get("scales", (1.0,)))
+
+    @functools.cached_property
     def encoder(self) -> Encoder:
         """The encoder for many grids at once."""
         return Encoder(to_onnx(self.weights))
@@ -96,6 +101,17 @@ class Recalled(NamedTuple):
     plans: tuple[int, ...]  # at most k, best first
     free: int  # one of these that answers the problem; -1: none of all that were checked does
     checks: int  # collision checks to know
+
+
+def scale_fault(memory: Memory, scale: float) -> str | None:
+    """Why a memory has nothing to say of problems of a scale, or None."""
+    if scale in memory.scales:
+        return None
+    made = " and ".join(f"{each:g}" for each in memory.scales)
+    return (
+        f"memory of {memory.class_name} was made of problems of scale {made}, asked was {scale:g}: make one "
+        "of that scale"
+    )
 
 
 def default_recall(memory: Memory) -> str:

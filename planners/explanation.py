@@ -1,0 +1,75 @@
+"""Why a plan: what was recalled for a problem, how near it was, and where it collides."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.memory.labels import START_TOLERANCE
+from planners.memory.masks import MOST_CELLS, rank_by_cells
+from planners.memory.nearly_free import least_blocked
+from planners.memory.recall import Memory
+from planners.search.repair import Flags, blocked_states
+from planners.solve import Attempt, turned
+from planners.world.problem import Problem
+from planners.world.vehicle import CAR, Vehicle
+from planners.world.view import View
+
+
+class Recollection(NamedTuple):
+    """One recalled plan, as the problem has it."""
+
+    plan: int  # its number in the memory
+    encoder_rank: int  # 1: the encoder puts it first of all plans
+    blocked_cells: int | None  # cells it shares with obstacles; None where they say nothing of it
+    blocked: Flags  # [T] which of its states are in collision
+    goal_missed_m: float  # by which it ends outside of the goal disc; 0: it does not
+    use: str  # "answer", "repaired", "guide", "" for nothing
+
+    @property
+    def first_blocked(self) -> int | None:
+        """The first state in collision."""
+        return int(self.blocked.argmax()) if self.blocked.any() else None
+
+
+def recollections(
+    problem: Problem, attempt: Attempt, memory: Memory, vehicle: Vehicle = CAR
+) -> list[Recollection]:
+    """What an attempt at a canonical problem recalled, in its order, looked at again."""
+    view = View(problem)
+    embedding = memory.forward(view.bits)
+    scores = memory.vectors[1:] @ embedding + memory.biases[1:]
+    ranking = rank_by_cells(memory.masks, view.bits).cells.copy()
+    stored = memory.heading is not None and abs(problem.start[2] - memory.heading) <= START_TOLERANCE
+    best = _least_blocked(problem, attempt, memory, view)
+    found: list[Recollection] = []
+    for number in attempt.recalled:
+        plan = turned(memory.plans[number], problem.start[2])
+        blocked, _ = blocked_states(plan, view.scene, vehicle)
+        cells = int(ranking[number])
+        missed = max(math.dist(plan.states[-1, :2], problem.goal) - problem.goal_radius, 0.0)
+        free = attempt.source == "recalled" and not blocked.any() and missed <= 1e-9
+        answers = free and not any(each.use == "answer" for each in found)
+        found.append(
+            Recollection(
+                number,
+                1 + int(np.count_nonzero(scores > scores[number])),
+                cells if stored and cells < MOST_CELLS else None,
+                blocked,
+                missed,
+                "answer" if answers else best.get(number, ""),
+            )
+        )
+    return found
+
+
+def _least_blocked(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:
+    """The plan that repair, or the search, went on from, and what for."""
+    use = attempt.assist.removeprefix("random-")
+    if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
+        return {}
+    order = np.array(attempt.recalled, np.int32)
+    best, _ = least_blocked(order, memory.sweeps, view.scene, problem.start)
+    return {int(best): "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}

@@ -1,0 +1,1 @@
+"""Routes over a map: local problems one after the other, joined where the vehicle comes to rest."""

@@ -1,0 +1,87 @@
+"""``plan --explain``: what was recalled, how near it was, where it collides, and what was done then."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Final
+
+from rich.console import Console
+from rich.table import Table
+
+from planners.explanation import Recollection
+from planners.memory.recall import Memory
+from planners.solve import Attempt
+from planners.world.problem import Plan
+
+USES: Final = {
+    "answer": "the answer",
+    "repaired": "repaired",
+    "guide": "guided the search",
+    "": "",
+}
+
+
+def tell(
+    attempt: Attempt,
+    memory: Memory | None,
+    recalled: Sequence[tuple[Recollection, Plan]],
+    scale: float,
+) -> None:
+    """Print a table of recalled plans, each with its ``Plan`` in the problem's frame, and what was done.
+
+    Its columns: the plan's number, its rank by the encoder, how many of its cells and states are blocked,
+    the first of the states and where that is, what the plan was used for.
+    """
+    print(_recall_line(attempt, memory, recalled))
+    if recalled:
+        Console(highlight=False).print(_table(recalled, scale))
+    print(
+        f"work     {attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions, "
+        f"{attempt.nodes:,} nodes"
+    )
+    print(f"ms       {_times(attempt)}")
+
+
+def _recall_line(
+    attempt: Attempt, memory: Memory | None, recalled: Sequence[tuple[Recollection, Plan]]
+) -> str:
+    if memory is None:
+        return f"recall   no memory was asked ({attempt.assist}, {attempt.planner})"
+    asked = (
+        f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
+    )
+    if not recalled:
+        return f"{asked}: none is worth trying"
+    free = sum(not (each.blocked.any() or each.goal_missed_m > 1e-9) for each, _ in recalled)
+    return f"{asked}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
+
+
+def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> Table:
+    table = Table("", "plan", "rank", "cells", "states", "first", "at", "use", box=None)
+    for column in table.columns[:-1]:
+        column.justify, column.no_wrap = "right", True
+    for order, (each, plan) in enumerate(recalled, start=1):
+        first = each.first_blocked
+        x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
+        missed = f"ends {scale * each.goal_missed_m:.1f} m off the goal" if each.goal_missed_m > 1e-9 else ""
+        table.add_row(
+            f"{order}",
+            f"{each.plan}",
+            f"{each.encoder_rank}",
+            "-" if each.blocked_cells is None else f"{each.blocked_cells}",
+            f"{int(each.blocked.sum())} of {len(each.blocked)}",
+            "-" if first is None else f"{first}",
+            "-" if first is None else f"({x:.1f}, {y:.1f})",
+            USES[each.use] or missed,
+        )
+    return table
+
+
+def _times(attempt: Attempt) -> str:
+    """The parts of the planning time that took any, in order, and the whole."""
+    names = [field.name for field in fields(Attempt) if field.name.endswith("_seconds")]
+    parts = {name: 1000.0 * float(getattr(attempt, name)) for name in names}
+    whole = parts.pop("planning_seconds")
+    shown = [f"{name.removesuffix('_seconds')} {value:.3f}" for name, value in parts.items() if value > 0.0]
+    return ", ".join([*shown, f"in all {whole:.3f}"])

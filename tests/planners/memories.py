@@ -1,0 +1,41 @@
+"""Memories without training: masks and exact checks find their plans, the encoder knows nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from planners.memory.encoder import Architecture, initial_weights
+from planners.memory.labels import sweep_plans
+from planners.memory.masks import masks_of
+from planners.memory.recall import Memory
+from planners.solve import solve
+from planners.world.problem import Problem
+from planners.world.randomness import generator
+from planners.world.vehicle import CAR, Vehicle
+
+
+def memory_of(
+    problems: Iterable[Problem], vehicle: Vehicle = CAR, metadata: dict[str, Any] | None = None
+) -> Memory:
+    """A memory of Follow's plans for ``problems``, those that it solves."""
+    attempts = [solve(problem, "follow", vehicle=vehicle) for problem in problems]
+    plans = tuple(attempt.plan for attempt in attempts if attempt.plan is not None)
+    sweeps = sweep_plans(plans, vehicle)
+    network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
+    zeros = np.zeros((len(plans) + 1, 3), np.float32)
+    return Memory(
+        class_name="test",
+        vehicle=vehicle,
+        plans=plans,
+        sweeps=sweeps,
+        masks=masks_of(sweeps),
+        centroids=zeros,
+        vectors=zeros,
+        biases=zeros[:, 0].copy(),
+        objective="labels",
+        weights=initial_weights(network, generator(0)),
+        metadata=metadata or {},
+    )
