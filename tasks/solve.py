@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
-from dashboards.pictures import picture
 from planners.memory.recall import RECALLS, Memory
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
-from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
-from storage.errors import StorageError
+from planners.world.vehicle import VEHICLES, vehicle_named
 from storage.files import whole_file
 from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
-from storage.results import write_attempts
-from tasks.attempts import attempt_row, check_attempt
+from tasks.attempts import check_attempt
+from tasks.learned import Solved, remember
 from tasks.model_registry import is_model_uri, load_from
 from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known, check_picture
+from tasks.timing import no_garbage_collection
+
+
+class Way(NamedTuple):
+    """How problems are to be solved: what an ``Assistant`` is made of."""
+
+    planner: str
+    assist: str
+    top_k: int
+    memory: str | None  # a folder, or a model in MLflow
+    seed: int
+    vehicle: str = DEFAULT_VEHICLE
+    improve_seconds: float = 0.0
+    recall: str | None = None
 
 
 class Assistant:
@@ -90,18 +102,25 @@ class Assistant:
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
 
 
-def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None) -> None:
+def plan_one(
+    assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None, learn: Path | None = None
+) -> None:
     """Plan for the one problem of a file; RunError when it has another number, or no plan was found."""
     check_picture(drawing)
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
     assistant(problems[0])  # code is warm before the time counts
-    attempt, plan, recalled = assistant(problems[0])
+    with no_garbage_collection():
+        attempt, plan, recalled = assistant(problems[0])
     if out is not None:
-        write_plan(out, _record(problems[0], attempt, plan, assistant.vehicle))
+        write_plan(out, plan_record(assistant, problems[0], attempt, plan))
+    if learn is not None:
+        remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
     told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
+        from dashboards.pictures import picture  # late: Matplotlib costs a third of a second
+
         with whole_file(drawing) as temporary:
             caption = f"{assistant.planner}, {assistant.assist}: {told}"
             figure = picture(problems[0], plan, caption, recalled, assistant.vehicle)
@@ -114,25 +133,19 @@ def plan_one(assistant: Assistant, problem: Path, out: Path | None, drawing: Pat
             print(f"{what:8} {place}")
 
 
-def solve_many(assistant: Assistant, problems: Path, out: Path, plans: Path | None) -> None:
-    """Solve every problem of a file; one attempt row each, and if asked its plan."""
-    if out.suffix != ".parquet":
-        raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    asked = read_problems(problems, assistant.vehicle)
-    if not asked:
-        raise StorageError(f"{problems} holds no problems; nothing to solve.")
-    assistant(asked[0])  # code is warm before the first time counts
-    rows = []
-    for problem in asked:
-        attempt, plan, _ = assistant(problem)
-        found = assistant.memory_of(problem.class_name)
-        rows.append(attempt_row(attempt, found.class_name if found else None, None, assistant.vehicle))
-        if plans is not None:
-            record = _record(problem, attempt, plan, assistant.vehicle)
-            write_plan(plans / f"{_file_name(problem.id, asked)}.json", record)
-    write_attempts(out, rows)
-    solved = sum(row["solved"] for row in rows)
-    print(f"{solved} of {len(rows)} solved, rows in {out}")
+def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
+    """What is told of an attempt in a file; the plan is in the frame of the problem."""
+    return PlanRecord(
+        problem.id,
+        attempt.status,
+        attempt.source or None,
+        attempt.planner,
+        attempt.assist,
+        attempt.planning_seconds,
+        plan,
+        assistant.vehicle,
+        problem.scale,
+    )
 
 
 def _folder_of(class_name: str, place: Path) -> str:
@@ -145,24 +158,3 @@ def _folder_of(class_name: str, place: Path) -> str:
         names = ", ".join(sorted(folder.name for folder in found))
         raise RunError(f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}.")
     return str(found[0] if found else place)
-
-
-def _record(problem: Problem, attempt: Attempt, plan: Plan | None, vehicle: Vehicle) -> PlanRecord:
-    return PlanRecord(
-        problem.id,
-        attempt.status,
-        attempt.source or None,
-        attempt.planner,
-        attempt.assist,
-        attempt.planning_seconds,
-        plan,
-        vehicle,
-        problem.scale,
-    )
-
-
-def _file_name(identity: str, problems: Sequence[Problem]) -> str:
-    """A problem's id if it can name a file, else its place in the list."""
-    plain = all(letter.isalnum() or letter in "-_.~" for letter in identity) and not identity.startswith(".")
-    place = next(i for i, problem in enumerate(problems) if problem.id == identity)
-    return identity if plain and identity else f"problem-{place}"

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tasks import caching
-from tasks.caching import chunks_of, is_marked, key_of, mark_done
+from tasks.caching import chunks_of, is_marked, mark_done
+from tasks.keys import key_of
 from tasks.settings import for_preset
 
 SETTINGS = for_preset("smoke")
