@@ -152,16 +152,13 @@ def solve_part(chunk: Part, told: Told = lambda: None) -> dict[str, Any]:
         for place, problem in problems_or_faults_of(chunk.piece, assistant.vehicle):
             if isinstance(problem, str):
                 return {"fault": f"{place}: {problem}"}
-            try:
-                canonical, _ = to_canonical(problem)
-            except ValueError as error:
-                return {"fault": f"{place}: {error}"}
             if not rows:
                 assistant(problem)  # code is warm before the first time counts
             attempt, plan, _ = assistant(problem)
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
-            solved.append(Solved(canonical, attempt))
+            if asked.learn is not None:
+                solved.append(Solved(to_canonical(problem)[0], attempt))
             if asked.plans is not None:
                 number = chunk.piece.first + len(rows) - 1
                 write_plan(
