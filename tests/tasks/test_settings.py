@@ -37,6 +37,7 @@ SETTINGS = st.builds(
     strict=st.booleans(),
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
     optimised=st.booleans(),
+    learned=st.sampled_from(["", "monday-12345678"]),
     learning=st.builds(
         Learning,
         seeds=st.integers(1, 3),
