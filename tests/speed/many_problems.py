@@ -1,7 +1,7 @@
 """Very many problems through `solve`: problems a second, memory, and a kill in the middle.
 
-``python -m tests.speed.many_problems [--problems 100000] [--workers 2] [--memory FOLDER] [--folder build/many]``
-draws problems of a seed of their own into a file (kept in the folder), has `solve` solve them, kills the
+``python -m tests.speed.many_problems [--problems 100000] [--workers 2] [--memory FOLDER] [--folder F]`` draws
+problems of a seed of their own into a file (kept in the folder, build/many), has `solve` solve them, kills the
 command with -9 when half of the parts are done, and gives the same command again. It watches the resident
 memory of the command and of its processes once a second, and which finished part is written twice. All is
 checked at the end: every problem has one row, in the order of the file.
@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.progress import track
 
 from planners.world.classes import problem_class
-from storage.files import whole_file
+from storage.files import remove_folder, whole_file
 from storage.memories import save_memory
 from storage.problem_files import raw_problems
 from storage.problems import fields_of
@@ -58,17 +58,10 @@ def main() -> None:
         save_memory(memory, memory_of(CLASS))
     out = asked.folder / "rows.parquet"
     out.unlink(missing_ok=True)
+    remove_folder(out.with_name(f"{out.name}.parts"))
     command = [sys.executable, "-m", "flows.cli", "solve", str(problems), "--planner", "gust"]
-    command += [
-        "--assist",
-        "open",
-        "--memory",
-        str(memory),
-        "--out",
-        str(out),
-        "--workers",
-        str(asked.workers),
-    ]
+    command += ["--assist", "open", "--memory", str(memory), "--out", str(out)]
+    command += ["--workers", str(asked.workers)]
     finished: dict[Path, int] = {}
     twice: set[Path] = set()
     first = _watch(command, out, finished, twice, kill_at=0.5, count=asked.problems)
@@ -80,7 +73,7 @@ def main() -> None:
         for share in (0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
             seen = [i for i, each in enumerate(watched.shares) if each <= share]
             if seen:
-                line = f"command {watched.own[seen[-1]]} MB, largest worker {watched.largest[seen[-1]]} MB"
+                line = f"command {watched.own[seen[-1]]} MB, largest other process {watched.largest[seen[-1]]} MB"
                 console.print(f"  up to {share:.0%} of the parts: {line}", highlight=False)
     console.print(f"parts finished before the kill: {before}; written again: {len(twice)}", highlight=False)
     rows = attempt_columns(out, ["problem_id"])["problem_id"]
