@@ -1,8 +1,8 @@
 """Very many problems through `solve`: problems a second, memory, and a kill in the middle.
 
 ``python -m tests.speed.many_problems [--problems 100000] [--workers 2] [--memory FOLDER] [--folder F]`` draws
-problems of a seed of their own into a file (kept in the folder, build/many), has `solve` solve them, kills the
-command with -9 when half of the parts are done, and gives the same command again. It watches the resident
+problems of a seed of their own into a file (kept in the folder, build/many), has `solve` solve them, kills
+the command with -9 when half of the parts are done, and gives the same command again. It watches the resident
 memory of the command and of its processes once a second, and which finished part is written twice. All is
 checked at the end: every problem has one row, in the order of the file.
 """
@@ -73,8 +73,9 @@ def main() -> None:
         for share in (0.1, 0.3, 0.5, 0.7, 0.9, 1.0):
             seen = [i for i, each in enumerate(watched.shares) if each <= share]
             if seen:
-                line = f"command {watched.own[seen[-1]]} MB, largest other process {watched.largest[seen[-1]]} MB"
-                console.print(f"  up to {share:.0%} of the parts: {line}", highlight=False)
+                own, largest = watched.own[seen[-1]], watched.largest[seen[-1]]
+                sizes = f"command {own} MB, largest other process {largest} MB"
+                console.print(f"  at {share:.0%} of the parts: {sizes}", highlight=False)
     console.print(f"parts finished before the kill: {before}; written again: {len(twice)}", highlight=False)
     rows = attempt_columns(out, ["problem_id"])["problem_id"]
     same = all(each == fields["id"] for each, (_, fields) in zip(rows, raw_problems(problems), strict=True))

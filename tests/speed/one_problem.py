@@ -2,8 +2,8 @@
 
 ``python -m tests.speed.one_problem`` has the benchmark solve new problems in all its ways, then asks the
 command for a plan of each of them in two of these ways, a process each: planning times side by side, and the
-seconds of the process from start to end with compiled kernels on the disk. The same problems, memory and seed, so
-the same plans: what differs is what stands around the attempt. Problems have a seed of their own.
+seconds of the process from start to end with compiled kernels on the disk. The same problems, memory and
+seed, so the same plans: what differs is what stands around the attempt. Problems have a seed of their own.
 """
 
 from __future__ import annotations
