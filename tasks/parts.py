@@ -126,8 +126,6 @@ def unfinished(asked: Asked) -> Iterator[None]:
         asked.folder.mkdir(parents=True, exist_ok=True)
         with locked(asked.folder / ".lock", str(asked.out)):
             remove_leftovers(asked.folder)
-            if asked.plans is not None and asked.plans.is_dir():
-                remove_leftovers(asked.plans)
             try:
                 yield
             finally:
