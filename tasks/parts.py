@@ -151,7 +151,7 @@ def solve_part(chunk: Part, told: Told = lambda: None) -> dict[str, Any]:
             if isinstance(problem, str):
                 return {"fault": f"{place}: {problem}"}
             if not rows:
-                assistant(problem)  # code is warm before the first time counts
+                assistant.warm_up(problem)
             attempt, plan, _ = assistant(problem)
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
