@@ -34,7 +34,8 @@ def curate_chunk(chunk: Chunk) -> dict[str, Any]:
     drawn = [each for shard in shards for each in read_experiences(shard, vehicle)]
     learned = _learned_of(chunk, vehicle)
     rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(learned)))
-    candidates = [(drawn + learned)[row] for row in rows]
+    everything = drawn + learned
+    candidates = [everything[row] for row in rows]
     kept = curate(candidates, settings.taught, vehicle).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
         others = sorted(set(range(len(candidates))) - set(kept))

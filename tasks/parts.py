@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -122,26 +122,28 @@ def is_solved(part: Part) -> bool:
 @contextmanager
 def unfinished(asked: Asked) -> Iterator[None]:
     """Hold the folder of parts for this process; it goes when there is nothing in it worth keeping."""
-    try:
-        asked.folder.mkdir(parents=True, exist_ok=True)
-        with locked(asked.folder / ".lock", str(asked.out)):
-            remove_leftovers(asked.folder)
-            try:
-                yield
-            finally:
-                if not any(asked.folder.glob("[0-9]*.parquet")):
-                    remove_folder(asked.folder)
-    except OSError as error:
-        raise StorageError(
-            f"{asked.folder} cannot be written: {error.strerror or error}; give another --out."
-        ) from None
+    with ExitStack() as stack:
+        try:
+            asked.folder.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(locked(asked.folder / ".lock", str(asked.out)))
+        except OSError as error:
+            reason = f"{asked.folder} cannot be written: {error.strerror}"
+            raise StorageError(f"{reason}; give another --out.") from None
+        remove_leftovers(asked.folder)
+        try:
+            yield
+        finally:
+            if not any(asked.folder.glob("[0-9]*.parquet")):
+                remove_folder(asked.folder)
 
 
-def solve_part(chunk: Part, told: Told = lambda: None) -> dict[str, Any]:
-    """Solve a part and write its rows; none where a problem of it is malformed: ``fault`` says which.
+def solve_part(chunk: Part) -> dict[str, Any]:
+    """Solve a part and write its rows; none where a problem of it is malformed: ``fault`` says which."""
+    return solve_telling(chunk, lambda: None)
 
-    ``told`` is called after each problem.
-    """
+
+def solve_telling(chunk: Part, told: Told) -> dict[str, Any]:
+    """The same; ``told`` is called after each problem."""
     asked = chunk.asked
     assistant = _assistant(asked.way, asked.memory_digest)
     rows: list[dict[str, Any]] = []

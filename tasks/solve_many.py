@@ -15,11 +15,12 @@ import numpy as np
 from planners.world.problem import Floats
 from storage.errors import StorageError
 from storage.files import remove_folder
+from storage.layout import open_data_folder
 from storage.problem_files import raw_slice
 from storage.results import attempt_columns, join_attempts
 from tasks.local_server import local_server
 from tasks.model_registry import memory_digest, memory_folder
-from tasks.parts import Asked, Part, is_solved, parts_of, solve_part, unfinished
+from tasks.parts import Asked, Part, is_solved, parts_of, solve_telling, unfinished
 from tasks.progress import progress
 from tasks.settings import UsageError
 from tasks.solve import Assistant, Way
@@ -53,6 +54,8 @@ def solve_many(
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
     Assistant(*way)  # which refuses what cannot be asked
+    if learn is not None:
+        open_data_folder(learn)
     began = time.monotonic()
     with memory_folder(way.memory) as memory:
         way = way._replace(memory=None if memory is None else str(memory))
@@ -78,7 +81,7 @@ def _here(parts: Sequence[Part]) -> list[str]:
     ready = count(1)
     with progress("solve", sum(part.piece.count for part in parts), ended=False) as show:
         for part in parts:
-            result = solve_part(part, lambda: show(next(ready)))
+            result = solve_telling(part, lambda: show(next(ready)))
             faults += [result["fault"]] if result["fault"] else []
     return faults
 
