@@ -156,6 +156,7 @@ def plan(
     explain: bool = False,
     out: Path | None = None,
     picture: Path | None = None,
+    learn: Path | None = None,
 ) -> None:
     """Plan for one problem: one plan, one picture.
 
@@ -185,12 +186,14 @@ def plan(
         Where to write the plan, .json.
     picture
         Where to draw it, .png, .svg or .pdf.
+    learn
+        Data folder that is to remember the plan where it is new.
 
     """
     from tasks.solve import Assistant, plan_one
 
     assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
-    plan_one(assistant, problem, out, picture, explain)
+    plan_one(assistant, problem, out, picture, explain, learn)
 
 
 @app.command
@@ -250,8 +253,10 @@ def solve(
     improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
+    learn: Path | None = None,
+    workers: int | None = None,
 ) -> None:
-    """Solve many problems of one's own: one attempt row each.
+    """Solve many problems of one's own: one attempt row each. The same command goes on where it was stopped.
 
     Parameters
     ----------
@@ -277,12 +282,17 @@ def solve(
         Where to write the rows, .parquet.
     plans
         Folder for the plans, one .json a problem.
+    learn
+        Data folder that is to remember what was newly solved.
+    workers
+        Worker processes; default one a core. A few problems are solved without.
 
     """
-    from tasks.solve import Assistant, solve_many
+    from tasks.solve import Way
+    from tasks.solve_many import solve_many
 
-    assistant = Assistant(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
-    solve_many(assistant, problems, out, plans)
+    way = Way(planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall)
+    solve_many(way, problems, out, plans, learn, worker_count(workers))
 
 
 @app.command
@@ -435,6 +445,10 @@ def _do(stage: str, options: Options) -> None:
         learning=options.learning,
         hallucination=options.hallucination,
     )
+    if options.learned is not None:
+        from tasks.learned import with_learned
+
+        settings = with_learned(settings, options.folder, options.learned)
     run_stage(
         f"flows.{stage}",
         stage,

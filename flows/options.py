@@ -75,6 +75,9 @@ class Options:
         Widths of its fully connected layers.
     dimensions
         Of the embedding.
+    learned
+        Choose among what --learn has added to the data folder too: a name, of what is there when it is first
+        used. The same name means the same experiences from then on.
     hallucination
         Methods that make problems around a plan, with weights, like rearrange=0.7 minimal=0.3; of rearrange,
         maximal, minimal and learned.
@@ -108,6 +111,7 @@ class Options:
     channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     dimensions: int | None = None
+    learned: str | None = None
     hallucination: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
 
     @property

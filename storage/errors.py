@@ -7,6 +7,10 @@ class StorageError(Exception):
     """Something on disk is missing, damaged, foreign or cannot be written; the message is one line."""
 
 
+class InUseError(StorageError):
+    """Another process holds it."""
+
+
 def sentence(subject: object, told: object) -> str:
     """One line of what is wrong with something, ended as a sentence where it does not end as a question."""
     text = f"{subject} {told}"

@@ -51,8 +51,7 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
 
     StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
     """
-    table = read_table(path, EXPERIENCES).slice(0, count)
-    refuse_another(path, _recorded(path), vehicle)
+    table = read_experience_table(path, vehicle).slice(0, count)
     size = state_size(vehicle)
     return [
         Experience(
@@ -68,6 +67,13 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
             strict=True,
         )
     ]
+
+
+def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
+    """The same as a table."""
+    table = read_table(path, EXPERIENCES)
+    refuse_another(path, _recorded(path), vehicle)
+    return table
 
 
 def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:

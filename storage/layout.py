@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 from storage.errors import StorageError
-from storage.files import PARTIAL, read_json, remove_leftovers, write_json
+from storage.files import PARTIAL, locked, read_json, remove_leftovers, write_json
 
 LAYOUT: Final = 1  # one more whenever an older program could no longer read the folder
 MARK: Final = "motion-memory.json"
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
 
-Table = Literal["candidates", "curated", "experiences", "hallucinated", "results", "recalls"]
+Table = Literal["candidates", "learned", "curated", "experiences", "hallucinated", "results", "recalls"]
 
 
 @dataclass(frozen=True)
@@ -111,6 +110,10 @@ class DataFolder:
         """Prefect's own folder."""
         return self.path / "prefect"
 
+    def learned(self, vehicle: str) -> Path:
+        """The folder of what was learned on the job for a vehicle (``learned.py``)."""
+        return self.path / "learned" / checked_name(vehicle)
+
     def run(self, name: str) -> RunFolder:
         """The folder of a run; a StorageError for a name that is no plain word."""
         return RunFolder(self.path / "runs" / checked_name(name))
@@ -125,25 +128,13 @@ class DataFolder:
 
         StorageError: another command holds it; the message says which process.
         """
-        try:
-            handle = os.open(self.path / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except OSError as error:
-            raise _not_writable(self.path, error) from None
-        try:
+        with ExitStack() as stack:
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
-                raise StorageError(
-                    f"{self.path} is in use by another command (process {holder}); "
-                    "wait for it to end or give another data folder."
-                ) from None
-            os.ftruncate(handle, 0)
-            os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+                stack.enter_context(locked(self.path / ".lock", str(self.path)))
+            except OSError as error:
+                raise _not_writable(self.path, error) from None
             remove_leftovers(self.path / "runs")
             yield
-        finally:
-            os.close(handle)  # which also gives the lock back, as does a killed process
 
 
 def open_data_folder(path: Path | str) -> DataFolder:

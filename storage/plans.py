@@ -54,6 +54,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
             "length_m": None if plan is None else plan.length_m,
             "duration_s": None if plan is None else plan.duration_s,
         },
+        indent=None,
     )
 
 

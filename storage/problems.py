@@ -3,29 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from planners.world.faults import problem_fault
 from planners.world.polygons import PolygonError, convex_pieces
 from planners.world.problem import Floats, Obstacles, Problem, obstacles_of
 from planners.world.vehicle import CAR, Vehicle
 from storage.errors import StorageError
-from storage.files import parse_json, read_text, whole_file, write_json
+from storage.files import whole_file, write_json
+from storage.problem_files import ProblemSlice, format_of, raw_problems, raw_slice
 from storage.schemas import PROBLEMS
 from storage.shards import table_of, write_table
 
-FORMATS: Final = (".json", ".jsonl", ".parquet")
 SMALLEST_SCALE: Final = 0.01  # a robot of 2 cm
 LARGEST_SCALE: Final = 100.0
 UNKNOWN_CLASS: Final = "unknown"
 _REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
-_OPTIONAL: Final = ("id", "class", "groups", "scale")
 
 
 def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
@@ -50,8 +47,19 @@ def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str
 
     StorageError: the file itself is missing, unreadable or of no known format.
     """
+    return _checked(path, raw_problems(path), vehicle)
+
+
+def problems_or_faults_of(piece: ProblemSlice, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
+    """The same for a slice of a file; an id may still occur in another slice."""
+    return _checked(piece.path, raw_slice(piece), vehicle)
+
+
+def _checked(
+    path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle
+) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
-    for number, fields in _raw_problems(path):
+    for number, fields in raw:
         place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
         identity = fields.get("id") if isinstance(fields, Mapping) else None
         named = f"{place} (id {_short(identity)})" if isinstance(identity, str) and identity else place
@@ -76,7 +84,7 @@ def write_problems(path: Path, problems: Sequence[Problem]) -> None:
     exactly, or to a last digit where the scale is not 1.
     """
     rows = [fields_of(problem) for problem in problems]
-    match _format(path):
+    match format_of(path):
         case ".json":
             if len(rows) != 1:
                 raise StorageError(f"{path} can hold one problem, got {len(rows)}; use .jsonl or .parquet.")
@@ -112,38 +120,6 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     if fault is not None:
         raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
     return problem
-
-
-def _raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
-    """Objects and their numbers: of the line, or counted from 1."""
-    match _format(path):
-        case ".json":
-            yield 1, parse_json(read_text(path), str(path))
-        case ".jsonl":
-            for number, line in enumerate(read_text(path).split("\n"), start=1):
-                if line.strip():
-                    yield number, parse_json(line, f"{path} line {number}")
-        case _:
-            yield from enumerate(_parquet_rows(path), start=1)
-
-
-def _parquet_rows(path: Path) -> Iterator[Any]:
-    try:
-        with pq.ParquetFile(path) as file:
-            names = [name for name in file.schema_arrow.names if name in (*_REQUIRED, *_OPTIONAL)]
-            for batch in file.iter_batches(1024, columns=names):
-                yield from batch.to_pylist()
-    except FileNotFoundError:
-        raise StorageError(f"{path} does not exist; check the name.") from None
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).partition("\n")[0].rstrip(".")
-        raise StorageError(f"{path} is no whole Parquet file ({reason}); write it again.") from None
-
-
-def _format(path: Path) -> str:
-    if path.suffix not in FORMATS:
-        raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
-    return path.suffix
 
 
 def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:

@@ -4,19 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 import pyarrow as pa
 
 from storage.errors import StorageError
 from storage.schemas import ATTEMPTS
-from storage.shards import read_table, table_of, write_table
+from storage.shards import read_table, table_of, write_table, write_tables
+
+if TYPE_CHECKING:  # pandas takes a fifth of a second to import, and who only writes rows needs none
+    import pandas as pd
 
 
 def write_attempts(path: Path, rows: Sequence[dict[str, Any]], key: str = "") -> None:
     """Write attempt rows (``schemas.ATTEMPTS``); a StorageError where a row has other fields or types."""
     write_table(path, table_of(rows, ATTEMPTS, "attempt"), key)
+
+
+def join_attempts(path: Path, shards: Sequence[Path]) -> None:
+    """Write the rows of many files as one, a file at a time."""
+    write_tables(path, (read_table(shard, ATTEMPTS) for shard in shards), ATTEMPTS)
+
+
+def attempt_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
+    """Some columns of a file of attempts, as Python values."""
+    columns: dict[str, list[Any]] = read_table(path, ATTEMPTS, names).to_pydict()
+    return columns
 
 
 def read_attempts(place: Path, without: Sequence[str] = ()) -> pd.DataFrame:

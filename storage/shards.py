@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,15 +24,21 @@ def write_table(path: Path, table: pa.Table, key: str = "") -> None:
 
     StorageError: it could not be written; what was at ``path`` before is still there.
     """
-    metadata = {**(table.schema.metadata or {}), SHARD_KEY: key.encode()}
-    with whole_file(path) as temporary:
-        pq.write_table(
-            table.replace_schema_metadata(metadata),
-            temporary,
-            row_group_size=ROW_GROUP_ROWS,
-            compression="zstd",
-            write_page_checksum=True,
-        )
+    write_tables(path, [table], table.schema, key)
+
+
+def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key: str = "") -> None:
+    """Write tables of one schema after one another into one file, of which no more than one is in memory.
+
+    StorageError as for ``write_table``.
+    """
+    described = schema.with_metadata({**(schema.metadata or {}), SHARD_KEY: key.encode()})
+    with (
+        whole_file(path) as temporary,
+        pq.ParquetWriter(temporary, described, compression="zstd", write_page_checksum=True) as file,
+    ):
+        for table in tables:
+            file.write_table(table.replace_schema_metadata(described.metadata), ROW_GROUP_ROWS)
 
 
 def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 from planners.memory.recall import Memory
@@ -19,6 +17,7 @@ from tasks.attempts import attempt_row, check_attempt
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
 from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
+from tasks.timing import no_garbage_collection
 from tasks.warm_up import compile_assists
 from tasks.worlds import source_key, source_of
 
@@ -63,7 +62,7 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     compile_assists(vehicle)
     for asked_first in asked:  # code and caches are warm before the first time counts
         _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
-    with _no_garbage_collection():
+    with no_garbage_collection():
         for index in range(chunk.first, chunk.last):
             problem = source.problem("test", index)
             order = generator(settings.seed, "order", problem.id).permutation(len(asked))
@@ -117,15 +116,3 @@ def _attempt(
     return solve(
         problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle, strategy=strategy
     )
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    gc.collect()
-    gc.freeze()
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
-        gc.unfreeze()

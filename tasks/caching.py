@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar
 
 from prefect import task
 from prefect.tasks import Task
@@ -17,11 +14,38 @@ from prefect.tasks import Task
 from storage.errors import StorageError
 from storage.files import read_json, write_json
 from storage.layout import RunFolder, open_data_folder
+from tasks.keys import key_of
 from tasks.settings import RunSettings
 from tasks.work import measured
 
-PACKAGES: Final = ("planners", "storage", "tasks")  # an edit in one of them makes every chunk anew
 RETRIES: Final = 1  # a disk or a network may stumble once; whoever fails twice fails
+
+
+class Piece(Protocol):
+    """What can be fanned out: a piece of something, with a place among its like."""
+
+    @property
+    def class_name(self) -> str:
+        """What it is a piece of."""
+
+    @property
+    def index(self) -> int:
+        """Its position among these pieces."""
+
+    @property
+    def first(self) -> int:
+        """The first problem or experience of the piece."""
+
+    @property
+    def last(self) -> int:
+        """One past its last."""
+
+    @property
+    def cache_key(self) -> str:
+        """What its result depends on."""
+
+
+AnyPiece = TypeVar("AnyPiece", bound=Piece)
 
 
 @dataclass(frozen=True)
@@ -40,6 +64,11 @@ class Chunk:
     def run(self) -> RunFolder:
         """The folder of the run it belongs to."""
         return run_folder(self.data, self.settings)
+
+    @property
+    def cache_key(self) -> str:
+        """The key under which its result is kept."""
+        return f"{self.settings.run_name}-{self.class_name}-{self.key}"
 
 
 def run_folder(data: str, settings: RunSettings) -> RunFolder:
@@ -69,27 +98,6 @@ def chunks_of(
     ]
 
 
-def key_of(*inputs: Any) -> str:
-    """A digest of JSON values and of the sources that turn them into rows."""
-    text = json.dumps([sources_digest(), *inputs], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-
-@functools.cache
-def sources_digest() -> str:
-    """A digest of every source file of the packages that rows depend on."""
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        spec = find_spec(package)
-        if spec is None or spec.origin is None:
-            raise ImportError(f"Package {package} is not there; install motion-memory again.")
-        root = Path(spec.origin).parent
-        for file in sorted(root.rglob("*.py")):
-            digest.update(f"{package}/{file.relative_to(root)}\0".encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()
-
-
 def mark_done(place: Path, key: str) -> None:
     """Note beside a folder that cannot carry a key from what it was made."""
     write_json(_mark(place), {"key": key})
@@ -107,17 +115,13 @@ def _mark(place: Path) -> Path:
     return place.with_name(f"{place.name}.key.json")
 
 
-def chunk_task(function: Callable[[Chunk], dict[str, Any]]) -> Task[[Chunk], dict[str, Any]]:
+def chunk_task(function: Callable[[AnyPiece], dict[str, Any]]) -> Task[[AnyPiece], dict[str, Any]]:
     """Make a Prefect task of a chunk's function: its small JSON result is kept under the chunk's key."""
     return task(
         name=function.__name__.replace("_", "-"),
         task_run_name=f"{function.__name__.replace('_', '-')} {{chunk.class_name}} {{chunk.index}}",
-        cache_key_fn=lambda _, parameters: _cache_key(parameters["chunk"]),
+        cache_key_fn=lambda _, parameters: parameters["chunk"].cache_key,
         persist_result=True,
         retries=RETRIES,
         retry_delay_seconds=1,
     )(measured(function))
-
-
-def _cache_key(chunk: Chunk) -> str:
-    return f"{chunk.settings.run_name}-{chunk.class_name}-{chunk.key}"

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any, Final
 
 from planners.memory.curation import curate
+from planners.memory.experience import Experience
 from planners.world.authority import faults
 from planners.world.problem import Plan, Problem
 from planners.world.vehicle import Vehicle, vehicle_named
 from storage.experiences import merge_experiences, read_experiences, replace_plans
+from storage.layout import open_data_folder
+from storage.learned import extract_class, snapshot_path
 from storage.shards import shard_is_done
 from tasks.attempts import PlanFaultError
-from tasks.caching import Chunk, chunk_task, chunks_of, key_of, run_folder
+from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
 from tasks.collect import Results, experiences_key
+from tasks.keys import key_of
 from tasks.settings import COMBINED, RunSettings
+from tasks.worlds import source_of
 
 IMPROVED_AT_ONCE: Final = 25  # plans, a second each
 CLEARANCE_WEIGHT: Final = 1.0  # buys most of a metre of clearance for half a second (docs/optimisation.md)
@@ -25,13 +31,37 @@ def curate_chunk(chunk: Chunk) -> dict[str, Any]:
     run, settings, name = chunk.run, chunk.settings, chunk.class_name
     vehicle = vehicle_named(settings.vehicle)
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
-    candidates = [each for shard in shards for each in read_experiences(shard, vehicle)][: settings.wanted]
+    drawn = [each for shard in shards for each in read_experiences(shard, vehicle)]
+    learned = _learned_of(chunk, vehicle)
+    rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(learned)))
+    everything = drawn + learned
+    candidates = [everything[row] for row in rows]
     kept = curate(candidates, settings.taught, vehicle).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
         others = sorted(set(range(len(candidates))) - set(kept))
         kept += others[: settings.experiences - len(kept)]
-    merge_experiences(shards, run.shard("curated", name, 0), kept, chunk.key)
+    shards += [run.shard("learned", name, 0)] if learned else []
+    merge_experiences(shards, run.shard("curated", name, 0), [rows[i] for i in kept], chunk.key)
     return {"candidates": len(candidates), "kept": len(kept)}
+
+
+def _learned_of(chunk: Chunk, vehicle: Vehicle) -> list[Experience]:
+    """What was learned of the class, as a shard of the run; problems that the run tests with stay out."""
+    settings, name = chunk.settings, chunk.class_name
+    if not settings.learned:
+        return []
+    source = source_of(chunk.data, settings, name)
+    tested = {source.problem("test", i).id for i in range(source.count("test", settings.test_problems))}
+    snapshot = snapshot_path(open_data_folder(chunk.data).learned(settings.vehicle), settings.learned)
+    shard = chunk.run.shard("learned", name, 0)
+    extract_class(snapshot, name, tested, shard, chunk.key)
+    return read_experiences(shard, vehicle)
+
+
+def _alternating(ours: Sequence[int], theirs: Sequence[int]) -> list[int]:
+    """One of these, one of those: of both are the first, which curation covers."""
+    pairs = zip_longest(ours, theirs)
+    return [row for pair in pairs for row in pair if row is not None]
 
 
 curate_candidates = chunk_task(curate_chunk)
@@ -47,7 +77,7 @@ def curation_chunks(data: str, settings: RunSettings, done: Results) -> list[Chu
     chunks = []
     for name in settings.class_names:
         of_class = sorted((each for each in done if each.class_name == name), key=lambda each: each.index)
-        inputs = [settings.wanted, settings.experiences, *(each.key for each in of_class)]
+        inputs = [settings.wanted, settings.experiences, settings.learned, *(each.key for each in of_class)]
         chunks += chunks_of(data, settings, "curate", name, len(of_class), len(of_class), inputs)
     return chunks
 

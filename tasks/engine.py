@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from itertools import islice
 from typing import Any, Final
 
 import dask
@@ -15,7 +16,7 @@ from dask.system import CPU_COUNT
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
-from tasks.caching import Chunk
+from tasks.caching import AnyPiece, Piece
 from tasks.progress import progress
 from tasks.settings import RunError
 from tasks.work import WORK, note
@@ -25,6 +26,7 @@ KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and
 CONNECT_SECONDS: Final = 5
 CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
+AHEAD: Final = 200  # chunks that wait for a worker: enough that none waits, few enough for any memory
 LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which reads files
 
 Client: Any = distributed.Client  # Dask has no types
@@ -115,11 +117,11 @@ def _close(local: Any) -> None:
 
 
 def fan_out(
-    task: Task[[Chunk], dict[str, Any]],
-    chunks: Sequence[Chunk],
+    task: Task[[AnyPiece], dict[str, Any]],
+    chunks: Sequence[AnyPiece],
     description: str,
-    is_done: Callable[[Chunk], bool],
-    units: Callable[[Chunk], int] = lambda chunk: chunk.last - chunk.first,
+    is_done: Callable[[AnyPiece], bool],
+    units: Callable[[AnyPiece], int] = lambda chunk: chunk.last - chunk.first,
     partly_done: Callable[[], int] = lambda: 0,
 ) -> list[dict[str, Any]]:
     """Do chunks on the flow's workers; results in the order of the chunks.
@@ -128,28 +130,29 @@ def fan_out(
     counts; ``partly_done`` tells those of chunks still at work. ChunkError at the first failure.
     """
     began = time.time()
-    futures: list[Any] = [
-        task.with_options(refresh_cache=not is_done(chunk)).submit(chunk) for chunk in chunks
-    ]
+    results: dict[int, dict[str, Any]] = {}
     sizes = [units(chunk) for chunk in chunks]
     with progress(description, sum(sizes)) as show:
-        pending = dict(zip(range(len(chunks)), futures, strict=True))
+        waiting = iter(enumerate(chunks))
+        pending: dict[int, Any] = {}
         done = begun = 0
         looked = time.monotonic()
-        while pending:
+        while len(results) < len(chunks):
+            for i, chunk in islice(waiting, AHEAD - len(pending)):
+                pending[i] = task.with_options(refresh_cache=not is_done(chunk)).submit(chunk)
             for i in [i for i, future in pending.items() if future.wrapped_future.done()]:
-                _check(pending.pop(i), chunks[i], description)
+                results[i] = _result(pending.pop(i), chunks[i], description)
                 done += sizes[i]
             if time.monotonic() - looked >= LOOK_SECONDS:
                 begun, looked = partly_done(), time.monotonic()
             show(max(done, min(begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
-    results = [future.result() for future in futures]
-    note(description, results, began)
-    return [{name: value for name, value in result.items() if name != WORK} for result in results]
+    ordered = [results[i] for i in range(len(chunks))]
+    note(description, ordered, began)
+    return [{name: value for name, value in result.items() if name != WORK} for result in ordered]
 
 
-def _check(future: Any, chunk: Chunk, description: str) -> None:
+def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
     where = f"{description}: chunk {chunk.index} of {chunk.class_name}"
     dask_future = future.wrapped_future
     if dask_future.status != "finished":
@@ -160,7 +163,8 @@ def _check(future: Any, chunk: Chunk, description: str) -> None:
             ) from cause
         raise ChunkError(f"{where} was lost: {cause}") from cause
     try:
-        future.result()
+        result: dict[str, Any] = future.result()
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ChunkError(f"{where} failed: {reason or type(error).__name__}") from error
+    return result

@@ -15,7 +15,7 @@ from rich.table import Table
 from planners.world.problem import Problem
 from planners.world.vehicle import VEHICLES, vehicle_named
 from storage.files import whole_file, whole_folder
-from storage.problems import FORMATS as PROBLEM_FORMATS
+from storage.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.problems import LARGEST_SCALE, SMALLEST_SCALE, write_problems
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at

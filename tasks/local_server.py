@@ -14,7 +14,6 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -177,6 +176,8 @@ def _is_locked(file: IO[str]) -> bool:
 
 
 def _is_healthy(url: str) -> bool:
+    import urllib.request  # late: few who import this start a server
+
     try:
         direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
         with direct.open(f"{url}/health", timeout=2.0) as answer:

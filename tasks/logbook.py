@@ -16,7 +16,8 @@ from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
 from tasks.build_memory import figure_names
-from tasks.caching import Chunk, key_of, run_folder
+from tasks.caching import Chunk, run_folder
+from tasks.keys import key_of
 from tasks.report import Report
 from tasks.settings import RunSettings
 from tasks.sweep import swept

@@ -5,12 +5,14 @@ They are downloaded, and then checked and read as any other archive; no code of 
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
-from unittest.mock import patch
 
 from planners.memory.recall import Memory
 from planners.world.vehicle import Vehicle
@@ -34,6 +36,30 @@ def is_model_uri(place: str) -> bool:
     return URI.fullmatch(place) is not None
 
 
+@contextmanager
+def memory_folder(place: str | None) -> Iterator[Path | None]:
+    """The folder at a place: itself, or what MLflow keeps, downloaded for as long as this lasts.
+
+    RunError: MLflow does not answer, or holds no such model.
+    """
+    if place is None or not is_model_uri(place):
+        yield place if place is None else Path(place)
+        return
+    with TemporaryDirectory(prefix="motion-memory-") as scratch:
+        yield _downloaded(place, scratch)
+
+
+def memory_digest(folder: Path | None) -> str:
+    """A digest of the memories in a folder, whose headers hold the checksums of all else."""
+    digest = hashlib.sha256()
+    if folder is not None:
+        for header in sorted([folder / "memory.json", *folder.glob("memories/[!.]*/memory.json")]):
+            if header.is_file():
+                digest.update(f"{header.relative_to(folder)}\0".encode())
+                digest.update(header.read_bytes())
+    return digest.hexdigest()
+
+
 def load_from(place: str, vehicle: Vehicle) -> Memory:
     """The memory in a folder, or of a model in MLflow at $MLFLOW_TRACKING_URI or in the usual data folder.
 
@@ -43,24 +69,28 @@ def load_from(place: str, vehicle: Vehicle) -> Memory:
 
 
 def _registered(uri: str, vehicle: Vehicle) -> Memory:
+    with TemporaryDirectory(prefix="motion-memory-") as scratch:  # mapped files outlive their names
+        return load_memory(_downloaded(uri, scratch), vehicle)
+
+
+def _downloaded(uri: str, scratch: str) -> Path:
     where = _tracking_uri(uri)
     for name, value in _SETTINGS.items():
         os.environ.setdefault(name, value)
+    from unittest.mock import patch
+
     from mlflow.artifacts import download_artifacts
 
-    with (
-        TemporaryDirectory(prefix="motion-memory-") as scratch,  # mapped files outlive their names
-        patch.dict(os.environ, {"MLFLOW_TRACKING_URI": where}),  # of all that MLflow asks on the way
-    ):
-        try:
+    try:
+        with patch.dict(os.environ, {"MLFLOW_TRACKING_URI": where}):  # of all that MLflow asks on the way
             folder = Path(download_artifacts(uri, dst_path=scratch))
-        except Exception as error:  # each of MLflow's stores has errors of its own
-            reason = " ".join(str(error).split())[:300] or type(error).__name__
-            raise RunError(f"{uri} cannot be had from MLflow at {where}: {reason}") from error
-        found = sorted(header.parent for header in folder.rglob("memory.json"))
-        if len(found) != 1:
-            raise RunError(f"{uri} in MLflow at {where} holds {len(found)} memories; name a model with one.")
-        return load_memory(found[0], vehicle)
+    except Exception as error:  # each of MLflow's stores has errors of its own
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RunError(f"{uri} cannot be had from MLflow at {where}: {reason}") from error
+    found = sorted(header.parent for header in folder.rglob("memory.json"))
+    if len(found) != 1:
+        raise RunError(f"{uri} in MLflow at {where} holds {len(found)} memories; name a model with one.")
+    return found[0]
 
 
 def _tracking_uri(uri: str) -> str:

@@ -71,6 +71,7 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "hallucination": DEFAULT_MIXTURE,
     "candidates": 0,
     "continual": "none",
+    "learned": "",
 }
 
 
@@ -99,6 +100,7 @@ class RunSettings:
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
     candidates: int = 0  # solved problems a class that experiences are chosen of; few: the first are kept
 
+    learned: str = ""  # snapshot of what was learned on the job, and a digest of it; more candidates
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
 
     @property

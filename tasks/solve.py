@@ -6,24 +6,39 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
+from typing import Final, NamedTuple
 
-from dashboards.pictures import picture
 from planners.explanation import recollections
 from planners.memory.recall import RECALLS, Memory
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
-from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
-from storage.errors import StorageError
+from planners.world.vehicle import VEHICLES, vehicle_named
 from storage.files import whole_file
 from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
-from storage.results import write_attempts
-from tasks.attempts import attempt_row, check_attempt
-from tasks.explain import tell
+from tasks.attempts import check_attempt
+from tasks.learned import Solved, remember
 from tasks.model_registry import is_model_uri, load_from
 from tasks.settings import COMBINED, DEFAULT_VEHICLE, RunError, UsageError, check_known, check_picture
+from tasks.timing import no_garbage_collection
+
+WARM_SECONDS: Final = 0.05  # hundreds of attempts that recall, tens that search, none of a second
+
+
+class Way(NamedTuple):
+    """How problems are to be solved: what an ``Assistant`` is made of."""
+
+    planner: str
+    assist: str
+    top_k: int
+    memory: str | None  # a folder, or a model in MLflow
+    seed: int
+    vehicle: str = DEFAULT_VEHICLE
+    improve_seconds: float = 0.0
+    recall: str | None = None
 
 
 class Assistant:
@@ -68,20 +83,34 @@ class Assistant:
             self._memories[place] = load_from(place, self.vehicle)
         return self._memories[place]
 
-    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
-        """The attempt, its plan and the recalled plans, these in the frame of the problem."""
-        canonical, alignment = to_canonical(problem)
-        memory = self.memory_of(problem.class_name)
-        attempt = solve(
+    def warm_up(self, problem: Problem) -> None:
+        """Attempt a problem so that nothing is cold when the time counts: once, then while that is quick.
+
+        In the benchmark an attempt stands next to others at the same problem; so it does here.
+        """
+        canonical, _ = to_canonical(problem)
+        attempt = self._attempt(canonical)
+        last = perf_counter() + WARM_SECONDS
+        while perf_counter() + attempt.planning_seconds < last:
+            attempt = self._attempt(canonical)
+
+    def _attempt(self, canonical: Problem) -> Attempt:
+        return solve(
             canonical,
             self.planner,
             self.assist,
             self.top_k,
-            memory,
+            self.memory_of(canonical.class_name),
             self.seed,
             vehicle=self.vehicle,
             strategy=self.recall,
         )
+
+    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
+        """The attempt, its plan and the recalled plans, these in the frame of the problem."""
+        canonical, alignment = to_canonical(problem)
+        memory = self.memory_of(problem.class_name)
+        attempt = self._attempt(canonical)
         if self.improve_seconds > 0.0:
             attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)
         check_attempt(canonical, attempt, set(), self.vehicle)
@@ -93,22 +122,33 @@ class Assistant:
 
 
 def plan_one(
-    assistant: Assistant, problem: Path, out: Path | None, drawing: Path | None, explained: bool = False
+    assistant: Assistant,
+    problem: Path,
+    out: Path | None,
+    drawing: Path | None,
+    explained: bool = False,
+    learn: Path | None = None,
 ) -> None:
     """Plan for the one problem of a file; RunError when it has another number, or no plan was found.
 
-    ``explained``: say and draw what was recalled, where it collides and what was done then.
+    ``explained``: say and draw what was recalled, where it collides and what was done then. ``learn``: the
+    data folder that the problem and its plan are added to as an experience.
     """
     check_picture(drawing)
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
-    assistant(problems[0])  # code is warm before the time counts
-    attempt, plan, recalled = assistant(problems[0])
+    with no_garbage_collection():
+        assistant.warm_up(problems[0])
+        attempt, plan, recalled = assistant(problems[0])
     if out is not None:
-        write_plan(out, _record(problems[0], attempt, plan, assistant.vehicle))
+        write_plan(out, plan_record(assistant, problems[0], attempt, plan))
+    if learn is not None:
+        remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
     told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
+        from dashboards.pictures import picture  # late: Matplotlib costs a third of a second
+
         with whole_file(drawing) as temporary:
             caption = f"{assistant.planner}, {assistant.assist}: {told}"
             figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
@@ -124,31 +164,27 @@ def plan_one(
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
+    from tasks.explain import tell  # late: tables cost a tenth of a second
+
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
     looked_at = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
     tell(attempt, memory, list(zip(looked_at, recalled, strict=True)), problem.scale)
 
 
-def solve_many(assistant: Assistant, problems: Path, out: Path, plans: Path | None) -> None:
-    """Solve every problem of a file; one attempt row each, and if asked its plan."""
-    if out.suffix != ".parquet":
-        raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    asked = read_problems(problems, assistant.vehicle)
-    if not asked:
-        raise StorageError(f"{problems} holds no problems; nothing to solve.")
-    assistant(asked[0])  # code is warm before the first time counts
-    rows = []
-    for problem in asked:
-        attempt, plan, _ = assistant(problem)
-        found = assistant.memory_of(problem.class_name)
-        rows.append(attempt_row(attempt, found.class_name if found else None, None, assistant.vehicle))
-        if plans is not None:
-            record = _record(problem, attempt, plan, assistant.vehicle)
-            write_plan(plans / f"{_file_name(problem.id, asked)}.json", record)
-    write_attempts(out, rows)
-    solved = sum(row["solved"] for row in rows)
-    print(f"{solved} of {len(rows)} solved, rows in {out}")
+def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
+    """What is told of an attempt in a file; the plan is in the frame of the problem."""
+    return PlanRecord(
+        problem.id,
+        attempt.status,
+        attempt.source or None,
+        attempt.planner,
+        attempt.assist,
+        attempt.planning_seconds,
+        plan,
+        assistant.vehicle,
+        problem.scale,
+    )
 
 
 def _folder_of(class_name: str, place: Path) -> str:
@@ -161,24 +197,3 @@ def _folder_of(class_name: str, place: Path) -> str:
         names = ", ".join(sorted(folder.name for folder in found))
         raise RunError(f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}.")
     return str(found[0] if found else place)
-
-
-def _record(problem: Problem, attempt: Attempt, plan: Plan | None, vehicle: Vehicle) -> PlanRecord:
-    return PlanRecord(
-        problem.id,
-        attempt.status,
-        attempt.source or None,
-        attempt.planner,
-        attempt.assist,
-        attempt.planning_seconds,
-        plan,
-        vehicle,
-        problem.scale,
-    )
-
-
-def _file_name(identity: str, problems: Sequence[Problem]) -> str:
-    """A problem's id if it can name a file, else its place in the list."""
-    plain = all(letter.isalnum() or letter in "-_.~" for letter in identity) and not identity.startswith(".")
-    place = next(i for i, problem in enumerate(problems) if problem.id == identity)
-    return identity if plain and identity else f"problem-{place}"

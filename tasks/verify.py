@@ -22,7 +22,7 @@ from planners.world.authority import faults
 from planners.world.collision import scene_of
 from planners.world.occupancy import occupancy_of, pack
 from planners.world.randomness import generator
-from planners.world.vehicle import Vehicle, vehicle_named
+from planners.world.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.encoders import load_encoder
 from storage.errors import StorageError
 from storage.experiences import read_experiences
@@ -30,6 +30,7 @@ from storage.files import read_text
 from storage.hallucinated import read_hallucinated_problems, read_labelled
 from storage.hallucinators import load_hallucinator
 from storage.layout import RunFolder, Table, open_data_folder
+from storage.learned import learned_shards
 from storage.memories import load_memory
 from storage.recalls import read_recalls
 from storage.results import read_attempts
@@ -51,10 +52,12 @@ Job = Callable[[], Findings]
 
 def verify_folder(folder: Path, sample: float, workers: int) -> None:
     """Check a whole data folder and print what was checked; RunError when something is wrong."""
-    runs = open_data_folder(folder).runs()
-    if not runs:
+    data = open_data_folder(folder)
+    jobs = [job for run in data.runs() for job in _jobs(str(folder), run, sample)]
+    for name, vehicle in VEHICLES.items():
+        jobs += [partial(_experiences, path, vehicle) for path in learned_shards(data.learned(name))]
+    if not jobs:
         raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
-    jobs = [job for run in runs for job in _jobs(str(folder), run, sample)]
     checked: Counter[str] = Counter()
     wrong: list[str] = []
     context = multiprocessing.get_context("spawn")

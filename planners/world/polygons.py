@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from planners.world.problem import Floats, counter_clockwise
 Corner = tuple[float, ...]
 
 LARGEST_COORDINATE_M: Final = 10_000.0  # float32 is exact to 1 mm up to there
+SURE_TURN_M2: Final = 1e-6  # far more than rounding makes of a straight angle
 
 
 class PolygonError(ValueError):
@@ -27,14 +29,15 @@ def convex_pieces(polygon: Floats) -> list[Floats]:
 
     PolygonError: fewer than 3 points, not finite, too far away, crossing itself, or without area.
     """
-    corners = _corners(polygon)
+    corners = counter_clockwise(_corners(polygon))
+    if len(corners) <= 4 and _turns(corners).min() > SURE_TURN_M2:  # five such points can make a star
+        return [corners]
     shape = shapely.Polygon(corners)
     if shape.convex_hull.area == 0.0:
         raise PolygonError("has no area; remove it or move a point")
     if not shape.is_valid:
         reason = shapely.is_valid_reason(shape).partition("[")[0].lower()
         raise PolygonError(f"crosses or touches itself ({reason}); draw it as a simple polygon")
-    corners = counter_clockwise(corners)
     return [corners] if _is_convex(corners) else joined_triangles(shape)
 
 
@@ -49,9 +52,10 @@ def _corners(polygon: Floats) -> Floats:
     """The polygon in float32 steps, without repeated points."""
     if len(polygon) < 3:
         raise PolygonError(f"has {len(polygon)} points, wanted were at least 3; complete or remove it")
-    if not np.isfinite(polygon).all():
+    farthest = float(np.abs(polygon).max())
+    if not math.isfinite(farthest):
         raise PolygonError("has a coordinate that is not a finite number; correct it")
-    if np.abs(polygon).max() > LARGEST_COORDINATE_M:
+    if farthest > LARGEST_COORDINATE_M:
         raise PolygonError(
             f"reaches farther than {LARGEST_COORDINATE_M:.0f} m from the origin; "
             "move the origin near the start"
@@ -65,10 +69,16 @@ def _corners(polygon: Floats) -> Floats:
 
 def _is_convex(corners: Floats) -> bool:
     """Whether a simple counter-clockwise polygon with area is convex; straight angles are allowed."""
+    turns = _turns(corners)
+    return bool((turns >= 0.0).all() and (turns > 0.0).any())
+
+
+def _turns(corners: Floats) -> Floats:
+    """For each edge the cross product with the next, square metres: above 0 where the way turns left."""
     edges = _after(corners) - corners
     after = _after(edges)
-    turns = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
-    return bool((turns >= 0.0).all() and (turns > 0.0).any())
+    turns: Floats = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    return turns
 
 
 def _after(corners: Floats) -> Floats:

@@ -56,6 +56,8 @@ COMMANDS = (
         (["optimise", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
         (["optimise", "p.json"], 1, "p.json does not exist"),
         (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
+        (["solve", "p.jsonl", "--out", "rows.parquet"], 1, "p.jsonl does not exist"),
+        (["solve", "p.jsonl", "--out", "rows.parquet", "--workers", "0"], 2, "0 workers: give 1 or more."),
         (["export", "nowhere", "--format", "xml", "--out", "a.csv"], 2, "Unknown format 'xml'. Known: ompl,"),
         (["export", "nowhere", "--format", "csv", "--out", "a.db"], 2, "a.db does not end in .csv"),
         (["export", "nowhere", "--format", "ompl", "--out", "."], 2, ". is there already; give a new folder"),

@@ -37,7 +37,7 @@ from planners.world.randomness import generator
 from storage.configurations import Configuration
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
-from tasks.caching import key_of
+from tasks.keys import key_of
 
 KEPT = Path("build") / "speed"  # not the data folder: a run wants that empty or its own
 COLLECTING = 79  # seed of the stored experiences

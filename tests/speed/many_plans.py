@@ -21,7 +21,7 @@ from planners.world.problem import Plan
 from planners.world.vehicle import CAR, state_size
 from storage.errors import StorageError
 from storage.memories import load_memory, save_memory
-from tasks.caching import key_of
+from tasks.keys import key_of
 from tests.speed.assists import COLLECTING, memory_of
 
 TAUGHT = 1_000  # plans that the encoder is trained on

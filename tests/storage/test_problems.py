@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.imported import read_imported, write_imported
-from storage.problems import FORMATS, read_problems, write_problems
+from storage.problem_files import FORMATS
+from storage.problems import read_problems, write_problems
 from tests.storage.samples import box, problem_with, problems, quick, same_problem, star
 
 GOOD: dict[str, Any] = {

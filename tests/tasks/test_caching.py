@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tasks import caching
-from tasks.caching import chunks_of, is_marked, key_of, mark_done
+from tasks import keys
+from tasks.caching import chunks_of, is_marked, mark_done
+from tasks.keys import key_of
 from tasks.settings import for_preset
 
 SETTINGS = for_preset("smoke")
@@ -47,13 +48,13 @@ def test_an_edited_source_file_changes_every_key(tmp_path: Path, monkeypatch: py
     (package / "__init__.py").write_text("")
     (package / "module.py").write_text("ANSWER = 42\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(caching, "PACKAGES", ("edited",))
-    caching.sources_digest.cache_clear()
+    monkeypatch.setattr(keys, "PACKAGES", ("edited",))
+    keys.sources_digest.cache_clear()
     before = key_of("same")
     (package / "module.py").write_text("ANSWER = 43\n")
-    caching.sources_digest.cache_clear()
+    keys.sources_digest.cache_clear()
     after = key_of("same")
-    caching.sources_digest.cache_clear()
+    keys.sources_digest.cache_clear()
     assert before != after
 
 

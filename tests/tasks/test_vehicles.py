@@ -22,7 +22,8 @@ from tasks.caching import run_folder
 from tasks.draw import draw_chunk, figure_chunks
 from tasks.hallucinate import hallucinate_chunk, hallucination_chunks
 from tasks.settings import ASSISTS, for_preset
-from tasks.solve import Assistant, plan_one, solve_many
+from tasks.solve import Assistant, Way, plan_one
+from tasks.solve_many import solve_many
 from tasks.train import train_chunk, train_chunks
 from tasks.verify import verify_folder
 from tests.tasks.collected import collect
@@ -88,8 +89,8 @@ def test_verify_makes_the_same_attempts_again(run: RunFolder, capsys: pytest.Cap
 
 
 def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, tmp_path: Path) -> None:
-    assistant = Assistant(PLANNER, "open", 3, run.path, 1, "car-1-trailer")
-    solve_many(assistant, problems, tmp_path / "rows.parquet", tmp_path / "plans")
+    way = Way(PLANNER, "open", 3, str(run.path), 1, "car-1-trailer")
+    solve_many(way, problems, tmp_path / "rows.parquet", tmp_path / "plans")
     assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
     for path in (tmp_path / "plans").iterdir():
         plan = read_plan(path, CAR_1_TRAILER).plan
@@ -100,11 +101,11 @@ def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, 
 
 
 def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
-    assistant = Assistant(PLANNER, "open", 3, run.path, 1, "car")
+    way = Way(PLANNER, "open", 3, str(run.path), 1, "car")
     with pytest.raises(
         StorageError, match="made for vehicle car-1-trailer, wanted was car; ask for --vehicle"
     ):
-        solve_many(assistant, problems, tmp_path / "rows.parquet", None)
+        solve_many(way, problems, tmp_path / "rows.parquet", None)
 
 
 def test_a_picture_and_a_plan_are_written(run: RunFolder, problems: Path, tmp_path: Path) -> None:

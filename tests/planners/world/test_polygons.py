@@ -72,3 +72,17 @@ def test_repeated_points_are_dropped() -> None:
 def test_a_polygon_that_is_none_is_refused(polygon: list[list[float]], reason: str) -> None:
     with pytest.raises(PolygonError, match=reason):
         convex_pieces(np.array(polygon, float))
+
+
+@quick
+@given(points=st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=3, max_size=4, unique=True))
+def test_a_few_points_are_refused_exactly_where_they_make_no_simple_polygon(
+    points: list[tuple[int, int]],
+) -> None:
+    shape = shapely.Polygon(points)
+    if shape.is_valid and shape.area > 0.0:
+        pieces = convex_pieces(np.array(points, float))
+        assert sum(shapely.Polygon(piece).area for piece in pieces) == pytest.approx(shape.area)
+    else:
+        with pytest.raises(PolygonError):
+            convex_pieces(np.array(points, float))
