@@ -45,4 +45,8 @@ def embed(parameters: Parameters, bits: Tensor) -> Tensor:
 @torch.no_grad()
 def embed_all(parameters: Parameters, bits: Tensor, batch: int = 1024) -> Tensor:
     """Like ``embed``, in batches and without gradients."""
-    return torch.cat([embed(parameters, part) for part in torch.split(bits, batch)])
+    last = parameters[f"linear.{layer_counts(parameters)[1] - 1}.bias"]
+    embeddings = torch.empty((len(bits), len(last)), dtype=last.dtype, device=bits.device)
+    for first in range(0, len(bits), batch):  # small results kept between large ones would scatter the heap
+        embeddings[first : first + batch] = embed(parameters, bits[first : first + batch])
+    return embeddings
