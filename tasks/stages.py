@@ -59,17 +59,24 @@ def stage_seconds(records: Sequence[dict[str, Any]]) -> dict[str, float]:
 
 
 def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
-    """A row of ``dashboards.tables.STAGE_HEADINGS`` for each stage; dashes where no chunk was to be done."""
-    rows = []
-    for name, seconds in stage_seconds(records).items():
-        load = whole([Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]])
-        of_load = [NOTHING] * 5
-        if load is not None:
-            megabytes = [f"{size / 1e6:,.0f}" for size in (load.first_bytes, load.last_bytes)]
-            shares = [f"{load.chunks:,}", str(load.workers), f"{100.0 * load.orchestration:.1f}"]
-            of_load = [*shares, *megabytes]
-        rows.append([name, f"{seconds:,.1f}", *of_load])
-    return rows
+    """A row of ``dashboards.tables.STAGE_HEADINGS`` for each stage, and for all of them."""
+    seconds = stage_seconds(records)
+    loads = {
+        name: [Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]]
+        for name in seconds
+    }
+    rows = [_cells(name, seconds[name], whole(loads[name])) for name in seconds]
+    every = whole([load for of_stage in loads.values() for load in of_stage])
+    return [*rows, _cells("all", sum(seconds.values()), every)] if rows else []
+
+
+def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
+    """Dashes where no chunk was to be done."""
+    if load is None:
+        return [name, f"{seconds:,.1f}", *[NOTHING] * 5]
+    megabytes = [f"{size / 1e6:,.0f}" for size in (load.first_bytes, load.last_bytes)]
+    share = f"{100.0 * load.orchestration:.1f}"
+    return [name, f"{seconds:,.1f}", f"{load.chunks:,}", str(load.workers), share, *megabytes]
 
 
 @functools.cache

@@ -8,7 +8,7 @@ import pytest
 
 from storage.layout import open_data_folder
 from tasks.settings import RunSettings, for_preset
-from tasks.stages import machine, stage_seconds, stages_of, timed
+from tasks.stages import machine, stage_cells, stage_seconds, stages_of, timed
 
 
 @timed
@@ -40,3 +40,19 @@ def test_a_stage_that_fails_has_no_record(tmp_path: Path) -> None:
 def test_a_timed_stage_still_tells_what_it_wants() -> None:
     assert list(inspect.signature(collect).parameters) == ["settings", "data"]
     assert get_type_hints(collect)["settings"] is RunSettings
+
+
+def test_a_line_a_stage_and_one_for_all_of_them() -> None:
+    load = {"what": "x", "chunks": 3, "workers": 2, "busy_seconds": 9.0, "span_seconds": 10.0}
+    load |= {"first_bytes": 5_000_000, "last_bytes": 6_000_000}
+    records = [
+        {"stage": "collect", "seconds": 4.0, "fan_outs": [load, load]},
+        {"stage": "report", "seconds": 1.0, "fan_outs": []},
+        {"stage": "collect", "seconds": 2.0, "fan_outs": [load | {"busy_seconds": 10.0}]},
+    ]
+    assert stage_cells(records) == [
+        ["collect", "6.0", "9", "2", "6.7", "5", "6"],
+        ["report", "1.0", "–", "–", "–", "–", "–"],
+        ["all", "7.0", "9", "2", "6.7", "5", "6"],
+    ]
+    assert stage_cells([]) == []
