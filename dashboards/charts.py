@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -22,6 +24,8 @@ from dashboards.style import (
     tidy,
 )
 
+COLUMNS: Final = 3  # of panels
+
 
 def retrieval_curves(curve: pd.DataFrame) -> Figure:
     """Share of problems with a free plan among the first k, against k: a panel a class (and memory).
@@ -37,11 +41,13 @@ def retrieval_curves(curve: pd.DataFrame) -> Figure:
         "fresh: new draws of the class; held-out: hallucinated problems kept from training.\n"
         "random: k plans picked blindly; oracle: any stored plan is free, the most that recall can reach."
     )
-    figure = new_figure(max(5.6, 3.3 * len(panels) + 0.5), 4.9, title, note)
-    layout = figure.add_gridspec(2, len(panels), height_ratios=(1, 9))
+    columns = min(len(panels), COLUMNS)
+    lines = -(-len(panels) // columns)
+    figure = new_figure(max(5.6, 3.3 * columns + 0.5), 1.3 + 3.6 * lines, title, note)
+    layout = figure.add_gridspec(1 + lines, columns, height_ratios=(1, *[9] * lines))
     most = int(curve["k"].max())
-    for i, (panel, memory) in enumerate(panels):
-        axes = figure.add_subplot(layout[1, i])
+    for i, (panel, memory) in enumerate(_own_before_combined(panels)):
+        axes = figure.add_subplot(layout[1 + i // columns, i % columns])
         rows = curve[(curve["panel"] == panel) & (curve["memory"] == memory)]
         for protocol, colour in (("held-out", BLUE), ("fresh", VERMILLION)):
             _retrieval(axes, rows[rows["protocol"] == protocol], colour)
@@ -52,11 +58,15 @@ def retrieval_curves(curve: pd.DataFrame) -> Figure:
         axes.set_xticks([k for k in range(1, most + 1) if most <= 10 or k == 1 or k % 5 == 0])
         axes.set_ylim(0.0, 1.04)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-        if i == 0:
+        if i % columns == 0:
             axes.set_ylabel("problems with a free plan among k", fontsize=9, color=INK)
         tidy(axes)
     _retrieval_legend(figure.add_subplot(layout[0, :]), set(curve["protocol"]))
     return figure
+
+
+def _own_before_combined(panels: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    return sorted(panels, key=lambda panel: panel[0] != panel[1])
 
 
 def training_curves(epochs: pd.DataFrame) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -72,6 +73,7 @@ def experience_chart(rows: pd.DataFrame) -> Figure:
         "Each memory was made from its first stage on. Dashed: oracle, any stored plan is free."
     )
     figure = new_figure(max(5.6, 3.3 * len(panels) + 0.5), 3.9, "Recall by number of experiences", note)
+    bottom = max(0.0, math.floor(10.0 * rows["low"].min()) / 10.0)  # the same for all
     for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         of_class = rows[rows["panel"] == panel].sort_values("plans")
         hit, plans = of_class["hit"].to_numpy(), of_class["plans"].to_numpy()
@@ -81,7 +83,7 @@ def experience_chart(rows: pd.DataFrame) -> Figure:
         axes.set_title(panel, fontsize=10, color=INK, pad=8)
         axes.set_xlabel("experiences", fontsize=9, color=INK)
         axes.set_xticks(plans)
-        axes.set_ylim(0.0, 1.04)
+        axes.set_ylim(bottom, 1.0 + 0.04 * (1.0 - bottom))
         axes.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
         tidy(axes)
     return figure
