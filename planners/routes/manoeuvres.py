@@ -141,7 +141,7 @@ def _arc(side: int, direction: int, steps: int, share: float, vehicle: Vehicle) 
 
 def _ramp(change: float, rate: float, dt: float) -> Floats:
     """Equal controls, none above ``rate``, which together make a change."""
-    steps = math.ceil(abs(change) / (rate * dt) - 1e-9)
+    steps = max(math.ceil(abs(change) / (rate * dt) - 1e-9), int(change != 0.0))
     return np.full(steps, change / (steps * dt)) if steps else np.zeros(0)
 
 

@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from storage import shards
 from storage.errors import StorageError
 from storage.shards import ROW_GROUP_ROWS, metadata_of, read_table, shard_is_done, table_of, write_table
 from tests.storage.samples import quick
@@ -107,11 +106,10 @@ def test_a_full_disk_leaves_what_was_there(tmp_path: Path, monkeypatch: pytest.M
     write_table(path, table(3), "old")
     before = path.read_bytes()
 
-    def full(rows: pa.Table, place: Path, **_: object) -> None:
-        place.write_bytes(b"half")
+    def full(writer: pq.ParquetWriter, rows: pa.Table, *_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(shards.pq, "write_table", full)
+    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
     with pytest.raises(StorageError, match="cannot be written: No space left on device"):
         write_table(path, table(4), "new")
     assert path.read_bytes() == before

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planners.routes.manoeuvres import FACING, bearing, braking, is_free_drive, rolling, turn_towards
@@ -39,6 +39,7 @@ def within_limits(states: Floats, controls: Floats, vehicle: Vehicle) -> bool:
 
 @pytest.mark.parametrize("name", VEHICLES)
 @given(speed=st.floats(-1.0, 4.0), aside=st.floats(-0.69, 0.69))
+@example(speed=0.0, aside=1e-12)
 def test_braking_ends_at_rest_all_straight(name: str, speed: float, aside: float) -> None:
     vehicle = VEHICLES[name]
     state = at_rest(*MIDDLE, vehicle)
