@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
 from rich import box
+from rich.console import Group
 from rich.table import Table
 
 from planners.world.problem import Floats
@@ -76,6 +77,19 @@ def rich_table(title: str, headings: Sequence[str], groups: Sequence[Rows]) -> T
         for i, cells in enumerate(group):
             table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1 > 0)
     return table
+
+
+def titled_tables(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> Group:
+    """For a terminal: a table under each title."""
+    return Group(*[rich_table(title, headings, groups) for title, groups in titled])
+
+
+def titled_markdown(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> str:
+    """As Markdown: a heading and a table for each title."""
+    return "\n".join(
+        f"### {title}\n\n{markdown_table(headings, [cells for group in groups for cells in group])}"
+        for title, groups in titled
+    )
 
 
 def markdown_table(headings: Sequence[str], rows: Rows) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from rich.console import Group
 
-from dashboards.cells import NOTHING, Rows, decimals_of, markdown_table, percent, rich_table, share
+from dashboards.cells import NOTHING, Rows, decimals_of, percent, share, titled_markdown, titled_tables
 from dashboards.intervals import RESAMPLES, bootstrap, interval, ratio
 from dashboards.signs import holm, signs
 from dashboards.statistics import Panel, panels
@@ -119,15 +119,12 @@ def _compare(first: Panel, other: Panel, seed: int, resamples: int) -> pd.DataFr
 
 def comparison_table(rows: pd.DataFrame) -> Group:
     """``compare_runs`` for a terminal: a table a panel."""
-    return Group(*[rich_table(title, HEADINGS, groups) for title, groups in _titled(rows)])
+    return titled_tables(HEADINGS, _titled(rows))
 
 
 def comparison_markdown(rows: pd.DataFrame) -> str:
     """The same as Markdown: a heading and a table a panel."""
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(HEADINGS, [cells for group in groups for cells in group])}"
-        for title, groups in _titled(rows)
-    )
+    return titled_markdown(HEADINGS, _titled(rows))
 
 
 def verdict(rows: pd.DataFrame) -> str:

@@ -21,6 +21,8 @@ from dashboards.cells import (
     reduction,
     rich_table,
     share,
+    titled_markdown,
+    titled_tables,
 )
 from dashboards.statistics import PLANNERS, ranked
 from dashboards.verdicts import Claim
@@ -46,20 +48,15 @@ STAGE_HEADINGS: Final = (
 
 def summary_table(summary: pd.DataFrame) -> Group:
     """The summary (``statistics.summarise``) for a terminal at least 110 columns wide: a table a class."""
-    return Group(
-        *[
-            rich_table(f"{title}; times in ms; solved, slower, hits in %", _HEADINGS, groups)
-            for title, groups in titled_rows(summary, _cells)
-        ]
+    titled = titled_rows(summary, _cells)
+    return titled_tables(
+        _HEADINGS, [(f"{title}; times in ms; solved, slower, hits in %", groups) for title, groups in titled]
     )
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
     """The whole summary as Markdown: a heading and a table a class."""
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(FULL_HEADINGS, [cells for group in groups for cells in group])}"
-        for title, groups in titled_rows(summary, full_cells)
-    )
+    return titled_markdown(FULL_HEADINGS, titled_rows(summary, full_cells))
 
 
 def retrieval_table(retrieval: pd.DataFrame) -> Table:

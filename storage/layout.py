@@ -137,6 +137,14 @@ class DataFolder:
             yield
 
 
+def open_run(path: Path) -> RunFolder:
+    """The folder of a run that is there; a StorageError for any other place."""
+    run = RunFolder(path)
+    if not run.settings.is_file():
+        raise StorageError(f"{path} is no run: it has no {run.settings.name}; name a folder in DATA/runs.")
+    return run
+
+
 def open_data_folder(path: Path | str) -> DataFolder:
     """Open a data folder, or make one of a missing or empty folder.
 

@@ -14,13 +14,12 @@ from dashboards.cells import markdown_table, rich_table
 from dashboards.comparison import compare_runs, comparison_markdown, comparison_table, verdict
 from storage.errors import StorageError
 from storage.files import read_text, whole_file
-from storage.layout import RunFolder
+from storage.layout import RunFolder, open_run
 from storage.results import read_attempts
-from tasks.report import console
+from tasks.report import NOT_NEEDED, console
 from tasks.settings import RunSettings, UsageError
 
 ENDINGS: Final = (".md", ".json", ".csv")
-NOT_NEEDED: Final = ("recalled",)
 
 
 def compare(runs: Sequence[Path], out: Path | None) -> None:
@@ -78,9 +77,7 @@ def _names(runs: Sequence[Path]) -> list[str]:
 
 
 def _settings(run: Path) -> RunSettings:
-    place = RunFolder(run).settings
-    if not place.is_file():
-        raise StorageError(f"{run} is no run: it has no {place.name}; name a folder in DATA/runs.")
+    place = open_run(run).settings
     try:
         return RunSettings.from_json(read_text(place))
     except ValueError as error:

@@ -7,9 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from storage.errors import StorageError
 from storage.files import read_text, whole_file
-from storage.layout import RunFolder
+from storage.layout import RunFolder, open_run
 from storage.ompl_log import write_ompl_logs
 from storage.planner_arena import Origin, write_planner_arena
 from storage.results import attempt_frames, tables_below
@@ -30,9 +29,7 @@ def export_run(folder: Path, form: str, out: Path) -> None:
         raise UsageError(f"{out} does not end in {ENDINGS[form]}.")
     if form == "ompl" and out.exists():
         raise UsageError(f"{out} is there already; give a new folder for the logs.")
-    run = RunFolder(folder)
-    if not run.settings.is_file():
-        raise StorageError(f"{folder} is no run: it has no {run.settings.name}; name a folder in DATA/runs.")
+    run = open_run(folder)
     tables_below(run.results, "benchmark")
     classes = {place.name: place for place in sorted(run.results.iterdir()) if place.is_dir()}
     if form == "ompl":

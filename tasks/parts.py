@@ -154,7 +154,7 @@ def solve_telling(chunk: Part, told: Told) -> dict[str, Any]:
                 return {"fault": f"{place}: {problem}"}
             if not rows:
                 assistant.warm_up(problem)
-            attempt, plan, _ = assistant(problem)
+            attempt, plan = assistant(problem)
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
             if asked.learn is not None:

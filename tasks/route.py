@@ -13,7 +13,7 @@ from rich.table import Table
 
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
-from planners.solve import WITHOUT_MEMORY, Attempt, solve
+from planners.solve import WITHOUT_MEMORY, Attempt
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.authority import faults
 from planners.world.problem import Plan, Problem
@@ -47,19 +47,8 @@ class _Solver:
         return self._solved(problem, "none" if self.assistant.assist == "none" else "fresh")
 
     def _solved(self, problem: Problem, assist: str) -> Attempt:
-        asked = self.assistant
-        memory = None if assist in WITHOUT_MEMORY else asked.memory_of(problem.class_name)
-        attempt = solve(
-            replace(problem, scale=self.scale),
-            asked.planner,
-            assist,
-            asked.top_k,
-            memory,
-            asked.seed,
-            vehicle=asked.vehicle,
-            strategy=asked.recall,
-        )
-        check_attempt(problem, attempt, set(), asked.vehicle)
+        attempt = self.assistant.attempt(replace(problem, scale=self.scale), assist)
+        check_attempt(problem, attempt, set(), self.assistant.vehicle)
         self.seconds.append(attempt.planning_seconds)
         return attempt
 

@@ -89,36 +89,42 @@ class Assistant:
         In the benchmark an attempt stands next to others at the same problem; so it does here.
         """
         canonical, _ = to_canonical(problem)
-        attempt = self._attempt(canonical)
+        attempt = self.attempt(canonical)
         last = perf_counter() + WARM_SECONDS
         while perf_counter() + attempt.planning_seconds < last:
-            attempt = self._attempt(canonical)
+            attempt = self.attempt(canonical)
 
-    def _attempt(self, canonical: Problem) -> Attempt:
+    def attempt(self, canonical: Problem, assist: str | None = None) -> Attempt:
+        """An attempt at a canonical problem, with another assist if one is named; not checked."""
+        use = assist or self.assist
         return solve(
             canonical,
             self.planner,
-            self.assist,
+            use,
             self.top_k,
-            self.memory_of(canonical.class_name),
+            None if use in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
             self.seed,
             vehicle=self.vehicle,
             strategy=self.recall,
         )
 
-    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None, list[Plan]]:
-        """The attempt, its plan and the recalled plans, these in the frame of the problem."""
+    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
+        """The attempt, checked, and its plan in the frame of the problem."""
         canonical, alignment = to_canonical(problem)
-        memory = self.memory_of(problem.class_name)
-        attempt = self._attempt(canonical)
+        attempt = self.attempt(canonical)
         if self.improve_seconds > 0.0:
             attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)
         check_attempt(canonical, attempt, set(), self.vehicle)
         if attempt.length_m is not None:
             attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
+        return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
+
+    def recalled(self, problem: Problem, attempt: Attempt) -> list[Plan]:
+        """The plans that an attempt recalled, in the frame of its problem."""
+        canonical, alignment = to_canonical(problem)
+        memory = self.memory_of(problem.class_name)
         stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
-        recalled = [from_canonical(plan, alignment) for plan in stored]
-        return attempt, attempt.plan and from_canonical(attempt.plan, alignment), recalled
+        return [from_canonical(plan, alignment) for plan in stored]
 
 
 def plan_one(
@@ -140,11 +146,12 @@ def plan_one(
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
     with no_garbage_collection():
         assistant.warm_up(problems[0])
-        attempt, plan, recalled = assistant(problems[0])
+        attempt, plan = assistant(problems[0])
     if out is not None:
         write_plan(out, plan_record(assistant, problems[0], attempt, plan))
     if learn is not None:
         remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
+    recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
     told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         from dashboards.pictures import picture  # late: Matplotlib costs a third of a second

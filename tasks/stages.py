@@ -61,12 +61,12 @@ def stage_seconds(records: Sequence[dict[str, Any]]) -> dict[str, float]:
 def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
     """A row of ``dashboards.tables.STAGE_HEADINGS`` for each stage, and for all of them."""
     seconds = stage_seconds(records)
-    loads = {
+    of_stage = {
         name: [Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]]
         for name in seconds
     }
-    rows = [_cells(name, seconds[name], whole(loads[name])) for name in seconds]
-    every = whole([load for of_stage in loads.values() for load in of_stage])
+    rows = [_cells(name, seconds[name], whole(of_stage[name])) for name in seconds]
+    every = whole([load for each in of_stage.values() for load in each])
     return [*rows, _cells("all", sum(seconds.values()), every)] if rows else []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from planners.memory.labels import sweep_plans
 from planners.memory.masks import masks_of
 from planners.memory.recall import Memory
 from planners.solve import solve
-from planners.world.problem import Problem
+from planners.world.problem import Floats, Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import CAR, Vehicle
 
@@ -22,19 +22,29 @@ def memory_of(
 ) -> Memory:
     """A memory of Follow's plans for ``problems``, those that it solves."""
     attempts = [solve(problem, "follow", vehicle=vehicle) for problem in problems]
-    plans = tuple(attempt.plan for attempt in attempts if attempt.plan is not None)
+    plans = [attempt.plan for attempt in attempts if attempt.plan is not None]
+    return memory_of_plans(plans, np.zeros(len(plans) + 1), vehicle, metadata)
+
+
+def memory_of_plans(
+    plans: Sequence[Plan],
+    biases: Sequence[float] | Floats,
+    vehicle: Vehicle = CAR,
+    metadata: dict[str, Any] | None = None,
+) -> Memory:
+    """A memory that ranks its plans by ``biases``, whatever the problem; row 0 is "no plan"."""
     sweeps = sweep_plans(plans, vehicle)
     network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
     zeros = np.zeros((len(plans) + 1, 3), np.float32)
     return Memory(
         class_name="test",
         vehicle=vehicle,
-        plans=plans,
+        plans=tuple(plans),
         sweeps=sweeps,
         masks=masks_of(sweeps),
         centroids=zeros,
         vectors=zeros,
-        biases=zeros[:, 0].copy(),
+        biases=np.array(biases, np.float32),
         objective="labels",
         weights=initial_weights(network, generator(0)),
         metadata=metadata or {},

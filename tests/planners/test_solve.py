@@ -6,17 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.encoder import Architecture, initial_weights
-from planners.memory.labels import free_plans, sweep_plans
-from planners.memory.masks import masks_of
-from planners.memory.recall import RECALLS, Memory
+from planners.memory.labels import free_plans
+from planners.memory.recall import RECALLS
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.solve import ASSISTS, improved, solve, turned
 from planners.world.authority import faults
 from planners.world.collision import scene_of
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, CAR_1_TRAILER
+from planners.world.vehicle import CAR_1_TRAILER
+from tests.planners.memories import memory_of_plans
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
@@ -24,23 +23,8 @@ PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "
 
 def memory_that_prefers(biases):
     """Five plans through strewn boxes, ranked by ``biases`` whatever the problem; row 0 is "no plan"."""
-    plans = tuple(plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5))
-    sweeps = sweep_plans(plans)
-    network = Architecture(channels=(2, 2), hidden=(4,), dimensions=3)
-    weights = initial_weights(network, generator(0))
-    zeros = np.zeros((6, 3), np.float32)
-    return Memory(
-        class_name="test",
-        vehicle=CAR,
-        plans=plans,
-        sweeps=sweeps,
-        masks=masks_of(sweeps),
-        centroids=zeros,
-        vectors=zeros,
-        biases=np.array(biases, np.float32),
-        objective="labels",
-        weights=weights,
-    )
+    plans = [plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5)]
+    return memory_of_plans(plans, biases)
 
 
 @functools.cache
