@@ -32,9 +32,10 @@ Unknown = Literal["occupied", "free"]
 
 def import_settings(
     vehicle: str,
-    strict: bool,
-    problems: int | None,
     seed: int,
+    strict: bool = False,
+    problems: int | None = None,
+    *,
     scale: float,
     resolution: float | None,
     unknown: str,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from flows.cli import app, call
-from flows.options import worker_count
+from flows.commands.run_options import worker_count
 
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
@@ -117,7 +117,8 @@ def test_help_is_quick() -> None:
 
 
 def test_without_a_number_there_are_as_many_workers_as_this_process_may_use_cores() -> None:
-    command = [sys.executable, "-c", "from flows.options import worker_count as n; print(n(None))"]
+    code = "from flows.commands.run_options import worker_count; print(worker_count(None))"
+    command = [sys.executable, "-c", code]
     core = min(os.sched_getaffinity(0))
     told = subprocess.run(["taskset", "-c", str(core), *command], capture_output=True, text=True, check=True)
     assert told.stdout == "1\n"

@@ -21,7 +21,7 @@ class Options:
     Parameters
     ----------
     preset
-        Size of the run: smoke (seconds), laptop (minutes) or paper (hours).
+        Size of the run: smoke (a minute), laptop (minutes) or paper (an hour).
     classes
         Generated problem classes; all of them by default, none beside --worlds.
     worlds
