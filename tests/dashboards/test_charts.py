@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -164,3 +166,10 @@ def test_the_same_rows_give_the_same_bytes_in_any_thread(tmp_path: Path, attempt
         files = list(pool.map(draw, range(3)))
     assert len(set(files)) == 1
     assert sorted(path.name for path in (tmp_path / "0").iterdir()) == ["times.png", "times.svg"]
+
+
+def test_the_first_figure_on_a_machine_puts_nothing_on_the_error_stream() -> None:
+    told = "Matplotlib is building the font cache; this may take a moment."
+    code = f"import dashboards, logging; logging.getLogger('matplotlib.font_manager').warning({told!r})"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stderr == ""
