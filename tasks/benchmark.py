@@ -22,6 +22,7 @@ from tasks.warm_up import compile_assists
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
+COLLECTED_EVERY: Final = 10  # problems; collecting garbage takes as long as some ten attempts
 
 
 class Configuration(NamedTuple):
@@ -59,6 +60,7 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
     asked = configurations(settings, name)
     rows: list[dict[str, Any]] = []
+    run_name = settings.run_name
     compile_assists(vehicle)
     for asked_first in asked:  # code and caches are warm before the first time counts
         _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
@@ -70,8 +72,9 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
             checked: set[bytes] = set()
             for i in range(len(asked)):
                 check_attempt(problem, attempts[i], checked, vehicle)
-                rows.append(attempt_row(attempts[i], asked[i].memory, settings.run_name, vehicle))
-            gc.collect()
+                rows.append(attempt_row(attempts[i], asked[i].memory, run_name, vehicle))
+            if index % COLLECTED_EVERY == 0:
+                gc.collect()
     write_attempts(chunk.run.shard("results", name, chunk.index), rows, key=chunk.key)
     return {"attempts": len(rows), "solved": sum(row["solved"] for row in rows)}
 

@@ -48,10 +48,7 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     beyond = _limit_faults(states, controls, vehicle)
     if beyond:  # how far a step may bend is known within the limits only
         return found + beyond
-    error = np.abs(simulate_again(states[0], controls, vehicle) - states).max(axis=1)
-    if error.max() > TOLERANCE:
-        first = int(np.argmax(error > TOLERANCE))
-        found.append(f"Dynamics: state {first} is {error[first]:.3g} off where the controls lead.")
+    found += _dynamics_faults(*(each.astype(np.float64).tobytes() for each in (states, controls)), vehicle)
     miss = math.dist(states[-1, :2], problem.goal)
     if miss > problem.goal_radius + ROUNDING:
         found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
@@ -66,6 +63,18 @@ def _limit_faults(states: Floats, controls: Floats, vehicle: Vehicle) -> list[st
         for name, values, low, high, unit in limits_of(states, controls, vehicle)
         if len(values) and (values.min() < low - ROUNDING or values.max() > high + ROUNDING)
     ]
+
+
+@functools.lru_cache(maxsize=1_000)  # a stored plan is judged in many problems
+def _dynamics_faults(states: bytes, controls: bytes, vehicle: Vehicle) -> tuple[str, ...]:
+    """The first state that is not where controls lead, of ``states [T, S]`` and ``controls [T - 1, 2]``."""
+    claimed = np.frombuffer(states).reshape(-1, state_size(vehicle))
+    led = simulate_again(claimed[0], np.frombuffer(controls).reshape(-1, 2), vehicle)
+    error = np.abs(led - claimed).max(axis=1)
+    if error.max() <= TOLERANCE:
+        return ()
+    first = int(np.argmax(error > TOLERANCE))
+    return (f"Dynamics: state {first} is {error[first]:.3g} off where the controls lead.",)
 
 
 def _sweep_faults(problem: Problem, body: Body) -> list[str]:
@@ -91,7 +100,8 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
     while runs:
         first, last = runs.pop()
         if last - first > 1:
-            if _meets(manager, _box_around(corners[first : last + 1], bend[first:last].max())):
+            way = centres[last] - centres[first]
+            if _meets(manager, _box_around(corners[first : last + 1], way, bend[first:last].max())):
                 middle = (first + last) // 2
                 runs += [(middle, last), (first, middle)]
             continue
@@ -99,7 +109,7 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
         box = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
         begin = _pose(centres[first], along[first])
         end = _pose(centres[last], along[last])
-        around = _box_around(corners[first : last + 1], wider)
+        around = _box_around(corners[first : last + 1], centres[last] - centres[first], wider)
         for other in _near(manager, around):
             if _hits(fcl.CollisionObject(box, begin), end, other):
                 x, y = centres[first]
@@ -147,9 +157,8 @@ def _pose(centre: Floats, along: Floats) -> fcl.Transform:
     )
 
 
-def _box_around(corners: Floats, slack: float) -> fcl.CollisionObject:
-    """A box around footprints' ``corners [T, 4, 2]`` along the way from the first to the last."""
-    way = corners[-1].mean(axis=0) - corners[0].mean(axis=0)
+def _box_around(corners: Floats, way: Floats, slack: float) -> fcl.CollisionObject:
+    """A box around footprints' ``corners [T, 4, 2]`` along the ``way [2]`` from the first to the last."""
     length = math.hypot(*way)
     along = way / length if length > 0.0 else np.array([1.0, 0.0])
     axes = np.array([along, (-along[1], along[0])])
