@@ -241,8 +241,8 @@ def _duration(milliseconds: float) -> str:
 
 
 def _change(reduction: float) -> str:
-    """What a bar says of its mean against the baseline's: −61 %, −98.9 %, +15 %; a dash without baseline."""
+    """What a bar says of its mean against the baseline's: −61 %, −99.4 %, +15 %; a dash without one."""
     if math.isnan(reduction):
         return "–"
-    decimals = 1 if reduction > 0.97 else 0
+    decimals = 1 if reduction > 0.99 else 0
     return f"{-100.0 * reduction:+.{decimals}f}\N{NARROW NO-BREAK SPACE}%".replace("-", "−")
