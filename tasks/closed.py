@@ -50,11 +50,8 @@ def auth_environment() -> dict[str, str]:
 
 def check_address(host: str) -> None:
     """UsageError unless a server on ``host`` is this machine's alone, or will ask for a password."""
-    if auth() is None and not _is_loopback(host):
-        raise UsageError(
-            f"Other machines reach {host or 'all addresses'}: set {AUTH}=user:password, or listen on "
-            "127.0.0.1."
-        )
+    if not _is_loopback(host) and auth() is None:
+        raise UsageError(f"Other machines reach {host}: set {AUTH}=user:password, or listen on 127.0.0.1.")
 
 
 def access() -> str:
@@ -64,7 +61,7 @@ def access() -> str:
 
 def _is_loopback(host: str) -> bool:
     try:
-        found = socket.getaddrinfo(host or None, None, flags=socket.AI_PASSIVE)
+        found = socket.getaddrinfo(host, None)
     except (OSError, UnicodeError):
         raise UsageError(
             f"No address is known of {host!r}; give one of this machine, like 127.0.0.1."

@@ -116,7 +116,8 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
         (
             request(
                 fields_of(problem(0))
-                | {"bounds": [-7, -7, 900, 900], "obstacles": [[[60, 60], [900, 60], [900, 900]]] * 99}
+                | {"bounds": [-7, -7, 900, 900], "groups": None}
+                | {"obstacles": [[[60, 60], [900, 60], [900, 900]]] * 99}
             ),
             400,
             "cover the bounds too many times",
