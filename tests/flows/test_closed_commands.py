@@ -73,6 +73,7 @@ def assert_closed(command: str, watched: Watched) -> None:
         assert LISTENERS[command][port.process] in documented(command), (command, port)
 
 
+@pytest.mark.timeout(600)  # three commands
 def test_a_run_and_what_it_leaves(place: Path) -> None:
     data = place / "data"
     watched = watch(["run", *TINY, "--data", str(data)], place / "run.log", PLANTED)

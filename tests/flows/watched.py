@@ -54,12 +54,16 @@ def watch(
             stdout=sink,
             stderr=subprocess.STDOUT,
         )
-        while running.poll() is None:
-            watched.ports |= _ports(running)
-            if not asked and until(log.read_text(errors="replace")):
-                running.send_signal(signal.SIGTERM)
-                asked = True
-            time.sleep(LOOK_SECONDS)
+        try:
+            while running.poll() is None:
+                watched.ports |= _ports(running)
+                if not asked and until(log.read_text(errors="replace")):
+                    running.send_signal(signal.SIGTERM)
+                    asked = True
+                time.sleep(LOOK_SECONDS)
+        finally:  # a test that is given up leaves nobody behind
+            if running.poll() is None:
+                running.kill()
     watched.code, watched.output = running.wait(), log.read_text(errors="replace")
     return watched
 
