@@ -1,7 +1,7 @@
 """A memory served over HTTP, client included: plans a second in batches, one problem at a time, and nonsense.
 
-``python -m tests.speed.serving [--memory FOLDER] [--workers 2] [--nonsense 10000]`` has it served by the command on
-loopback and asks it, from this process, over connections that stay open; answers are read, and the
+``python -m tests.speed.serving [--memory FOLDER] [--workers 2] [--nonsense N]`` has the command serve on
+loopback and asks it from this process, over connections that stay open; answers are read, and the
 plans in them counted. Then the same memory by the call for a robot's process. New problems of the
 memory's class, from a seed of their own. One memory, 100 plans, is made in a minute where none is given.
 """
