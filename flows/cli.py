@@ -13,7 +13,8 @@ from typing import Final
 
 from cyclopts import App, CycloptsError
 
-from flows.commands import maps, problems, results, stages
+from flows.commands import maps, problems, results, serving, stages
+from tasks.redaction import redacted
 
 FAILURE: Final = 1
 WRONG_USE: Final = 2
@@ -32,6 +33,7 @@ for command in (
     *(problems.plan, problems.optimise, problems.solve),
     *(maps.import_worlds, maps.route),
     *(results.verify, results.export, results.compare),
+    *(serving.serve_memory, serving.servers),
 ):
     app.command(command)
 
@@ -52,7 +54,7 @@ def call(arguments: Sequence[str] | None = None) -> int:
         return end.code if isinstance(end.code, int) else FAILURE
     except Exception as error:
         if debug:
-            traceback.print_exc()
+            print(redacted(traceback.format_exc()), file=sys.stderr)
         print(f"motion-memory: {_one_line(error)}", file=sys.stderr)
         return WRONG_USE if _is_wrong_use(error) else FAILURE
     return 0
@@ -66,7 +68,7 @@ def _is_wrong_use(error: Exception) -> bool:
 
 def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split())
-    return text or type(error).__name__
+    return redacted(text) or type(error).__name__
 
 
 def main() -> None:

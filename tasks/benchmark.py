@@ -16,9 +16,9 @@ from storage.shards import shard_is_done
 from tasks.attempts import attempt_row, check_attempt
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
+from tasks.compile_assists import compile_assists
 from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
 from tasks.timing import no_garbage_collection
-from tasks.warm_up import compile_assists
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work

@@ -18,6 +18,7 @@ from prefect_dask.task_runners import DaskTaskRunner
 
 from tasks.caching import AnyPiece, Piece
 from tasks.progress import progress
+from tasks.redaction import redacted
 from tasks.settings import RunError
 from tasks.work import WORK, note
 
@@ -71,7 +72,7 @@ def _connected(address: str) -> Iterator[str]:
             yield address
     except (OSError, ValueError) as error:
         raise RuntimeError(
-            f"No Dask scheduler answers at {address}; start one with `dask scheduler`."
+            redacted(f"No Dask scheduler answers at {address}; start one with `dask scheduler`.")
         ) from error
 
 
@@ -161,10 +162,10 @@ def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
             raise ChunkError(
                 f"{where} ended {KILLS_ALLOWED + 1} worker processes; was there too little memory?"
             ) from cause
-        raise ChunkError(f"{where} was lost: {cause}") from cause
+        raise ChunkError(redacted(f"{where} was lost: {cause}")) from cause
     try:
         result: dict[str, Any] = future.result()
     except Exception as error:
         reason = str(error).partition("\n")[0]
-        raise ChunkError(f"{where} failed: {reason or type(error).__name__}") from error
+        raise ChunkError(redacted(f"{where} failed: {reason or type(error).__name__}")) from error
     return result

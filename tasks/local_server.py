@@ -64,7 +64,7 @@ class LocalServer:
     def wait(self, seconds: float = START_SECONDS) -> None:
         """Return when the server answers; RuntimeError with one line when it does not."""
         deadline = time.monotonic() + seconds
-        while not _is_healthy(self.url):
+        while not is_healthy(self.url):
             if time.monotonic() > deadline or _find(self.log.parent) is None:
                 raise RuntimeError(
                     f"The local Prefect server did not start; see {self.log}, or set PREFECT_API_URL."
@@ -73,7 +73,12 @@ class LocalServer:
 
 
 def set_environment(data: Path) -> None:
-    """Quiet, private and embedded defaults for every library a command uses, all inside ``data``."""
+    """Quiet, private and embedded defaults for every library a command uses, all inside ``data``.
+
+    And the password of all servers, where one is set: ours ask for it, and clients send it.
+    """
+    from tasks.closed import auth_environment  # late: as a script this file has nothing but itself
+
     home = data / "prefect"
     home.mkdir(parents=True, exist_ok=True)
     folders = {
@@ -81,7 +86,7 @@ def set_environment(data: Path) -> None:
         "PREFECT_LOCAL_STORAGE_PATH": str(home / "results"),
         "PREFECT_API_DATABASE_CONNECTION_URL": f"sqlite+aiosqlite:///{home / 'prefect.db'}",
     }
-    for name, value in (ENVIRONMENT | folders).items():
+    for name, value in (ENVIRONMENT | folders | auth_environment()).items():
         os.environ.setdefault(name, value)
 
 
@@ -175,7 +180,8 @@ def _is_locked(file: IO[str]) -> bool:
     return False
 
 
-def _is_healthy(url: str) -> bool:
+def is_healthy(url: str) -> bool:
+    """Whether the server at an address answers that it is."""
     import urllib.request  # late: few who import this start a server
 
     try:

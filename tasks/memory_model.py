@@ -7,7 +7,9 @@ file from the installed package. Nothing of it is pickled, and the archive is ch
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Any, Final
 
 import pandas as pd
@@ -15,7 +17,7 @@ from mlflow.exceptions import MlflowException
 from mlflow.models import ModelSignature
 from mlflow.models.model import Model
 from mlflow.protos.databricks_pb2 import INVALID_PARAMETER_VALUE
-from mlflow.pyfunc import save_model
+from mlflow.pyfunc import PyFuncModel, save_model
 from mlflow.pyfunc.model import PythonModel, PythonModelContext
 from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
@@ -39,6 +41,8 @@ CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
 REQUIREMENTS: Final = ("motion-memory",)  # given, so that MLflow infers none, which takes seconds
 TOP_K: Final = 5
+MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: others wait meanwhile
+MOST_CORNERS_OF_ONE: Final = 1_000  # making convex pieces of a polygon grows with their square
 _ROWS: Final = Array(Array(DataType.double))
 SIGNATURE: Final = ModelSignature(
     inputs=Schema([ColSpec(DataType.string, "problem")]),
@@ -63,8 +67,13 @@ class MemoryModel(PythonModel):
 
     def load_context(self, context: PythonModelContext) -> None:
         """Load and check the archive; a StorageError where it is not as it was written."""
-        self.vehicle = vehicle_named(context.model_config["vehicle"])
-        self.memory: Memory = load_memory(Path(context.artifacts[ARTIFACT]), self.vehicle)
+        self.open(Path(context.artifacts[ARTIFACT]), context.model_config["vehicle"])
+
+    def open(self, archive: Path, vehicle: str) -> None:
+        """The same, of an archive that need not be MLflow's."""
+        self.vehicle = vehicle_named(vehicle)
+        self.memory: Memory = load_memory(archive, self.vehicle)
+        self._turn = Lock()  # kernels draw into buffers of the process, and servers call from many threads
 
     def predict(
         self,
@@ -76,17 +85,28 @@ class MemoryModel(PythonModel):
 
         MlflowException: a problem is malformed or impossible; its message is one line.
         """
+        return self.plans(model_input, params)
+
+    def plans(self, model_input: pd.DataFrame, params: dict[str, Any] | None = None) -> pd.DataFrame:
+        """``predict`` without MLflow's context."""
         top_k = (params or {}).get("top_k", TOP_K)
-        rows = [
-            row
-            for number, text in enumerate(model_input["problem"], start=1)
-            for row in self._ranked(self._problem(text, number), top_k)
-        ]
+        if top_k is None or top_k < 1:
+            raise MlflowException(f"top_k is {top_k}: give 1 or more.", INVALID_PARAMETER_VALUE)
+        with self._turn:
+            rows = [
+                row
+                for number, text in enumerate(model_input["problem"], start=1)
+                for row in self._ranked(self._problem(text, number), top_k)
+            ]
         return pd.DataFrame(rows, columns=SIGNATURE.outputs.input_names())
 
-    def _problem(self, text: str, number: int) -> Problem:
+    def _problem(self, text: object, number: int) -> Problem:
         try:
-            problem = problem_of(parse_json(text, "it"), f"problem-{number}", self.vehicle)
+            if not isinstance(text, str):
+                raise ValueError(f"it is {type(text).__name__}, wanted was the text of a JSON object")
+            fields = parse_json(text, "it")
+            _refuse_endless(fields)
+            problem = problem_of(fields, f"problem-{number}", self.vehicle)
             unfit = scale_fault(self.memory, problem.scale)
             if unfit is not None:
                 raise ValueError(unfit)
@@ -108,6 +128,22 @@ class MemoryModel(PythonModel):
             row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
             rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
         return rows
+
+
+def pyfunc_of(model: MemoryModel) -> PyFuncModel:
+    """A model as MLflow would load it, but by the installed code, whatever lies beside its archive."""
+    return PyFuncModel(Model(signature=SIGNATURE), model, predict_fn="plans")
+
+
+def _refuse_endless(fields: object) -> None:
+    """ValueError where polygons have so many corners that everybody else would wait."""
+    polygons = fields.get("obstacles") if isinstance(fields, Mapping) else None
+    corners = [len(each) for each in polygons if isinstance(each, list)] if isinstance(polygons, list) else []
+    if max(corners, default=0) > MOST_CORNERS_OF_ONE or sum(corners) > MOST_CORNERS:
+        raise ValueError(
+            f"obstacles have {sum(corners)} corners, one of them {max(corners)}; at most {MOST_CORNERS} and "
+            f"{MOST_CORNERS_OF_ONE} are taken: simplify them, or use the command `solve`"
+        )
 
 
 def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:

@@ -18,7 +18,9 @@ from planners.memory.recall import Memory
 from planners.world.vehicle import Vehicle
 from storage.layout import DataFolder
 from storage.memories import load_memory
+from tasks.closed import auth_environment
 from tasks.local_server import ENVIRONMENT
+from tasks.redaction import redacted
 from tasks.settings import RunError, default_data
 from tasks.tracking import tracking_uri
 
@@ -75,7 +77,7 @@ def _registered(uri: str, vehicle: Vehicle) -> Memory:
 
 def _downloaded(uri: str, scratch: str) -> Path:
     where = _tracking_uri(uri)
-    for name, value in _SETTINGS.items():
+    for name, value in (_SETTINGS | auth_environment()).items():
         os.environ.setdefault(name, value)
     from unittest.mock import patch
 
@@ -86,10 +88,12 @@ def _downloaded(uri: str, scratch: str) -> Path:
             folder = Path(download_artifacts(uri, dst_path=scratch))
     except Exception as error:  # each of MLflow's stores has errors of its own
         reason = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RunError(f"{uri} cannot be had from MLflow at {where}: {reason}") from error
+        raise RunError(redacted(f"{uri} cannot be had from MLflow at {where}: {reason}")) from error
     found = sorted(header.parent for header in folder.rglob("memory.json"))
     if len(found) != 1:
-        raise RunError(f"{uri} in MLflow at {where} holds {len(found)} memories; name a model with one.")
+        raise RunError(
+            redacted(f"{uri} in MLflow at {where} holds {len(found)} memories; name a model with one.")
+        )
     return found[0]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from storage.layout import MARK, DataFolder, open_data_folder
 from tasks.local_server import LocalServer, local_server, set_environment
+from tasks.redaction import redacted
 from tasks.settings import RunError, RunSettings, UsageError
 
 
@@ -73,7 +74,7 @@ def _tell(folder: DataFolder, settings: RunSettings) -> None:
     print(f"data     {run.path}")
     if run.figures.exists():
         print(f"figures  {run.figures}")
-    print(f"MLflow   mlflow ui --backend-store-uri {tracker(str(folder.path)).uri}")
+    print(redacted(f"MLflow   mlflow ui --backend-store-uri {tracker(str(folder.path)).uri}"))
     print(
         f"Prefect  PREFECT_API_DATABASE_CONNECTION_URL=sqlite+aiosqlite:///{folder.prefect / 'prefect.db'} "
         "prefect server start"

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.layout import DataFolder
+from tasks.redaction import redacted
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -61,7 +62,7 @@ class Tracker:
         self._thread.join()
         if self._failure is not None:
             reason = str(self._failure).partition("\n")[0]
-            raise RuntimeError(f"MLflow at {self.uri} cannot be used: {reason}") from self._failure
+            raise RuntimeError(redacted(f"MLflow at {self.uri} cannot be used: {reason}")) from self._failure
         return self._connected
 
     @contextmanager

@@ -9,36 +9,20 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.encoder import Architecture, initial_weights
 from planners.memory.experience import Experience
 from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
-from planners.memory.recall import RECALLS, TRIED_DRAWN, Memory
 from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.classes import CLASSES, problem_class
 from planners.world.dynamics import simulate
-from planners.world.problem import (
-    BOUNDS,
-    CANONICAL_GOAL,
-    CANONICAL_START,
-    GOAL_RADIUS,
-    Plan,
-    Problem,
-    obstacles_of,
-    start_state,
-)
+from planners.world.problem import Plan, start_state
 from planners.world.randomness import generator
 from planners.world.vehicle import Vehicle, vehicle_named
+from tasks.compile_assists import EMPTY, compile_assists
 from tasks.engine import Client
 from tasks.settings import COLLECTOR, DEFAULT_MIXTURE
-
-EMPTY: Final = Problem(
-    "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
-)
 
 
 @contextmanager
@@ -66,27 +50,6 @@ def _compile_hallucination(vehicle: Vehicle) -> None:
         made = next(hallucinate(experience, dict(DEFAULT_MIXTURE), draw, generator(0)))
         label_problems([made.problem], experience.sweep)
         no_plan(experience.sweep, draw, generator(0), name, 0)
-
-
-def compile_assists(vehicle: Vehicle) -> None:
-    """What a memory needs, by every strategy: of copies of one plan, with a box put on it."""
-    plan = solve(EMPTY, COLLECTOR, vehicle=vehicle).plan
-    if plan is None:
-        return
-    plans = [plan] * (TRIED_DRAWN + 1)  # so that the last is checked with the scene
-    sweeps = sweep_plans(plans, vehicle)
-    architecture = Architecture()
-    readout = np.zeros((len(plans) + 1, architecture.dimensions), np.float32)
-    weights = initial_weights(architecture, generator(0))
-    masks = masks_of(sweeps)
-    biases = readout[:, 0].copy()
-    memory = Memory("empty", vehicle, plans, sweeps, masks, readout, readout, biases, "labels", weights)
-    x, y = plan.states[len(plan.states) // 2, :2]
-    box = np.array([[x - 1.0, y - 1.0], [x + 1.0, y - 1.0], [x + 1.0, y + 1.0], [x - 1.0, y + 1.0]])
-    blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
-    for strategy in RECALLS:
-        for assist in ("open", "repair"):
-            solve(blocked, COLLECTOR, assist, 1, memory, vehicle=vehicle, strategy=strategy)
 
 
 def _compile_rest(vehicle: Vehicle) -> None:

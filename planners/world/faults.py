@@ -7,12 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.collision import box_is_free, count_free_prefix, scene_of
+from planners.world.collision import CELL_M, REACH_M, box_is_free, count_free_prefix, scene_of
 from planners.world.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
 from planners.world.vehicle import CAR, Vehicle
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell look-up of collision checks grows with the bounds' area
+MOST_LISTED: Final = 4_000_000  # pieces in cells of that look-up, 64 MB; city maps have some thousand
 
 
 def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
@@ -43,6 +44,8 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
             f"start and goal are {distance:.2f} m apart, wanted was {CANONICAL_DISTANCE:.2f} m within the "
             f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
         )
+    if _listed(problem) > MOST_LISTED:
+        return "obstacles cover the bounds too many times over; leave out those that others cover"
     scene = scene_of(problem)
     if count_free_prefix(start_state(problem, vehicle)[np.newaxis], vehicle, scene) == 0:
         return f"start footprint at {_place(problem.start)} is not free or leaves the bounds; move the start"
@@ -50,6 +53,16 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if not box_is_free(x, y, 1.0, 0.0, 0.0, 0.0, scene):
         return f"goal centre {_place(problem.goal)} lies in an obstacle or out of bounds; move the goal"
     return None
+
+
+def _listed(problem: Problem) -> float:
+    """In about how many cells of the look-up pieces will be listed, all together."""
+    vertices, starts = problem.obstacles.vertices, problem.obstacles.piece_starts[:-1]
+    if len(vertices) == 0:
+        return 0.0
+    low = np.maximum(np.minimum.reduceat(vertices, starts) - REACH_M, problem.bounds[:2])
+    high = np.minimum(np.maximum.reduceat(vertices, starts) + REACH_M, problem.bounds[2:])
+    return float((np.maximum(high - low, 0.0) / CELL_M + 1.0).prod(axis=1).sum())
 
 
 def _place(coordinates: tuple[float, ...]) -> str:

@@ -16,6 +16,7 @@ from flows.commands.run_options import worker_count
 COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
     "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
+    "serve-memory", "servers",
 )  # fmt: skip
 
 

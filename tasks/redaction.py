@@ -1,0 +1,35 @@
+"""What is secret in a text goes out of it before anybody sees, logs or stores it."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+from collections.abc import Iterator
+from typing import Final
+
+HIDDEN: Final = "***"
+SHORTEST: Final = 6  # letters: shorter values are words that any text may hold
+_NAMES: Final = re.compile(r"(PASSWORD|PASSWD|SECRET|TOKEN|KEY|AUTH_STRING|_AUTH)$")
+_IN_ADDRESS: Final = re.compile(r"(?<=://)[^/\s\"']*@")  # scheme://user:password@host
+
+
+def redacted(text: str) -> str:
+    """The text with passwords in addresses, and values of secret environment variables, as ``***``."""
+    text = _IN_ADDRESS.sub(f"{HIDDEN}@", text)
+    for secret in sorted(set(_secrets()), key=len, reverse=True):  # the whole before its part
+        text = text.replace(secret, HIDDEN)
+    return text
+
+
+def _secrets() -> Iterator[str]:
+    """Values of secret variables, what stands behind ``user:`` in them and in addresses, and their Base64."""
+    for name, value in os.environ.items():
+        address = _IN_ADDRESS.search(value)
+        if _NAMES.search(name):
+            found = [value, value.partition(":")[2], base64.b64encode(value.encode()).decode()]
+        elif address:
+            found = [address.group()[:-1].partition(":")[2]]
+        else:
+            continue
+        yield from (each for each in found if len(each) >= SHORTEST)
