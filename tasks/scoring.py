@@ -9,7 +9,7 @@ nothing, and spends most of its time on writing numbers.
 from __future__ import annotations
 
 import asyncio
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import orjson
 import pandas as pd
@@ -64,9 +64,9 @@ class Scoring:
         """The answer to a body, ``{"predictions": [a row a plan]}``. RefusedError: it is no good."""
         table, top_k = self._asked(body)
         try:
-            plans = self._model.predict(table, {"top_k": top_k})
+            plans = cast("pd.DataFrame", self._model.predict(table, {"top_k": top_k}))
         except MlflowException as error:
-            if error.get_http_status_code() >= 500:
+            if error.get_http_status_code() >= 500:  # type: ignore[no-untyped-call]
                 raise
             raise RefusedError(400, str(error.message).rpartition("Error: ")[2]) from None
         return orjson.dumps({"predictions": plans.to_dict("records")})
@@ -83,7 +83,7 @@ class Scoring:
             raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {told}.")
         top_k = _top_k(asked.get("params"))
         try:
-            schema = self._model.metadata.get_input_schema()
+            schema = self._model.metadata.get_input_schema()  # type: ignore[no-untyped-call]
             table = scoring_server.infer_and_parse_data({given[0]: asked[given[0]]}, schema)
             if not isinstance(table, pd.DataFrame):
                 table = pd.DataFrame(table)

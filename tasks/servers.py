@@ -36,7 +36,10 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     folder = open_data_folder(data)
     set_environment(folder.path)
     with bound(host, prefect_port) as one, bound(host, mlflow_port) as other:
-        apps = {"Prefect": (prefect_app, one), "MLflow": (functools.partial(mlflow_app, folder), other)}
+        apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
+            "Prefect": (prefect_app, one),
+            "MLflow": (functools.partial(mlflow_app, folder), other),
+        }
         healthy = (f"{address_of(one)}/api", address_of(other))
         with _running(apps) as wait:
             wait(lambda: all(is_healthy(url) for url in healthy), START_SECONDS)
