@@ -1,0 +1,37 @@
+"""The tutorial says what happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.docs.tutorial import as_anywhere, begin, do, is_shown, picture_in, pictures, steps
+from tests.worlds import SHARED
+
+
+@pytest.mark.timeout(600)
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
+def test_each_command_of_the_tutorial_prints_what_it_says(tmp_path: Path) -> None:
+    begin(tmp_path)
+    for step in steps():
+        printed = do(step, tmp_path)
+        assert is_shown(as_anywhere(step.shown), as_anywhere(printed)), f"{step.commands}\n{printed}"
+    for name in pictures():
+        assert picture_in(tmp_path, name).stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed", "same"),
+    [
+        ("a 1.5 b", "a   12.25   b", True),
+        ("a 15 b", "a 16 b", False),
+        ("a\n…\nc", "a\nb\nb\nc", True),
+        ("a\n…\nc", "a\nb\nb", False),
+        ("a\n…", "a", True),
+        ("a", "a\nb", False),
+        ("", "", True),
+    ],
+)
+def test_times_may_differ_and_dots_stand_for_lines(shown: str, printed: str, same: bool) -> None:
+    assert is_shown(as_anywhere(shown), as_anywhere(printed)) == same
