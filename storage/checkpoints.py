@@ -13,6 +13,7 @@ from safetensors.numpy import save_file
 from planners.memory.training import Checkpoint, Epoch
 from storage.columns import Array
 from storage.files import whole_file
+from storage.mirror import fetch
 
 _KEY: Final = "key"
 
@@ -42,7 +43,7 @@ def epochs_kept(path: Path, key: str) -> int:
 
 def _tensors(path: Path, key: str, names: Sequence[str]) -> dict[str, Array] | None:
     try:
-        with safe_open(path, "np") as kept:
+        with safe_open(fetch(path), "np") as kept:
             if kept.metadata().get(_KEY) != key:
                 return None
             return {name: kept.get_tensor(name) for name in names}

@@ -7,6 +7,7 @@ is there. MLflow is imported, and its database made, in a background thread: bot
 from __future__ import annotations
 
 import os
+import re
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +17,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.layout import DataFolder
+from storage.mirror import fetch, fetch_folder, files_in, uri_of
+from tasks.settings import UsageError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -28,8 +31,22 @@ PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
 def tracking_uri(data: DataFolder) -> str:
-    """Where MLflow is: as the user says, else a database in the data folder."""
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{data.mlflow_database}"
+    """Where MLflow is: as the user says, else a database in the data folder.
+
+    UsageError: the data folder is in object storage, where no database can be.
+    """
+    given = os.environ.get("MLFLOW_TRACKING_URI")
+    if not given and data.is_remote:
+        raise UsageError(
+            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that keeps "
+            "its own (docs/runbook.md)."
+        )
+    return given or f"sqlite:///{data.mlflow_database}"
+
+
+def without_password(uri: str) -> str:
+    """An address that can be shown."""
+    return re.sub(r"(://[^/]*:)[^@]*@", r"\1***@", uri)
 
 
 class Tracker:
@@ -61,7 +78,7 @@ class Tracker:
         self._thread.join()
         if self._failure is not None:
             reason = str(self._failure).partition("\n")[0]
-            raise RuntimeError(f"MLflow at {self.uri} cannot be used: {reason}") from self._failure
+            raise RuntimeError(f"MLflow at {without_password(self.uri)} cannot be used: {reason}") from self._failure
         return self._connected
 
     @contextmanager
@@ -123,11 +140,10 @@ class Tracker:
             self._client.log_batch(run_id, metrics=entries[first : first + 1000])
 
     def artifacts(self, run_id: str, place: Path, under: str | None = None) -> None:
-        """Log a file or a folder as artifacts."""
-        if place.is_dir():
-            self._client.log_artifacts(run_id, str(place), under)
-        elif place.exists():
-            self._client.log_artifact(run_id, str(place), under)
+        """Log a file, or the files of a folder, as artifacts."""
+        for path in [place] if place.suffix else files_in(place, "[!.]*"):
+            if fetch(path).is_file():
+                self._client.log_artifact(run_id, str(path), under)
 
     def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
         """Log an archive as the model ``name`` that the run brought forth; the id of the model."""
@@ -142,7 +158,7 @@ class Tracker:
             folder = Path(scratch) / name
             model = Model(made.artifact_location, run_id)
             model.model_id = model.model_uuid = made.model_id
-            save_memory_model(folder, archive, vehicle, model)
+            save_memory_model(folder, fetch_folder(archive), vehicle, model)
             self._client.log_model_artifacts(made.model_id, str(folder))
         self._client.finalize_logged_model(made.model_id, "READY")
         return str(made.model_id)
@@ -151,6 +167,6 @@ class Tracker:
         """Log which data went in (``context``: "training", "benchmark")."""
         from mlflow.entities import Dataset, DatasetInput, InputTag
 
-        source = f'{{"uri": "{place.as_uri()}"}}'
+        source = f'{{"uri": "{uri_of(place)}"}}'
         entry = Dataset(name, digest, "local", source)
         self._client.log_inputs(run_id, [DatasetInput(entry, [InputTag("mlflow.data.context", context)])])
