@@ -23,8 +23,8 @@ def run_stage(
     """Run the flow ``module.name``; afterwards say where everything lies."""
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)
+    tracking_uri(DataFolder(local_place(data)))  # which refuses a place that cannot be tracked
     folder = open_data_folder(data)
-    tracking_uri(folder)  # which refuses a folder that cannot be tracked, before any work
     with (
         folder.lock(),
         local_server(folder.path) as server,
