@@ -39,7 +39,9 @@ def leased(place: Place, owner: str, what: str) -> Iterator[None]:
     if tag is None:
         raise InUseError(_in_use(place, what))
     ended = threading.Event()
-    keeper = threading.Thread(target=_keep, args=(place, body, owner, tag, what, ended), name="lease", daemon=True)
+    keeper = threading.Thread(
+        target=_keep, args=(place, body, owner, tag, what, ended), name="lease", daemon=True
+    )
     keeper.start()
     try:
         yield
@@ -60,9 +62,7 @@ def _taken_over(place: Place, body: bytes, owner: str) -> str | None:
     return objects.put_if(place, body, found.etag)
 
 
-def _keep(
-    place: Place, body: bytes, owner: str, tag: str, what: str, ended: threading.Event
-) -> None:
+def _keep(place: Place, body: bytes, owner: str, tag: str, what: str, ended: threading.Event) -> None:
     """Put the lease again until the end; Ctrl-C for this command should another have taken it."""
     held: str | None = tag
     while not ended.wait(RENEWED_SECONDS):

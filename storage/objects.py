@@ -103,7 +103,9 @@ def content(place: Place) -> bytes:
 def keys(place: Place) -> Iterator[str]:
     """The keys of all objects whose keys begin with that of ``place``, in order."""
     with _one_line("listed", place):
-        for page in _client().get_paginator("list_objects_v2").paginate(Bucket=place.bucket, Prefix=place.key):
+        for page in (
+            _client().get_paginator("list_objects_v2").paginate(Bucket=place.bucket, Prefix=place.key)
+        ):
             yield from (each["Key"] for each in page.get("Contents", ()))
 
 
@@ -197,4 +199,3 @@ def _may_pass(error: Any) -> bool:
     known = _errors()
     lost = (known.HTTPClientError, known.ConnectionError, known.IncompleteReadError, RetriesExceededError)
     return isinstance(error, lost)
-| _errors().IncompleteReadError)

@@ -194,7 +194,9 @@ def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
         cause = dask_future.exception()
         if isinstance(cause, distributed.KilledWorker):
             killed = cause.allowed_failures + 1
-            raise ChunkError(f"{where} ended {killed} worker processes; was there too little memory?") from cause
+            raise ChunkError(
+                f"{where} ended {killed} worker processes; was there too little memory?"
+            ) from cause
         raise ChunkError(f"{where} was lost: {cause}") from cause
     try:
         result: dict[str, Any] = future.result()

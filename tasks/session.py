@@ -92,7 +92,9 @@ def _tell(folder: DataFolder, settings: RunSettings) -> None:
 def _check_reachable(scheduler: str | None) -> None:
     """UsageError where workers elsewhere would look for a Prefect server on their own machine."""
     host = urlsplit(scheduler or "").hostname or "localhost"
-    if not os.environ.get("PREFECT_API_URL") and not (host == "localhost" or host.startswith(("127.", "::1"))):
+    if not os.environ.get("PREFECT_API_URL") and not (
+        host == "localhost" or host.startswith(("127.", "::1"))
+    ):
         raise UsageError(
             f"Workers of {scheduler} cannot reach a Prefect server on loopback: set PREFECT_API_URL to one that "
             "they can (docs/runbook.md)."

@@ -78,7 +78,9 @@ class Tracker:
         self._thread.join()
         if self._failure is not None:
             reason = str(self._failure).partition("\n")[0]
-            raise RuntimeError(f"MLflow at {without_password(self.uri)} cannot be used: {reason}") from self._failure
+            raise RuntimeError(
+                f"MLflow at {without_password(self.uri)} cannot be used: {reason}"
+            ) from self._failure
         return self._connected
 
     @contextmanager

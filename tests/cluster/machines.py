@@ -86,7 +86,9 @@ class Postgres:
             self._call("createdb", "-h", "127.0.0.1", "-p", str(self.port), "-U", POSTGRES_USER, name)
 
     def start(self) -> None:
-        options = f"-c port={self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
+        options = (
+            f"-c port={self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"
+        )
         log = self._folder / "postgres.log"
         self._run("pg_ctl", "--wait", f"--log={log}", f"--options={options}", "start")
 
@@ -161,9 +163,9 @@ class Fleet:
 
     def environment(self, machine: str) -> dict[str, str]:
         """What is set on one machine of the fleet."""
-        return self._base | getattr(self, "_services", {}) | {
-            "MOTION_MEMORY_CACHE": str(self.scratch / machine)
-        }
+        return (
+            self._base | getattr(self, "_services", {}) | {"MOTION_MEMORY_CACHE": str(self.scratch / machine)}
+        )
 
     def start(self, machine: str, *command: str) -> Process:
         log = self.scratch / f"{machine}.log"

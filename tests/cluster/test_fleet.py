@@ -50,7 +50,9 @@ def _local_run(folder: Path) -> subprocess.Popen[bytes]:
 
 def _is_at(client: distributed.Client, name: str, what: str) -> bool:
     """Whether the worker of that name is in a chunk of that kind."""
-    named = {info["name"]: address for address, info in client.scheduler_info(n_workers=-1)["workers"].items()}
+    named = {
+        info["name"]: address for address, info in client.scheduler_info(n_workers=-1)["workers"].items()
+    }
     return any(str(key).startswith(what) for key in client.processing().get(named.get(name), ()))
 
 
@@ -105,7 +107,10 @@ def _disturb(machines: Fleet, running: subprocess.Popen[bytes]) -> RunFolder:
 
 def _check_databases(machines: Fleet, run_name: str) -> None:
     """Prefect and MLflow have kept the run in PostgreSQL."""
-    with closing(psycopg2.connect(machines.postgres.address("mlflow"))) as database, database.cursor() as rows:
+    with (
+        closing(psycopg2.connect(machines.postgres.address("mlflow"))) as database,
+        database.cursor() as rows,
+    ):
         rows.execute("SELECT count(*) FROM tags WHERE key = 'motion_memory.run' AND value = %s", [run_name])
         assert rows.fetchone() == (3,)  # the run, its training, its benchmark
         rows.execute("SELECT DISTINCT status FROM runs")

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from prefect.client.schemas.objects import State, StateType
 
 from storage.errors import StorageError, UnreachableError
