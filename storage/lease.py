@@ -1,8 +1,8 @@
 """A lease: one command at a time holds a folder in object storage, and a dead one loses it.
 
-The lease is an object that is put only where there is none, and put again all the while. Whoever finds one that
-was not put again for a minute, by the server's own clock, may put theirs in its place; storage sees to it that
-of two who try one succeeds.
+The lease is an object that is put only where there is none, and put again all the while. Whoever finds one
+that was not put again for a minute, by the server's own clock, may put theirs in its place; storage sees to
+it that of two who try one succeeds.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ LOST_SECONDS: Final = 60.0
 def leased(place: Place, owner: str, what: str) -> Iterator[None]:
     """Hold the lease object at ``place`` for as long as this lasts.
 
-    ``owner`` says what outlives a killed command: who comes with the same one takes the lease over at once, and
-    must have made sure by itself that the other is dead.
+    ``owner`` says what outlives a killed command: who comes with the same one takes the lease over at once,
+    and must have made sure by itself that the other is dead.
 
     InUseError: another command holds it. StorageError: storage cannot be asked.
     """

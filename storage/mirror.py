@@ -1,9 +1,10 @@
 """A local copy of what lies in object storage: put there whole when written, fetched when read.
 
 A path below the cache folder stands for the object of the same name:
-``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. So any process of any machine knows from a path
-alone which object it is; to paths elsewhere nothing here applies. The object is the truth and the file its copy,
-marked by its time as the copy of that very content. A folder that must appear at once is one object, a tar.
+``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. So any process of any machine knows from a
+path alone which object it is; to paths elsewhere nothing here applies. The object is the truth, the file its
+copy, marked by its time as the copy of that very content. A folder that must appear at once is one object: a
+tar.
 """
 
 from __future__ import annotations
@@ -164,7 +165,7 @@ def note_of(path: Path) -> str | None:
 
 
 def files_in(folder: Path, pattern: str, below: bool = False) -> list[Path]:
-    """Paths of files in a folder, or anywhere below it, whose names match; of a copy, those of all objects."""
+    """Paths of files in a folder, or anywhere below it, whose names match; in storage, none is fetched."""
     place = object_of(folder)
     if place is None:
         return sorted(folder.rglob(pattern) if below else folder.glob(pattern))

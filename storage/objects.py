@@ -1,7 +1,7 @@
 """Objects: the one place that speaks to S3-compatible storage.
 
 Server, region and credentials are what the usual AWS variables say (AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID,
-AWS_SECRET_ACCESS_KEY, AWS_REGION, a profile, an instance's role). A request that finds no answer, or an answer
+AWS_SECRET_ACCESS_KEY, AWS_REGION, a profile, an instance's role). A request that finds no answer, or one
 from 500 up, is made again with growing waits before anybody hears of it.
 """
 

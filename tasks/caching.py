@@ -125,8 +125,8 @@ def _mark(place: Path) -> Path:
 def chunk_task(function: Callable[[AnyPiece], dict[str, Any]]) -> Task[[AnyPiece], dict[str, Any]]:
     """Make a Prefect task of a chunk's function: its small JSON result is kept beside its rows.
 
-    What may pass, such as storage that does not answer, is tried again with growing waits; what a chunk itself
-    does wrong it would do wrong again.
+    What may pass, such as storage that does not answer, is tried again with growing waits; what a chunk does
+    wrong itself it would do wrong again.
     """
     return task(
         name=function.__name__.replace("_", "-"),

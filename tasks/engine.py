@@ -136,8 +136,8 @@ def fan_out(
     """Do chunks on the flow's workers; results in the order of the chunks.
 
     A chunk that ``is_done``, and has left what it told, is not done again. ``units`` are what the bar counts;
-    ``partly_done`` tells those of chunks still at work. ChunkError at the first failure. A scheduler that goes
-    away and comes back is given anew what it had not finished.
+    ``partly_done`` tells those of chunks still at work. A scheduler that goes away and comes back is given
+    anew what it had not finished. ChunkError at the first failure of a chunk, RunError without a scheduler.
     """
     began = time.time()
     results: dict[int, dict[str, Any]] = {}

@@ -96,6 +96,6 @@ def _check_reachable(scheduler: str | None) -> None:
         host == "localhost" or host.startswith(("127.", "::1"))
     ):
         raise UsageError(
-            f"Workers of {scheduler} cannot reach a Prefect server on loopback: set PREFECT_API_URL to one that "
-            "they can (docs/runbook.md)."
+            f"Workers of {scheduler} cannot reach a Prefect server on loopback: set PREFECT_API_URL to one "
+            "that they can (docs/runbook.md)."
         )

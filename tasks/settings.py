@@ -170,7 +170,7 @@ def default_data() -> Path:
 
 
 def default_scheduler() -> str | None:
-    """The Dask scheduler of a command that was given none: $MOTION_MEMORY_SCHEDULER; None: workers of its own."""
+    """The Dask scheduler that $MOTION_MEMORY_SCHEDULER names; None: a command has workers of its own."""
     return os.environ.get("MOTION_MEMORY_SCHEDULER") or None
 
 

@@ -38,8 +38,8 @@ def tracking_uri(data: DataFolder) -> str:
     given = os.environ.get("MLFLOW_TRACKING_URI")
     if not given and data.is_remote:
         raise UsageError(
-            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that keeps "
-            "its own (docs/runbook.md)."
+            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
+            "keeps its own (docs/runbook.md)."
         )
     return given or f"sqlite:///{data.mlflow_database}"
 

@@ -52,11 +52,10 @@ def machine(folder: Path) -> Iterator[Path]:
 class Failing:
     """Answers the next requests with an error instead of letting them through; counts all."""
 
-    def __init__(self, client: Any, status: int = 503) -> None:
+    def __init__(self, client: Any) -> None:
         self.left = 0
         self.seen = 0
         self.operations: list[str] = []
-        self._status = status
         client.meta.events.register_first("before-send.s3", self._answer)
         client.meta.events.register("before-call.s3", self._note)
 
@@ -70,7 +69,7 @@ class Failing:
         if self.left <= 0:
             return None
         self.left -= 1
-        return AWSResponse(request.url, self._status, {}, _Body())
+        return AWSResponse(request.url, 503, {}, _Body())
 
 
 class _Body:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
+from botocore.exceptions import ClientError
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -193,13 +194,17 @@ def test_what_cannot_be_put_leaves_what_was_there(
 ) -> None:
     path = open_data_folder(DATA).path / "x.json"
     write_json(path, "old")
-    failing = Failing(storage, status=403)
-    failing.left = 1000
-    with pytest.raises(StorageError, match=r"s3://bucket/team/data/x.json cannot be written") as refused:
-        write_json(path, "new")
+
+    def refuse(*_: object, **__: object) -> None:
+        told = {"Error": {"Code": "AccessDenied"}, "ResponseMetadata": {"HTTPStatusCode": 403}}
+        raise ClientError(told, "PutObject")
+
+    with monkeypatch.context() as denied:
+        denied.setattr(storage, "put_object", refuse)
+        with pytest.raises(StorageError, match=r"data/x.json cannot be written: .*AccessDenied") as refused:
+            write_json(path, "new")
     assert "\n" not in str(refused.value)
     assert not isinstance(refused.value, UnreachableError)
-    failing.left = 0
     assert read_json(path) == "old"
     with pytest.raises(RuntimeError), whole_file(path):
         raise RuntimeError
