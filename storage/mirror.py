@@ -121,13 +121,15 @@ def fetch(path: Path) -> Path:
     if place is None or not _unseen(path):
         return path
     found = objects.look(place)
+    if found is not None and not _is_copy(path, found.etag):
+        with _scratch(path) as scratch:
+            if objects.download(place, scratch / path.name):
+                _mark(scratch / path.name, found.etag)
+                (scratch / path.name).replace(path)
+            else:  # it went in between
+                found = None
     if found is None:
         path.unlink(missing_ok=True)
-    elif not _is_copy(path, found.etag):
-        with _scratch(path) as scratch:
-            objects.download(place, scratch / path.name)
-            _mark(scratch / path.name, found.etag)
-            (scratch / path.name).replace(path)
     _see(path)
     return path
 

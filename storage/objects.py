@@ -65,10 +65,16 @@ def look(place: Place) -> Found | None:
     return Found(answer["ETag"], answer["Metadata"].get(NOTE, ""), age.total_seconds())
 
 
-def download(place: Place, path: Path) -> None:
-    """Write an object's content to ``path``."""
+def download(place: Place, path: Path) -> bool:
+    """Write an object's content to ``path``; False where there is none (any more)."""
     with _one_line("read", place):
-        _client().download_file(place.bucket, place.key, str(path))
+        try:
+            _client().download_file(place.bucket, place.key, str(path))
+        except _errors().ClientError as error:
+            if _code(error) in _MISSING:
+                return False
+            raise
+    return True
 
 
 def upload(path: Path, place: Place, note: str = "") -> str:

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -21,12 +21,12 @@ from tests.flows.same_rows import assert_same_rows
 
 RUN = (
     "run", "--preset", "smoke", "--classes", "trap", "--experiences", "4", "--candidates", "8",
-    "--problems-per-experience", "10", "--test-problems", "250", "--epochs", "2",
+    "--problems-per-experience", "10", "--test-problems", "120", "--epochs", "2",
 )  # fmt: skip
 AWAY_SECONDS = 8.0
-BUCKET_WAIT_SECONDS = 30.0
+STAGE_SECONDS = 1500.0
 
-pytestmark = [pytest.mark.cluster, pytest.mark.timeout(600), pytest.mark.filterwarnings("default")]
+pytestmark = [pytest.mark.cluster, pytest.mark.timeout(4000), pytest.mark.filterwarnings("default")]
 
 
 @pytest.fixture
@@ -75,28 +75,32 @@ def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of
     except AssertionError as error:
         raise AssertionError(f"{error}\n{machines.logs()}") from error
     local = _local_run(tmp_path / "local")
-    assert running.wait(timeout=300) == 0, machines.logs()
-    assert local.wait(timeout=300) == 0, (tmp_path / "local.log").read_text()[-2000:]
+    assert running.wait(timeout=2000) == 0, machines.logs()
+    assert local.wait(timeout=2000) == 0, (tmp_path / "local.log").read_text()[-2000:]
     (undisturbed,) = DataFolder(tmp_path / "local").runs()
     assert len(assert_same_rows(_fetched(run), undisturbed)) >= 6
-    assert not (tmp_path / "one" / "runs").exists()
     _check_databases(machines, run.path.name)
     _check_nobody_holds_it(machines)
 
 
 def _disturb(machines: Fleet, running: subprocess.Popen[bytes]) -> RunFolder:
     """Do to a run what a bad day does; its folder."""
+
+    def wait(what: str, is_so: Callable[[], bool]) -> None:
+        wait_for(what, lambda: is_so() or running.poll() is not None, STAGE_SECONDS)
+        assert running.poll() is None, f"the command ended before {what}"
+
     data = open_data_folder(machines.environment("test")["MOTION_MEMORY_DATA"])
-    wait_for("a run", lambda: bool(data.runs()), 120.0)
+    wait("a run", lambda: bool(data.runs()))
     (run,) = data.runs()
-    wait_for("hallucinated problems", lambda: bool(run.shards("hallucinated", "trap")), 120.0)
+    wait("hallucinated problems", lambda: bool(run.shards("hallucinated", "trap")))
     machines.scheduler.kill()
     machines.scheduler = machines.start_scheduler()
     for name, worker in machines.workers.items():
-        worker.running.wait(timeout=60)  # it ends with its scheduler, and its keeper starts it again
+        worker.running.wait(timeout=600)  # it ends with its scheduler, and its keeper starts it again
         machines.workers[name] = machines.start_worker(name)
     with distributed.Client(machines.scheduler_address, set_as_default=False) as client:
-        wait_for("the benchmark", lambda: _is_at(client, "one", "benchmark_chunk"), 180.0)
+        wait("the benchmark", lambda: _is_at(client, "one", "benchmark_chunk"))
         machines.workers["one"].kill()
         machines.postgres.stop()
         time.sleep(AWAY_SECONDS)
