@@ -19,7 +19,7 @@ from typing import Final
 
 ROOT: Final = Path(__file__).parents[2]
 BIN: Final = Path(sys.executable).parent
-START_SECONDS: Final = 900.0
+START_SECONDS: Final = 120.0
 POSTGRES_USER: Final = "postgres"  # the server refuses to be root
 
 

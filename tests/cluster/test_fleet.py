@@ -24,9 +24,9 @@ RUN = (
     "--problems-per-experience", "10", "--test-problems", "120", "--epochs", "2",
 )  # fmt: skip
 AWAY_SECONDS = 8.0
-STAGE_SECONDS = 1500.0
+STAGE_SECONDS = 240.0
 
-pytestmark = [pytest.mark.cluster, pytest.mark.timeout(4000), pytest.mark.filterwarnings("default")]
+pytestmark = [pytest.mark.cluster, pytest.mark.timeout(900), pytest.mark.filterwarnings("default")]
 
 
 @pytest.fixture
@@ -75,8 +75,8 @@ def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of
     except AssertionError as error:
         raise AssertionError(f"{error}\n{machines.logs()}") from error
     local = _local_run(tmp_path / "local")
-    assert running.wait(timeout=2000) == 0, machines.logs()
-    assert local.wait(timeout=2000) == 0, (tmp_path / "local.log").read_text()[-2000:]
+    assert running.wait(timeout=300) == 0, machines.logs()
+    assert local.wait(timeout=300) == 0, (tmp_path / "local.log").read_text()[-2000:]
     (undisturbed,) = DataFolder(tmp_path / "local").runs()
     assert len(assert_same_rows(_fetched(run), undisturbed)) >= 6
     _check_databases(machines, run.path.name)
@@ -97,7 +97,7 @@ def _disturb(machines: Fleet, running: subprocess.Popen[bytes]) -> RunFolder:
     machines.scheduler.kill()
     machines.scheduler = machines.start_scheduler()
     for name, worker in machines.workers.items():
-        worker.running.wait(timeout=600)  # it ends with its scheduler, and its keeper starts it again
+        worker.running.wait(timeout=60)  # it ends with its scheduler, and its keeper starts it again
         machines.workers[name] = machines.start_worker(name)
     with distributed.Client(machines.scheduler_address, set_as_default=False) as client:
         wait("the benchmark", lambda: _is_at(client, "one", "benchmark_chunk"))
