@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from storage.errors import StorageError, UnreachableError
 
-ATTEMPTS: Final = 8  # of a request, with waits of up to 1, 2, 4 ... 20 s between them: some half a minute
+ATTEMPTS: Final = 7  # of a request, with waits of up to 1, 2, 4 ... 32 s between them: half a minute in all
 CONNECT_SECONDS: Final = 10
 READ_SECONDS: Final = 60
 NOTE: Final = "key"  # of an object's metadata: what its content was made from
@@ -143,7 +143,8 @@ def _client() -> Any:
             "Object storage needs boto3; install it with `pip install 'motion-memory[remote]'`."
         ) from None
     settings = Config(
-        retries={"mode": "standard", "total_max_attempts": ATTEMPTS},
+        # not "standard": that mode's quota of retries is not refilled by answers like 404, and runs out
+        retries={"mode": "legacy", "total_max_attempts": ATTEMPTS},
         connect_timeout=CONNECT_SECONDS,
         read_timeout=READ_SECONDS,
         # what is newer than S3's first checksums is not understood by all servers; content has our own
