@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TORCH := torch==2.13.0
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
 
-.PHONY: run smoke test test-slow check speed format clean
+.PHONY: run smoke test test-slow test-cluster check speed format clean
 
 run: $(READY)  ## the main job: every stage on the three classes, under 10 minutes on 2 cores
 	$(BIN)/motion-memory run --preset laptop
@@ -19,6 +19,9 @@ test: $(READY)  ## the test suite, in parallel
 
 test-slow: $(READY)  ## the tests that take minutes
 	$(BIN)/pytest -m slow -q --timeout 3600
+
+test-cluster: $(READY)  ## more than one machine, all of them here: needs the PostgreSQL server
+	$(BIN)/pytest -m cluster -q
 
 check: $(READY)  ## lint, types, import contracts
 	$(BIN)/ruff check .

@@ -20,7 +20,8 @@ from planners.world.vehicle import Vehicle
 from storage.arrays import write_array
 from storage.columns import Array
 from storage.errors import StorageError
-from storage.files import parse_json, read_text, whole_folder
+from storage.files import local_text, parse_json, whole_folder
+from storage.mirror import fetch_folder
 from storage.vehicles import fields_of, refuse_another
 
 VERSION: Final = 2  # one more whenever an older program could no longer read an archive
@@ -93,12 +94,12 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
 
 def _header(folder: Path, kind: str) -> dict[str, Any]:
     """The header of an archive of this version, as it was written to the last byte."""
-    path = folder / f"{kind}.json"
+    path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
         raise StorageError(f"{folder} holds no {kind} (no {kind}.json in it); check the path or build one.")
     if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
         raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
-    text = read_text(path)
+    text = local_text(path)
     header = parse_json(text, str(path))
     if not isinstance(header, dict) or header.get("kind") != kind:
         raise StorageError(f"{path} does not describe a {kind}; build it again.")

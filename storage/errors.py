@@ -7,6 +7,10 @@ class StorageError(Exception):
     """Something on disk is missing, damaged, foreign or cannot be written; the message is one line."""
 
 
+class UnreachableError(StorageError):
+    """Object storage does not answer, or answers with errors; it may, later."""
+
+
 class InUseError(StorageError):
     """Another process holds it."""
 

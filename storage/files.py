@@ -14,15 +14,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from storage.errors import InUseError, StorageError
+from storage.mirror import PARTIAL, fetch, publish, publish_folder
 
 REMOVALS: Final = 10
 REMOVAL_SECONDS: Final = 0.2
-PARTIAL: Final = ".partial"  # ending of what is still being written; nobody reads it
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
+def whole_file(path: Path, note: str = "") -> Iterator[Path]:
     """Yield a temporary name beside ``path``; put it in the place of ``path`` once it is on the disk.
+
+    Where ``path`` stands for an object (``mirror.py``), it is put into storage first, with the ``note``.
 
     StorageError: it could not be written (disk full, no permission); ``path`` is as it was.
     """
@@ -35,6 +37,7 @@ def whole_file(path: Path) -> Iterator[Path]:
             yield temporary
             temporary.chmod(0o666 & ~_umask())
             _synchronise(temporary)
+            publish(temporary, path, note)
             temporary.replace(path)
             _synchronise(path.parent)
         finally:
@@ -57,6 +60,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
             for file in temporary.iterdir():
                 _synchronise(file)
             _synchronise(temporary)
+            publish_folder(temporary, path)
             if path.exists():  # a full folder cannot be renamed over: the old one steps aside
                 path.replace(old)
             temporary.replace(path)
@@ -75,6 +79,7 @@ def locked(path: Path, what: str) -> Iterator[None]:
     InUseError: another process holds it; the message begins with ``what`` is in use, and says who it is.
     OSError: it cannot be opened.
     """
+    path.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     try:
         try:
@@ -126,6 +131,11 @@ def read_json(path: Path) -> Any:
 
 def read_text(path: Path) -> str:
     """The text of a file; a StorageError where it is missing, unreadable or not UTF-8."""
+    return local_text(fetch(path))
+
+
+def local_text(path: Path) -> str:
+    """The same of a file that is here, such as one of a folder that was fetched."""
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

@@ -25,6 +25,7 @@ from storage.columns import lists_of
 from storage.errors import InUseError, StorageError
 from storage.experiences import read_experience_table, write_experiences
 from storage.files import locked
+from storage.mirror import files_in, remove
 from storage.schemas import EXPERIENCES
 from storage.shards import read_table, write_table
 
@@ -62,7 +63,7 @@ def add_learned(
 
 def learned_shards(folder: Path) -> list[Path]:
     """The shards that are there, in no telling order."""
-    return sorted(folder.glob("[!.]*.parquet"))
+    return files_in(folder, "[!.]*.parquet")
 
 
 def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
@@ -73,9 +74,9 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     if not learned_shards(folder):
         raise StorageError(f"{folder} holds nothing that was learned; solve problems with --learn first.")
     with locked(folder / ".lock", str(folder)):
-        found = sorted((folder / SNAPSHOTS).glob(f"{name}-{'?' * DIGITS}.parquet"))
-        if found:
-            return found[0].stem
+        taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
+        if taken:
+            return taken[0].stem
         _, table, digest = _kept(folder, vehicle)
         called = f"{name}-{digest[:DIGITS]}"
         write_table(snapshot_path(folder, called), table)
@@ -107,7 +108,7 @@ def _merge(folder: Path, vehicle: Vehicle) -> None:
         write_table(merged, table)
         for shard in shards:
             if shard != merged:
-                shard.unlink(missing_ok=True)
+                remove(shard)
 
 
 def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:

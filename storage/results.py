@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from storage.errors import StorageError
+from storage.mirror import files_in
 from storage.schemas import ATTEMPTS
 from storage.shards import read_table, table_of, write_table, write_tables
 
@@ -55,9 +56,9 @@ def _tables(place: Path, without: Sequence[str]) -> Iterator[pa.Table]:
 
 def tables_below(place: Path, stage: str) -> list[Path]:
     """The file, or all Parquet files below a folder by name; a StorageError that names the stage if none."""
-    if not place.is_dir():
+    if place.suffix == ".parquet" or place.is_file():
         return [place]
-    paths = sorted(path for path in place.rglob("*.parquet") if not path.name.startswith("."))
+    paths = files_in(place, "[!.]*.parquet", below=True)
     if not paths:
         raise StorageError(f"{place} holds no rows; run {stage}.")
     return paths

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 
 from storage.errors import StorageError
 from storage.files import whole_file
+from storage.mirror import fetch, note_of
 
 ROW_GROUP_ROWS: Final = 4096  # 2,000 to 8,000 measured best for 64 x 64 grids
 SCHEMA_KEY: Final = b"schema"
@@ -34,7 +35,7 @@ def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key:
     """
     described = schema.with_metadata({**(schema.metadata or {}), SHARD_KEY: key.encode()})
     with (
-        whole_file(path) as temporary,
+        whole_file(path, key) as temporary,
         pq.ParquetWriter(temporary, described, compression="zstd", write_page_checksum=True) as file,
     ):
         for table in tables:
@@ -54,7 +55,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
         )
     try:
         return pq.read_table(
-            path,
+            fetch(path),
             columns=None if columns is None else list(columns),
             partitioning=None,
             page_checksum_verification=True,
@@ -66,7 +67,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
 def metadata_of(path: Path) -> dict[bytes, bytes]:
     """The key/value metadata of a Parquet file; a StorageError where it is missing or damaged."""
     try:
-        return dict(pq.read_schema(path).metadata or {})
+        return dict(pq.read_schema(fetch(path)).metadata or {})
     except FileNotFoundError:
         raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
     except (pa.ArrowException, OSError) as error:
@@ -74,7 +75,10 @@ def metadata_of(path: Path) -> dict[bytes, bytes]:
 
 
 def shard_is_done(path: Path, key: str) -> bool:
-    """Whether a readable shard made from the same ``key`` is already there."""
+    """Whether a readable shard made from the same ``key`` is already there; none is fetched to find out."""
+    noted = note_of(path)
+    if noted is not None:
+        return noted == key
     try:
         return metadata_of(path).get(SHARD_KEY) == key.encode()
     except StorageError:

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Final
 
 from dashboards.verdicts import Claim
+from storage.files import read_text
 from storage.layout import RunFolder
+from storage.mirror import fetch, files_in, uri_of
 
 MAX_IMAGE_BYTES: Final = 700_000  # an artifact is a row of the server's database
 
@@ -29,11 +31,11 @@ def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
 
     told = [claim._asdict() for claim in claims]
     try:
-        create_link_artifact(run.report.as_uri(), "Report", key=key("report"), description="Whole page")
-        create_markdown_artifact(run.summary("md").read_text(encoding="utf-8"), key=key("summary"))
+        create_link_artifact(uri_of(run.report), "Report", key=key("report"), description="Whole page")
+        create_markdown_artifact(read_text(run.summary("md")), key=key("summary"))
         create_table_artifact(told, key=key("claims"), description="Claims of the paper")
-        for figure in sorted(run.figures.glob("*.png")):
-            if figure.stat().st_size <= MAX_IMAGE_BYTES:
+        for figure in files_in(run.figures, "*.png"):
+            if fetch(figure).stat().st_size <= MAX_IMAGE_BYTES:
                 create_image_artifact(_address(figure), key=key(figure.stem), description=figure.stem)
     except Exception as error:  # a report is whole without its artifacts, whatever is wrong with the server
         reason = (str(error) or type(error).__name__).splitlines()[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,16 +10,20 @@ from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
 
 from prefect import task
-from prefect.tasks import Task
+from prefect.cache_policies import NO_CACHE
+from prefect.client.schemas.objects import State
+from prefect.tasks import Task, exponential_backoff
 
-from storage.errors import StorageError
+from storage.errors import StorageError, UnreachableError
 from storage.files import read_json, write_json
 from storage.layout import RunFolder, open_data_folder
+from storage.mirror import is_there, looking_once
 from tasks.keys import key_of
 from tasks.settings import RunSettings
 from tasks.work import measured
 
-RETRIES: Final = 1  # a disk or a network may stumble once; whoever fails twice fails
+RETRIES: Final = 3  # of a chunk that a disk, a network or a storage failed
+FIRST_WAIT_SECONDS: Final = 2.0  # then twice as long, and again
 
 
 class Piece(Protocol):
@@ -41,8 +46,8 @@ class Piece(Protocol):
         """One past its last."""
 
     @property
-    def cache_key(self) -> str:
-        """What its result depends on."""
+    def result(self) -> Path:
+        """Where what it told is kept: a name that says what it depends on."""
 
 
 AnyPiece = TypeVar("AnyPiece", bound=Piece)
@@ -52,7 +57,7 @@ AnyPiece = TypeVar("AnyPiece", bound=Piece)
 class Chunk:
     """One piece of a stage: small enough to send anywhere, enough to do it there."""
 
-    data: str  # the data folder
+    data: str  # the data folder: a path, or s3://bucket/folder
     settings: RunSettings
     class_name: str
     index: int  # position among the stage's chunks of this class, and number of its shard
@@ -66,9 +71,9 @@ class Chunk:
         return run_folder(self.data, self.settings)
 
     @property
-    def cache_key(self) -> str:
-        """The key under which its result is kept."""
-        return f"{self.settings.run_name}-{self.class_name}-{self.key}"
+    def result(self) -> Path:
+        """Where what it told is kept."""
+        return self.run.result(self.class_name, self.key)
 
 
 def run_folder(data: str, settings: RunSettings) -> RunFolder:
@@ -106,7 +111,9 @@ def mark_done(place: Path, key: str) -> None:
 def is_marked(place: Path, key: str) -> bool:
     """Whether a folder is there and was made from what ``key`` says."""
     try:
-        return place.is_dir() and bool(read_json(_mark(place)) == {"key": key})
+        return bool(read_json(_mark(place)) == {"key": key}) and is_there(place)
+    except UnreachableError:
+        raise
     except StorageError:
         return False
 
@@ -116,12 +123,49 @@ def _mark(place: Path) -> Path:
 
 
 def chunk_task(function: Callable[[AnyPiece], dict[str, Any]]) -> Task[[AnyPiece], dict[str, Any]]:
-    """Make a Prefect task of a chunk's function: its small JSON result is kept under the chunk's key."""
+    """Make a Prefect task of a chunk's function: its small JSON result is kept beside its rows.
+
+    What may pass, such as storage that does not answer, is tried again with growing waits; what a chunk does
+    wrong itself it would do wrong again.
+    """
     return task(
         name=function.__name__.replace("_", "-"),
         task_run_name=f"{function.__name__.replace('_', '-')} {{chunk.class_name}} {{chunk.index}}",
-        cache_key_fn=lambda _, parameters: parameters["chunk"].cache_key,
-        persist_result=True,
+        cache_policy=NO_CACHE,
+        persist_result=False,  # a worker's own disk would keep it, where no other worker looks
         retries=RETRIES,
-        retry_delay_seconds=1,
-    )(measured(function))
+        retry_delay_seconds=exponential_backoff(FIRST_WAIT_SECONDS),
+        retry_jitter_factor=0.5,
+        retry_condition_fn=_may_pass,
+    )(_kept(measured(function)))
+
+
+def kept_result(chunk: Piece) -> dict[str, Any] | None:
+    """What a chunk told when it was done; None where it never was, or what it told is lost."""
+    try:
+        result: dict[str, Any] = read_json(chunk.result)
+    except UnreachableError:
+        raise
+    except StorageError:
+        return None
+    return result
+
+
+def _kept(function: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
+    """Wrap a chunk's function so that its result is kept, once its rows are."""
+
+    @functools.wraps(function)
+    def wrapped(chunk: Any) -> dict[str, Any]:
+        with looking_once():
+            result = function(chunk)
+            write_json(chunk.result, result)
+        return result
+
+    return wrapped
+
+
+def _may_pass(_task: object, _run: object, state: State[Any]) -> bool:
+    """Whether a chunk failed for a reason that may be gone the next time."""
+    error = state.data
+    lost = (UnreachableError, OSError)
+    return isinstance(error, lost) or (isinstance(error, StorageError) and isinstance(error.__cause__, lost))

@@ -14,7 +14,7 @@ from dashboards.cells import markdown_table, rich_table
 from dashboards.comparison import compare_runs, comparison_markdown, comparison_table, verdict
 from storage.errors import StorageError
 from storage.files import read_text, whole_file
-from storage.layout import RunFolder, open_run
+from storage.layout import open_run
 from storage.results import read_attempts
 from tasks.report import NOT_NEEDED, console
 from tasks.settings import RunSettings, UsageError
@@ -85,7 +85,7 @@ def _settings(run: Path) -> RunSettings:
 
 
 def _attempts(run: Path) -> pd.DataFrame:
-    return read_attempts(RunFolder(run).results, NOT_NEEDED)
+    return read_attempts(open_run(run).results, NOT_NEEDED)
 
 
 def _different(settings: Sequence[RunSettings]) -> list[list[str]]:

@@ -11,6 +11,7 @@ from planners.memory.recall import default_recall
 from planners.solve import solve
 from planners.world.vehicle import vehicle_named
 from storage.memories import load_memory
+from storage.mirror import is_there
 from storage.results import read_attempts
 from tasks.benchmark import benchmark_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
@@ -34,7 +35,7 @@ draw_figures = chunk_task(draw_chunk)
 
 def is_drawn(chunk: Chunk) -> bool:
     """Whether the figures of a class are there."""
-    return (chunk.run.figures / f"problems-{chunk.class_name}.svg").exists()
+    return is_there(chunk.run.figures / f"problems-{chunk.class_name}.svg")
 
 
 def figure_chunks(data: str, settings: RunSettings) -> list[Chunk]:

@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from itertools import islice
+from pathlib import Path
 from typing import Any, Final
 
 import dask
 import distributed
+import yaml
 from dask.system import CPU_COUNT
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
-from tasks.caching import AnyPiece, Piece
+from tasks.caching import AnyPiece, Piece, kept_result
 from tasks.progress import progress
 from tasks.redaction import redacted
-from tasks.settings import RunError
+from tasks.settings import RunError, default_scheduler
 from tasks.work import WORK, note
 
-LIBRARIES: Final = ("OMP", "MKL", "OPENBLAS")  # each worker is one thread
-KILLS_ALLOWED: Final = 2  # a chunk that kills a third worker is the culprit and fails the stage
+SETTINGS: Final = Path(__file__).with_name("dask.yaml")
 CONNECT_SECONDS: Final = 5
+RECONNECT_SECONDS: Final = 120  # for which a scheduler may be away
+LOSSES_ALLOWED: Final = 5  # of a scheduler within a stage
 CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
 AHEAD: Final = 200  # chunks that wait for a worker: enough that none waits, few enough for any memory
+LOST: Final = ("cancelled", "lost")  # of a chunk whose scheduler is gone
 LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which reads files
 
 Client: Any = distributed.Client  # Dask has no types
@@ -44,6 +48,8 @@ class ChunkError(RunError):
 def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[str]:
     """Address of the scheduler that every flow inside shares: the one around it, the given one, or a new one.
 
+    Without one given it is $MOTION_MEMORY_SCHEDULER.
+
     A new one is local: ``workers`` processes (default: one a core) of one thread, reachable on loopback only.
     RuntimeError with one line when nobody answers at ``scheduler``.
     """
@@ -51,7 +57,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     if around is not None:
         yield around
         return
-    with _connected(scheduler) if scheduler else _local(workers or int(CPU_COUNT)) as address:
+    given = scheduler or default_scheduler()
+    with _connected(given) if given else _local(workers or int(CPU_COUNT)) as address:
         token = _shared.set(address)
         try:
             yield address
@@ -62,7 +69,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
 def task_runner() -> Any:
     """What a flow gives its tasks to: the shared cluster, found when the first task is submitted."""
     shared: Any = cluster  # entered by the runner, which is all that it wants of a cluster
-    return DaskTaskRunner(cluster_class=shared)
+    return DaskTaskRunner(cluster_class=shared, client_kwargs={"timeout": RECONNECT_SECONDS})
 
 
 @contextmanager
@@ -78,18 +85,7 @@ def _connected(address: str) -> Iterator[str]:
 
 @contextmanager
 def _local(workers: int) -> Iterator[str]:
-    settings = {
-        "distributed.scheduler.allowed-failures": KILLS_ALLOWED,
-        "distributed.scheduler.worker-saturation": 1.0,  # a chunk waits for whoever is free, not in a queue
-        # a worker that may spill has a folder `storage` on its path, which would hide our package
-        "distributed.worker.memory.target": False,
-        "distributed.worker.memory.spill": False,
-        "distributed.worker.memory.terminate": False,  # a machine's memory is its owner's business
-        # Dask has its workers give freed memory back at once (MALLOC_TRIM_THRESHOLD_): training then takes
-        # two and a half times as long, most of it in page faults
-        "distributed.nanny.pre-spawn-environ": {f"{library}_NUM_THREADS": 1 for library in LIBRARIES},
-    }
-    with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(settings):
+    with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(_settings()):
         local = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -103,6 +99,19 @@ def _local(workers: int) -> Iterator[str]:
         finally:
             _kill(local)  # what was wanted of them is written; leaving politely takes seconds
             _close(local)
+
+
+def _settings() -> dict[str, Any]:
+    """The settings of ``dask.yaml``, by their dotted names."""
+
+    def named(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+        for name, value in values.items():
+            if isinstance(value, dict):
+                yield from named(f"{prefix}{name}.", value)
+            else:
+                yield f"{prefix}{name}", value
+
+    return dict(named("", yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))))
 
 
 def _kill(local: Any) -> None:
@@ -127,23 +136,38 @@ def fan_out(
 ) -> list[dict[str, Any]]:
     """Do chunks on the flow's workers; results in the order of the chunks.
 
-    A chunk whose shard is not ``is_done`` is done again, whatever the cache says. ``units`` are what the bar
-    counts; ``partly_done`` tells those of chunks still at work. ChunkError at the first failure.
+    A chunk that ``is_done``, and has left what it told, is not done again. ``units`` are what the bar counts;
+    ``partly_done`` tells those of chunks still at work. A scheduler that goes away and comes back is given
+    anew what it had not finished. ChunkError at the first failure of a chunk, RunError without a scheduler.
     """
     began = time.time()
     results: dict[int, dict[str, Any]] = {}
     sizes = [units(chunk) for chunk in chunks]
     with progress(description, sum(sizes)) as show:
-        waiting = iter(enumerate(chunks))
+        waiting = deque(range(len(chunks)))
         pending: dict[int, Any] = {}
-        done = begun = 0
+        done = begun = losses = 0
         looked = time.monotonic()
         while len(results) < len(chunks):
-            for i, chunk in islice(waiting, AHEAD - len(pending)):
-                pending[i] = task.with_options(refresh_cache=not is_done(chunk)).submit(chunk)
-            for i in [i for i, future in pending.items() if future.wrapped_future.done()]:
-                results[i] = _result(pending.pop(i), chunks[i], description)
-                done += sizes[i]
+            for i in [waiting.popleft() for _ in range(min(len(waiting), AHEAD - len(pending)))]:
+                kept = kept_result(chunks[i]) if is_done(chunks[i]) else None
+                if kept is None:
+                    pending[i] = task.submit(chunks[i])
+                else:
+                    results[i] = kept
+                    done += sizes[i]
+            ended = [i for i, future in pending.items() if future.wrapped_future.done()]
+            lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
+            if lost:
+                losses += 1
+                _wait_for_scheduler(pending[lost[0]].wrapped_future.client, losses)
+            for i in ended:
+                future = pending.pop(i)
+                if i in lost:
+                    waiting.append(i)
+                else:
+                    results[i] = _result(future, chunks[i], description)
+                    done += sizes[i]
             if time.monotonic() - looked >= LOOK_SECONDS:
                 begun, looked = partly_done(), time.monotonic()
             show(max(done, min(begun, sum(sizes))))
@@ -153,14 +177,26 @@ def fan_out(
     return [{name: value for name, value in result.items() if name != WORK} for result in ordered]
 
 
+def _wait_for_scheduler(client: Any, losses: int) -> None:
+    """Return when the client has the scheduler again; RunError when it gave up, or this is too often."""
+    while client.status == "connecting":
+        time.sleep(POLL_SECONDS)
+    if client.status != "running" or losses > LOSSES_ALLOWED:
+        raise RunError(
+            f"The Dask scheduler went away {losses} times, or for more than {RECONNECT_SECONDS} s; finished "
+            "chunks are kept: when it is back, the same command goes on."
+        )
+
+
 def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
     where = f"{description}: chunk {chunk.index} of {chunk.class_name}"
     dask_future = future.wrapped_future
     if dask_future.status != "finished":
         cause = dask_future.exception()
         if isinstance(cause, distributed.KilledWorker):
+            killed = cause.allowed_failures + 1
             raise ChunkError(
-                f"{where} ended {KILLS_ALLOWED + 1} worker processes; was there too little memory?"
+                f"{where} ended {killed} worker processes; was there too little memory?"
             ) from cause
         raise ChunkError(redacted(f"{where} was lost: {cause}")) from cause
     try:

@@ -9,6 +9,7 @@ from typing import Final
 
 from storage.files import read_text, whole_file
 from storage.layout import RunFolder, open_run
+from storage.mirror import fetch
 from storage.ompl_log import write_ompl_logs
 from storage.planner_arena import Origin, write_planner_arena
 from storage.results import attempt_frames, tables_below
@@ -30,8 +31,8 @@ def export_run(folder: Path, form: str, out: Path) -> None:
     if form == "ompl" and out.exists():
         raise UsageError(f"{out} is there already; give a new folder for the logs.")
     run = open_run(folder)
-    tables_below(run.results, "benchmark")
-    classes = {place.name: place for place in sorted(run.results.iterdir()) if place.is_dir()}
+    folders = {path.parent for path in tables_below(run.results, "benchmark")}
+    classes = {folder.name: folder for folder in sorted(folders)}
     if form == "ompl":
         write_ompl_logs(out, classes, _origin(run))
     else:
@@ -53,7 +54,7 @@ def _write_csv(path: Path, results: Path) -> None:
 
 def _origin(run: RunFolder) -> Origin:
     measured = next((each for each in reversed(stages_of(run)) if each["stage"] == "benchmark"), None)
-    oldest = min(path.stat().st_mtime for path in tables_below(run.results, "benchmark"))
+    oldest = min(fetch(path).stat().st_mtime for path in tables_below(run.results, "benchmark"))
     return Origin(
         run_name=run.path.resolve().name,
         version=version("motion-memory"),

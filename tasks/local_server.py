@@ -39,6 +39,8 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
     "PREFECT_LOGGING_LEVEL": "CRITICAL",  # a failure is told once, in one line, by the command
     "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states say it all; logs would cost a request a task
+    "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
+    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # what a server says whose database is away
     "MLFLOW_LOGGING_LEVEL": "ERROR",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",

@@ -14,6 +14,7 @@ from dashboards.distributions import endings
 from dashboards.page import Picture, page
 from dashboards.verdicts import Claim
 from storage.layout import RunFolder
+from storage.mirror import fetch, files_in
 from tasks.settings import RunSettings
 from tasks.stages import stage_cells, stages_of
 
@@ -56,7 +57,8 @@ def page_of(
 def _pictures(run: RunFolder) -> list[Picture]:
     """Every figure once, as PNG or SVG, whichever is smaller."""
     smaller: dict[str, Path] = {}
-    for path in sorted(run.figures.glob("*.[ps][nv]g"), key=lambda path: path.stat().st_size):
+    drawn = [fetch(path) for path in files_in(run.figures, "*.[ps][nv]g")]
+    for path in sorted(drawn, key=lambda path: path.stat().st_size):
         smaller.setdefault(path.stem, path)
     return [Picture(smaller[name], CAPTIONS.get(name, _words(name))) for name in sorted(smaller, key=_place)]
 

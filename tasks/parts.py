@@ -76,9 +76,9 @@ class Part:
         return self.piece.first + self.piece.count
 
     @property
-    def cache_key(self) -> str:
-        """The key under which its result is kept."""
-        return f"solve-{self.key}"
+    def result(self) -> Path:
+        """Where what it told is kept."""
+        return self.asked.folder / f"{self.index:06d}-{self.key}.json"
 
     @property
     def shard(self) -> Path:

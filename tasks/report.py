@@ -34,6 +34,7 @@ from dashboards.tables import (
 from dashboards.verdicts import Claim
 from storage.files import read_text, whole_file
 from storage.layout import RunFolder, open_data_folder
+from storage.mirror import is_there
 from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.caching import Chunk, run_folder
@@ -103,7 +104,7 @@ def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
     own = run_folder(data, settings)
     places = {settings.experiences: own.results}
     for run in open_data_folder(data).runs():
-        if run.path == own.path or not (run.settings.exists() and run.results.exists()):
+        if run.path == own.path or not (is_there(run.settings) and is_there(run.results)):
             continue
         try:
             asked = RunSettings.from_json(read_text(run.settings))

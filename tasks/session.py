@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from storage.layout import MARK, DataFolder, open_data_folder
+from storage.mirror import fetch, is_there, local_place, shown
 from tasks.local_server import LocalServer, local_server, set_environment
 from tasks.redaction import redacted
-from tasks.settings import RunError, RunSettings, UsageError
+from tasks.settings import RunError, RunSettings, UsageError, default_scheduler
+from tasks.tracking import tracking_uri
 
 
 def run_stage(
     module: str, name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
 ) -> None:
     """Run the flow ``module.name``; afterwards say where everything lies."""
+    scheduler = scheduler or default_scheduler()
+    _check_reachable(scheduler)
+    tracking_uri(DataFolder(local_place(data)))  # which refuses a place that cannot be tracked
     folder = open_data_folder(data)
     with (
         folder.lock(),
@@ -25,7 +32,7 @@ def run_stage(
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         flow = getattr(importlib.import_module(module), name)
-        flow(settings, str(folder.path))
+        flow(settings, folder.place)
     _tell(folder, settings)
 
 
@@ -33,9 +40,9 @@ def verify(folder: Path, sample: float, workers: int) -> None:
     """Check what lies in a data folder; nothing is written where there is none."""
     if not 0.0 <= sample <= 1.0:
         raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")
-    if not (folder / MARK).is_file():
+    if not fetch(local_place(folder) / MARK).is_file():
         raise RunError(f"{folder} is no data folder: it has no {MARK}.")
-    set_environment(folder)
+    set_environment(open_data_folder(folder).path)
     from tasks.verify import verify_folder
 
     verify_folder(folder, sample, workers)
@@ -57,7 +64,7 @@ def _workers_for(
 
     with ExitStack() as stack:
         if name not in ("collect", "hallucinate", "benchmark"):
-            tracker(str(folder.path))
+            tracker(folder.place)
         address = stack.enter_context(cluster(workers, scheduler))
         local = scheduler is None and name != "report"
         stack.enter_context(warm_up(address, vehicle) if local else nullcontext())
@@ -68,14 +75,28 @@ def _workers_for(
 
 
 def _tell(folder: DataFolder, settings: RunSettings) -> None:
-    from tasks.logbook import tracker
-
     run = folder.run(settings.run_name)
-    print(f"data     {run.path}")
-    if run.figures.exists():
-        print(f"figures  {run.figures}")
-    print(redacted(f"MLflow   mlflow ui --backend-store-uri {tracker(str(folder.path)).uri}"))
+    print(f"data     {shown(run.path)}")
+    if is_there(run.figures):
+        print(f"figures  {shown(run.figures)}")
+    uri = redacted(tracking_uri(folder))
+    print(f"MLflow   {uri}" if uri.startswith("http") else f"MLflow   mlflow ui --backend-store-uri {uri}")
+    if os.environ.get("PREFECT_API_URL"):
+        print(f"Prefect  {redacted(os.environ['PREFECT_API_URL']).removesuffix('/api')}")
+        return
     print(
         f"Prefect  PREFECT_API_DATABASE_CONNECTION_URL=sqlite+aiosqlite:///{folder.prefect / 'prefect.db'} "
         "prefect server start"
     )
+
+
+def _check_reachable(scheduler: str | None) -> None:
+    """UsageError where workers elsewhere would look for a Prefect server on their own machine."""
+    host = urlsplit(scheduler or "").hostname or "localhost"
+    if not os.environ.get("PREFECT_API_URL") and not (
+        host == "localhost" or host.startswith(("127.", "::1"))
+    ):
+        raise UsageError(
+            f"Workers of {scheduler} cannot reach a Prefect server on loopback: set PREFECT_API_URL to one "
+            "that they can (docs/runbook.md)."
+        )

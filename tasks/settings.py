@@ -169,6 +169,11 @@ def default_data() -> Path:
     return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
 
 
+def default_scheduler() -> str | None:
+    """The Dask scheduler that $MOTION_MEMORY_SCHEDULER names; None: a command has workers of its own."""
+    return os.environ.get("MOTION_MEMORY_SCHEDULER") or None
+
+
 def world_class(path: str | Path) -> str:
     """The class name of worlds or of a map: the folder's name, or the file's without its ending."""
     place = Path(path).resolve()

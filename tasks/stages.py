@@ -14,6 +14,7 @@ from typing import Any, Final
 from dashboards.cells import NOTHING
 from storage.files import read_json, write_json
 from storage.layout import RunFolder
+from storage.mirror import is_there
 from tasks.attempts import commit
 from tasks.caching import run_folder
 from tasks.settings import RunSettings
@@ -48,7 +49,7 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
 
 def stages_of(run: RunFolder) -> list[dict[str, Any]]:
     """The records of a run's stages, oldest first; a stage that was continued has several."""
-    records = read_json(run.stages) if run.stages.exists() else []
+    records = read_json(run.stages) if is_there(run.stages) else []
     return [{"fan_outs": []} | record for record in records]  # older ones do not say
 
 

@@ -16,7 +16,9 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.layout import DataFolder
+from storage.mirror import fetch, fetch_folder, files_in, uri_of
 from tasks.redaction import redacted
+from tasks.settings import UsageError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -29,8 +31,17 @@ PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
 def tracking_uri(data: DataFolder) -> str:
-    """Where MLflow is: as the user says, else a database in the data folder."""
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{data.mlflow_database}"
+    """Where MLflow is: as the user says, else a database in the data folder.
+
+    UsageError: the data folder is in object storage, where no database can be.
+    """
+    given = os.environ.get("MLFLOW_TRACKING_URI")
+    if not given and data.is_remote:
+        raise UsageError(
+            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
+            "keeps its own (docs/runbook.md)."
+        )
+    return given or f"sqlite:///{data.mlflow_database}"
 
 
 class Tracker:
@@ -124,11 +135,10 @@ class Tracker:
             self._client.log_batch(run_id, metrics=entries[first : first + 1000])
 
     def artifacts(self, run_id: str, place: Path, under: str | None = None) -> None:
-        """Log a file or a folder as artifacts."""
-        if place.is_dir():
-            self._client.log_artifacts(run_id, str(place), under)
-        elif place.exists():
-            self._client.log_artifact(run_id, str(place), under)
+        """Log a file, or the files of a folder, as artifacts."""
+        for path in [place] if place.suffix else files_in(place, "[!.]*"):
+            if fetch(path).is_file():
+                self._client.log_artifact(run_id, str(path), under)
 
     def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
         """Log an archive as the model ``name`` that the run brought forth; the id of the model."""
@@ -143,7 +153,7 @@ class Tracker:
             folder = Path(scratch) / name
             model = Model(made.artifact_location, run_id)
             model.model_id = model.model_uuid = made.model_id
-            save_memory_model(folder, archive, vehicle, model)
+            save_memory_model(folder, fetch_folder(archive), vehicle, model)
             self._client.log_model_artifacts(made.model_id, str(folder))
         self._client.finalize_logged_model(made.model_id, "READY")
         return str(made.model_id)
@@ -152,6 +162,6 @@ class Tracker:
         """Log which data went in (``context``: "training", "benchmark")."""
         from mlflow.entities import Dataset, DatasetInput, InputTag
 
-        source = f'{{"uri": "{place.as_uri()}"}}'
+        source = f'{{"uri": "{uri_of(place)}"}}'
         entry = Dataset(name, digest, "local", source)
         self._client.log_inputs(run_id, [DatasetInput(entry, [InputTag("mlflow.data.context", context)])])

@@ -12,6 +12,7 @@ from planners.world.vehicle import vehicle_named
 from storage.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
 from storage.encoders import save_encoder
 from storage.hallucinated import Labelled, read_labelled
+from storage.mirror import remove
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
 from tasks.hallucinate import hallucination_chunks, relabel_chunks
 from tasks.settings import COMBINED, RunSettings
@@ -37,7 +38,7 @@ def train_chunk(chunk: Chunk) -> dict[str, Any]:
     model = chunk.run.model(chunk.class_name, chunk.index)
     save_encoder(model, trained, vehicle_named(asked.vehicle))
     mark_done(model, chunk.key)
-    place.unlink(missing_ok=True)
+    remove(place)
     return {
         "problems": len(problems.plan_index),
         "plans": problems.plans,

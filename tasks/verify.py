@@ -32,6 +32,7 @@ from storage.hallucinators import load_hallucinator
 from storage.layout import RunFolder, Table, open_data_folder
 from storage.learned import learned_shards
 from storage.memories import load_memory
+from storage.mirror import is_there
 from storage.recalls import read_recalls
 from storage.results import read_attempts
 from tasks.attempts import PlanFaultError, check_attempt, same_outcome
@@ -53,7 +54,7 @@ Job = Callable[[], Findings]
 def verify_folder(folder: Path, sample: float, workers: int) -> None:
     """Check a whole data folder and print what was checked; RunError when something is wrong."""
     data = open_data_folder(folder)
-    jobs = [job for run in data.runs() for job in _jobs(str(folder), run, sample)]
+    jobs = [job for run in data.runs() for job in _jobs(data.place, run, sample)]
     for name, vehicle in VEHICLES.items():
         jobs += [partial(_experiences, path, vehicle) for path in learned_shards(data.learned(name))]
     if not jobs:
@@ -91,18 +92,18 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
     for name in memory_names(settings):
         shards = [path for table in COLLECTED for path in run.shards(table, name)]
         for path in (run.experiences(name), *shards):
-            if path.exists():
+            if is_there(path):
                 yield partial(_experiences, path, vehicle)
         for path in run.shards("hallucinated", name):
             yield partial(_hallucinated, run, settings, name, path)
-        if run.hallucinator(name).exists():
+        if is_there(run.hallucinator(name)):
             yield partial(_hallucinator, run, name, vehicle)
         for path in run.shards("recalls", name):
             yield partial(_recalls, path)
         for seed in range(settings.learning.seeds):
-            if run.model(name, seed).exists():
+            if is_there(run.model(name, seed)):
                 yield partial(_encoder, run.model(name, seed), vehicle)
-        if run.memory(name).exists():
+        if is_there(run.memory(name)):
             yield partial(_memory, run, name, vehicle)
         for path in run.shards("results", name):
             yield partial(_attempts, data, settings, run, name, path, sample)

@@ -17,6 +17,7 @@ from planners.world.classes import ProblemClass, problem_class
 from planners.world.problem import Obstacles, Problem
 from planners.world.vehicle import vehicle_named
 from storage.imported import read_imported, write_imported
+from storage.mirror import fetch
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Part, source_at
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
@@ -67,7 +68,7 @@ class Worlds:
         return worlds[int(rng.integers(len(worlds)))].obstacles
 
     def _worlds(self, purpose: Purpose) -> tuple[Problem, ...]:
-        path = _part(self.folder, purpose)
+        path = fetch(_part(self.folder, purpose))
         if not path.exists():
             raise RunError(f"{path} is not there; run collect with these worlds first.")
         return _problems(path, path.stat().st_mtime_ns)

@@ -35,11 +35,11 @@ class Options:
     objective
         What the encoder is trained for: labels or triplet.
     data
-        Data folder; default $MOTION_MEMORY_DATA or ./data.
+        Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
     workers
         Worker processes; default one a core.
     scheduler
-        Address of a Dask scheduler to use instead, like tcp://host:8786.
+        Address of a Dask scheduler to use instead, like tcp://host:8786; default $MOTION_MEMORY_SCHEDULER.
     strict
         Stop at a bad world instead of skipping it.
     continual

@@ -65,6 +65,8 @@ COMMANDS = (
         (["export", "nowhere", "--format", "csv", "--out", "a.csv"], 1, "nowhere is no run"),
         (["verify", "nowhere"], 1, "nowhere is no data folder"),
         (["verify", "nowhere", "--sample", "2"], 2, "Sample is 2.0"),
+        (["run", "--data", "s3://bucket/data"], 2, "s3://bucket/data can hold no MLflow database"),
+        (["run", "--scheduler", "tcp://10.0.0.5:8786"], 2, "set PREFECT_API_URL"),
         (["run", "--preset", "smoke", "--data", "/proc/nowhere"], 1, "/proc/nowhere cannot be used"),
     ],
 )

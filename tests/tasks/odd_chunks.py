@@ -76,4 +76,6 @@ def main(data: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    from storage.layout import open_data_folder
+
+    main(open_data_folder(sys.argv[1]).path)

@@ -7,9 +7,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from prefect.client.schemas.objects import State, StateType
 
+from storage.errors import StorageError, UnreachableError
+from storage.files import read_json, write_json
 from tasks import keys
-from tasks.caching import chunks_of, is_marked, mark_done
+from tasks.caching import _may_pass, chunk_task, chunks_of, is_marked, kept_result, mark_done
 from tasks.keys import key_of
 from tasks.settings import for_preset
 
@@ -66,3 +69,34 @@ def test_a_folder_is_done_only_with_its_own_key(tmp_path: Path) -> None:
     place.mkdir()
     assert is_marked(place, "key")
     assert not is_marked(place, "another")
+
+
+def test_what_a_chunk_told_is_kept_under_its_key(tmp_path: Path) -> None:
+    one, other = chunks_of(str(tmp_path / "data"), SETTINGS, "stage", "trap", 2, 1, [])
+    told = chunk_task(lambda chunk: {"solved": chunk.first}).fn(one)
+    assert told["solved"] == 0
+    assert kept_result(one) == told
+    assert kept_result(other) is None
+    write_json(one.result.with_name(other.result.name), {"solved": 5})
+    assert kept_result(other) == {"solved": 5}
+    assert read_json(one.result) == told
+
+
+def _caused_by(error: OSError) -> StorageError:
+    told = StorageError("it cannot be written")
+    told.__cause__ = error
+    return told
+
+
+@pytest.mark.parametrize(
+    ("error", "again"),
+    [
+        (UnreachableError("503"), True),
+        (OSError(5, "Input/output error"), True),
+        (_caused_by(OSError(116, "Stale file handle")), True),
+        (StorageError("it is damaged"), False),
+        (ValueError("this is no chunk"), False),
+    ],
+)
+def test_only_what_may_pass_is_tried_again(error: Exception, again: bool) -> None:
+    assert _may_pass(None, None, State(type=StateType.FAILED, data=error)) == again
