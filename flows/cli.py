@@ -13,7 +13,7 @@ from typing import Final
 
 from cyclopts import App, CycloptsError
 
-from flows.commands import maps, problems, results, stages
+from flows.commands import maps, operations, problems, results, stages
 
 FAILURE: Final = 1
 WRONG_USE: Final = 2
@@ -32,6 +32,7 @@ for command in (
     *(problems.plan, problems.optimise, problems.solve),
     *(maps.import_worlds, maps.route),
     *(results.verify, results.export, results.compare),
+    *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):
     app.command(command)
 

@@ -7,24 +7,31 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 
-from storage.layout import MARK, DataFolder, open_data_folder
+from storage.layout import MARK, DataFolder
+from tasks.hold import hold
 from tasks.local_server import LocalServer, local_server, set_environment
 from tasks.settings import RunError, RunSettings, UsageError
 
 
 def run_stage(
-    module: str, name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
+    module: str,
+    name: str,
+    settings: RunSettings,
+    data: Path,
+    workers: int,
+    scheduler: str | None,
+    **more: Any,
 ) -> None:
-    """Run the flow ``module.name``; afterwards say where everything lies."""
-    folder = open_data_folder(data)
+    """Run the flow ``module.name``, with ``more`` parameters; afterwards say where everything lies."""
     with (
-        folder.lock(),
+        hold(data) as folder,
         local_server(folder.path) as server,
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         flow = getattr(importlib.import_module(module), name)
-        flow(settings, str(folder.path))
+        flow(settings, str(folder.path), **more)
     _tell(folder, settings)
 
 
@@ -70,7 +77,7 @@ def _tell(folder: DataFolder, settings: RunSettings) -> None:
     from tasks.logbook import tracker
 
     run = folder.run(settings.run_name)
-    print(f"data     {run.path}")
+    print(f"data     {run.path if run.path.exists() else folder.path}")
     if run.figures.exists():
         print(f"figures  {run.figures}")
     print(f"MLflow   mlflow ui --backend-store-uri {tracker(str(folder.path)).uri}")
