@@ -18,6 +18,7 @@ from prefect_dask.task_runners import DaskTaskRunner
 
 from tasks.caching import AnyPiece, Piece
 from tasks.progress import progress
+from tasks.progress_artifact import progress_artifact
 from tasks.settings import RunError
 from tasks.work import WORK, note
 
@@ -132,7 +133,10 @@ def fan_out(
     began = time.time()
     results: dict[int, dict[str, Any]] = {}
     sizes = [units(chunk) for chunk in chunks]
-    with progress(description, sum(sizes)) as show:
+    with (
+        progress(description, sum(sizes)) as bar,
+        progress_artifact(description, sum(sizes), bar) as show,
+    ):
         waiting = iter(enumerate(chunks))
         pending: dict[int, Any] = {}
         done = begun = 0
