@@ -137,7 +137,7 @@ def _next_number(registry: Registry) -> int:
 
 
 def _is_judged(version: Version, champion: Version | None) -> bool:
-    """Whether all was done with a version: what it has seen is no news. One that a crash left has no verdict."""
+    """Whether all was done with a version: what it has seen is no news. A crash leaves one without verdict."""
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 
 
