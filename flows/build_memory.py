@@ -6,6 +6,7 @@ from prefect import flow
 
 from tasks.build_memory import build_one_memory, is_built, memory_chunks
 from tasks.engine import fan_out, task_runner
+from tasks.hold import holding
 from tasks.logbook import log_memories
 from tasks.recalls import is_recalled, recall_chunks, recall_problems
 from tasks.report import report_retrieval, show_retrieval
@@ -14,6 +15,7 @@ from tasks.stages import timed
 
 
 @flow(name="build-memory", task_runner=task_runner())
+@holding
 @timed
 def build_memory(settings: RunSettings, data: str) -> None:
     """Join encoder, centroids and plans into one archive a memory, and measure what it recalls."""

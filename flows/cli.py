@@ -13,7 +13,7 @@ from typing import Final
 
 from cyclopts import App, CycloptsError
 
-from flows.commands import maps, problems, results, serving, stages
+from flows.commands import maps, operations, problems, results, serving, stages
 from tasks.redaction import redacted
 
 FAILURE: Final = 1
@@ -34,6 +34,7 @@ for command in (
     *(maps.import_worlds, maps.route),
     *(results.verify, results.export, results.compare),
     *(serving.serve_memory, serving.servers),
+    *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):
     app.command(command)
 

@@ -16,12 +16,14 @@ from tasks.curate import (
     keep_experiences,
 )
 from tasks.engine import fan_out, task_runner
+from tasks.hold import holding
 from tasks.settings import RunSettings
 from tasks.stages import timed
 from tasks.worlds import read_worlds, tell_skipped, world_chunks, worlds_are_read
 
 
 @flow(name="collect", task_runner=task_runner())
+@holding
 @timed
 def collect(settings: RunSettings, data: str) -> None:
     """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""

@@ -10,11 +10,13 @@ from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.train import train
 from tasks.continual import runs_of_continual
+from tasks.hold import holding
 from tasks.logbook import run_logged
 from tasks.settings import RunSettings
 
 
 @flow(name="continual")
+@holding
 def continual(settings: RunSettings, data: str) -> None:
     """Collect, hallucinate, train, build and benchmark with a fifth, two fifths ... of the experiences."""
     for fewer in runs_of_continual(settings):

@@ -10,11 +10,13 @@ from flows.hallucinate import hallucinate
 from flows.train import train
 from tasks.engine import cluster
 from tasks.experience_curve import report_curve, runs_of_curve
+from tasks.hold import holding
 from tasks.logbook import run_logged
 from tasks.settings import RunSettings
 
 
 @flow(name="experience-curve")
+@holding
 def experience_curve(settings: RunSettings, data: str) -> None:
     """Make memories of more and more experiences, each from the first stage on, and compare their recall."""
     runs = runs_of_curve(settings)

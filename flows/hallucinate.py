@@ -11,17 +11,20 @@ from tasks.hallucinate import (
     is_hallucinated,
     relabel_chunks,
     relabel_problems,
+    tell_taken,
 )
+from tasks.hold import holding
 from tasks.learn_hallucination import is_learned, learn_hallucination, learning_chunks
 from tasks.settings import RunSettings
 from tasks.stages import timed
 
 
 @flow(name="hallucinate", task_runner=task_runner())
+@holding
 @timed
 def hallucinate(settings: RunSettings, data: str) -> None:
     """Make many problems for each plan, label them, and label them once more for the combined memory."""
     fan_out(learn_hallucination, learning_chunks(data, settings), "learn to hallucinate", is_learned)
     chunks = hallucination_chunks(data, settings)
-    fan_out(hallucinate_problems, chunks, "hallucinate", is_hallucinated)
+    tell_taken(fan_out(hallucinate_problems, chunks, "hallucinate", is_hallucinated))
     fan_out(relabel_problems, relabel_chunks(data, settings), "relabel", is_hallucinated)

@@ -12,11 +12,13 @@ from flows.hallucinate import hallucinate
 from flows.report import report
 from flows.train import train
 from tasks.engine import cluster
+from tasks.hold import holding
 from tasks.logbook import run_logged
 from tasks.settings import RunSettings
 
 
 @flow(name="run")
+@holding
 def run(settings: RunSettings, data: str) -> None:
     """Collect, hallucinate, train, build memories, benchmark; again with less experience if asked; report."""
     with cluster(), run_logged(data, settings):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from prefect import flow
 
 from tasks.engine import fan_out, task_runner
+from tasks.hold import holding
 from tasks.logbook import log_sweep
 from tasks.report import show_sweep
 from tasks.settings import RunSettings
@@ -12,6 +13,7 @@ from tasks.sweep import is_swept, sweep_chunks, sweep_variant
 
 
 @flow(name="sweep", task_runner=task_runner())
+@holding
 def sweep(settings: RunSettings, data: str) -> None:
     """Train each variant on the hallucinated problems, as children of one run, and print what came of it."""
     chunks = sweep_chunks(data, settings)

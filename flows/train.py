@@ -5,6 +5,7 @@ from __future__ import annotations
 from prefect import flow
 
 from tasks.engine import fan_out, task_runner
+from tasks.hold import holding
 from tasks.logbook import log_training
 from tasks.settings import RunSettings
 from tasks.stages import timed
@@ -12,6 +13,7 @@ from tasks.train import class_epochs, class_epochs_done, is_trained, train_chunk
 
 
 @flow(name="train", task_runner=task_runner())
+@holding
 @timed
 def train(settings: RunSettings, data: str) -> None:
     """Train one encoder for each class, and one for all of them if wanted, epoch by epoch."""

@@ -51,7 +51,11 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
 
     StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
     """
-    table = read_experience_table(path, vehicle).slice(0, count)
+    return experiences_of(read_experience_table(path, vehicle).slice(0, count), vehicle)
+
+
+def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
+    """The experiences in a table of a vehicle."""
     size = state_size(vehicle)
     return [
         Experience(
@@ -92,6 +96,13 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
     if max(rows, default=0) >= merged.num_rows:
         raise StorageError(f"{path} would need more than the {merged.num_rows} rows there are; run collect.")
     write_table(path, merged.take(pa.array(rows, pa.int64())), key)
+
+
+def copy_experiences(source: Path, path: Path, key: str) -> int:
+    """Write the experiences of a file as another; how many they are."""
+    table = read_table(source, EXPERIENCES)
+    write_table(path, table, key)
+    return int(table.num_rows)
 
 
 def replace_plans(source: Path, path: Path, first: int, plans: Sequence[Plan], key: str = "") -> None:

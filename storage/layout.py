@@ -32,7 +32,9 @@ MARK: Final = "motion-memory.json"
 HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
 
-Table = Literal["candidates", "learned", "curated", "experiences", "hallucinated", "results", "recalls"]
+Table = Literal[
+    "candidates", "learned", "curated", "experiences", "hallucinated", "results", "recalls", "judged"
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class RunFolder:
     def recalls(self) -> Path:
         """What the memories recalled: ``<class>/NNNN.parquet`` below."""
         return self.path / "recalls"
+
+    @property
+    def judged(self) -> Path:
+        """Attempts of champions and challengers at held-back problems: ``<class>/NNNN.parquet`` below."""
+        return self.path / "judged"
 
     @property
     def figures(self) -> Path:
@@ -98,6 +105,10 @@ class RunFolder:
     def memory(self, class_name: str) -> Path:
         """The folder of a class's memory."""
         return self.path / "memories" / checked_name(class_name)
+
+    def champion(self, class_name: str) -> Path:
+        """The folder of the memory that a retraining begins from and is judged against."""
+        return self.path / "champions" / checked_name(class_name)
 
     def shard(self, table: Table, class_name: str, index: int) -> Path:
         """Chunk ``index`` of a table: ``<table>/<class>/NNNN.parquet``."""

@@ -23,7 +23,7 @@ from planners.memory.experience import Experience
 from planners.world.vehicle import Vehicle
 from storage.columns import lists_of
 from storage.errors import InUseError, StorageError
-from storage.experiences import read_experience_table, write_experiences
+from storage.experiences import experiences_of, read_experience_table, write_experiences
 from storage.files import locked
 from storage.mirror import files_in, remove
 from storage.schemas import EXPERIENCES
@@ -33,6 +33,7 @@ MOST: Final = 5_000  # experiences a class: five times what a memory is chosen f
 SHARDS: Final = 16  # more are merged
 SNAPSHOTS: Final = "snapshots"
 DIGITS: Final = 8  # of a snapshot's digest
+READINGS: Final = 3  # of shards that others may merge
 
 
 def add_learned(
@@ -86,6 +87,22 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
 def snapshot_path(folder: Path, called: str) -> Path:
     """The file of a snapshot, which ``read_experiences`` reads."""
     return folder / SNAPSHOTS / f"{called}.parquet"
+
+
+def snapshot_ids(folder: Path, called: str) -> set[str]:
+    """The problems of a snapshot's experiences; none where it is not there any more."""
+    try:
+        return set(read_table(snapshot_path(folder, called), EXPERIENCES, ["id"])["id"].to_pylist())
+    except StorageError:
+        return set()
+
+
+def read_learned(folder: Path, vehicle: Vehicle) -> list[Experience]:
+    """What is learned by now, as a snapshot taken now would hold it; nothing is written."""
+    for _ in range(READINGS):
+        with suppress(StorageError):  # somebody merged the shards meanwhile
+            return experiences_of(_kept(folder, vehicle)[1], vehicle)
+    return experiences_of(_kept(folder, vehicle)[1], vehicle)
 
 
 def extract_class(snapshot: Path, class_name: str, without: Set[str], path: Path, key: str) -> int:

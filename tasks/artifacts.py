@@ -26,20 +26,43 @@ def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
         create_table_artifact,
     )
 
-    def key(name: str) -> str:
-        return re.sub(r"[^a-z0-9]+", "-", f"{run.path.name}-{name}".lower()).strip("-")
-
     told = [claim._asdict() for claim in claims]
     try:
-        create_link_artifact(uri_of(run.report), "Report", key=key("report"), description="Whole page")
-        create_markdown_artifact(read_text(run.summary("md")), key=key("summary"))
-        create_table_artifact(told, key=key("claims"), description="Claims of the paper")
+        create_link_artifact(uri_of(run.report), "Report", key=_key(run, "report"), description="Whole page")
+        create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
+        create_table_artifact(told, key=_key(run, "claims"), description="Claims of the paper")
         for figure in files_in(run.figures, "*.png"):
             if fetch(figure).stat().st_size <= MAX_IMAGE_BYTES:
-                create_image_artifact(_address(figure), key=key(figure.stem), description=figure.stem)
+                create_image_artifact(_address(figure), key=_key(run, figure.stem), description=figure.stem)
     except Exception as error:  # a report is whole without its artifacts, whatever is wrong with the server
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        print(f"Prefect has not got all artifacts of the report: {reason}", file=sys.stderr)
+        _complain("the report", error)
+
+
+def publish_judgements(run_name: str, told: Sequence[tuple[str, str, str]]) -> None:
+    """The verdict on each memory: its name, one line, the whole as Markdown."""
+    from prefect.artifacts import create_markdown_artifact, create_table_artifact
+
+    try:
+        for memory, line, markdown in told:
+            create_markdown_artifact(markdown, key=key_of(f"verdict-{memory}"), description=line)
+        table = [{"memory": memory, "verdict": line} for memory, line, _ in told]
+        create_table_artifact(table, key=key_of("verdicts"), description=run_name)
+    except Exception as error:  # the champions are who they are, whatever is wrong with the server
+        _complain("the verdicts", error)
+
+
+def key_of(name: str) -> str:
+    """A name as the key of an artifact."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+def _complain(what: str, error: Exception) -> None:
+    reason = (str(error) or type(error).__name__).splitlines()[0]
+    print(f"Prefect has not got all artifacts of {what}: {reason}", file=sys.stderr)
+
+
+def _key(run: RunFolder, name: str) -> str:
+    return key_of(f"{run.path.name}-{name}")
 
 
 def _address(picture: Path) -> str:

@@ -8,10 +8,11 @@ from typing import Any, Final
 from planners.memory.experience import Experience
 from planners.solve import solve
 from planners.world.vehicle import vehicle_named
-from storage.experiences import write_experiences
+from storage.experiences import copy_experiences, write_experiences
 from storage.shards import metadata_of, shard_is_done
 from tasks.attempts import check_attempt
 from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
+from tasks.champion_run import champion_run_of
 from tasks.settings import RunError, RunSettings
 from tasks.worlds import source_key, source_of
 
@@ -24,7 +25,16 @@ Results = Mapping[Chunk, Mapping[str, Any]]
 
 
 def collect_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Solve a range of a class's problems; write those solved, each plan checked by the authority."""
+    """Solve a range of a class's problems; write those solved, each plan checked by the authority.
+
+    What the run of a retraining's champion has from the same key is taken over.
+    """
+    place, asked = chunk.run.shard("candidates", chunk.class_name, chunk.index), chunk.last - chunk.first
+    before = champion_run_of(chunk)
+    if before is not None:
+        known = before.folder.shard("candidates", chunk.class_name, chunk.index)
+        if shard_is_done(known, chunk.key):
+            return {"solved": copy_experiences(known, place, chunk.key), "asked": asked}
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
     planner, seed = chunk.settings.collector, chunk.settings.seed
     vehicle = vehicle_named(chunk.settings.vehicle)
@@ -37,7 +47,7 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
             experiences.append(Experience(problem, attempt.plan, vehicle))
             seconds.append(attempt.planning_seconds)
     write_experiences(
-        chunk.run.shard("candidates", chunk.class_name, chunk.index),
+        place,
         experiences,
         planner=planner,
         seeds=[seed] * len(experiences),
@@ -45,7 +55,7 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
         key=chunk.key,
         vehicle=vehicle,
     )
-    return {"solved": len(experiences), "asked": chunk.last - chunk.first}
+    return {"solved": len(experiences), "asked": asked}
 
 
 collect_problems = chunk_task(collect_chunk)

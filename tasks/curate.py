@@ -20,7 +20,7 @@ from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
 from tasks.collect import Results, experiences_key
 from tasks.keys import key_of
 from tasks.settings import COMBINED, RunSettings
-from tasks.worlds import source_of
+from tasks.worlds import held_back, source_of
 
 IMPROVED_AT_ONCE: Final = 25  # plans, a second each
 CLEARANCE_WEIGHT: Final = 1.0  # buys most of a metre of clearance for half a second (docs/optimisation.md)
@@ -33,25 +33,35 @@ def curate_chunk(chunk: Chunk) -> dict[str, Any]:
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
     drawn = [each for shard in shards for each in read_experiences(shard, vehicle)]
     learned = _learned_of(chunk, vehicle)
+    rows = chosen(drawn, learned, settings)
+    shards += [run.shard("learned", name, 0)] if learned else []
+    merge_experiences(shards, run.shard("curated", name, 0), rows, chunk.key)
+    return {"candidates": min(len(drawn), settings.wanted) + len(learned), "kept": len(rows)}
+
+
+def chosen(drawn: Sequence[Experience], learned: Sequence[Experience], settings: RunSettings) -> list[int]:
+    """Which to keep of what was drawn and learned of a class, numbered in this order, the best first."""
     rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(learned)))
-    everything = drawn + learned
+    everything = [*drawn, *learned]
     candidates = [everything[row] for row in rows]
-    kept = curate(candidates, settings.taught, vehicle).tolist()
+    kept = curate(candidates, settings.taught, vehicle_named(settings.vehicle)).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
         others = sorted(set(range(len(candidates))) - set(kept))
         kept += others[: settings.experiences - len(kept)]
-    shards += [run.shard("learned", name, 0)] if learned else []
-    merge_experiences(shards, run.shard("curated", name, 0), [rows[i] for i in kept], chunk.key)
-    return {"candidates": len(candidates), "kept": len(kept)}
+    return [rows[i] for i in kept]
 
 
 def _learned_of(chunk: Chunk, vehicle: Vehicle) -> list[Experience]:
-    """What was learned of the class, as a shard of the run; problems that the run tests with stay out."""
+    """What was learned of the class, as a shard of the run; problems that the run is measured by stay out."""
     settings, name = chunk.settings, chunk.class_name
     if not settings.learned:
         return []
-    source = source_of(chunk.data, settings, name)
-    tested = {source.problem("test", i).id for i in range(source.count("test", settings.test_problems))}
+    sources = [each(chunk.data, settings, name) for each in (source_of, held_back)]
+    tested = {
+        source.problem("test", i).id
+        for source in sources
+        for i in range(source.count("test", settings.test_problems))
+    }
     snapshot = snapshot_path(open_data_folder(chunk.data).learned(settings.vehicle), settings.learned)
     shard = chunk.run.shard("learned", name, 0)
     extract_class(snapshot, name, tested, shard, chunk.key)

@@ -20,6 +20,7 @@ from prefect_dask.task_runners import DaskTaskRunner
 
 from tasks.caching import AnyPiece, Piece, kept_result
 from tasks.progress import progress
+from tasks.progress_artifact import progress_artifact
 from tasks.redaction import redacted
 from tasks.settings import RunError, default_scheduler
 from tasks.work import WORK, note
@@ -143,7 +144,10 @@ def fan_out(
     began = time.time()
     results: dict[int, dict[str, Any]] = {}
     sizes = [units(chunk) for chunk in chunks]
-    with progress(description, sum(sizes)) as show:
+    with (
+        progress(description, sum(sizes)) as bar,
+        progress_artifact(description, sum(sizes), bar) as show,
+    ):
         waiting = deque(range(len(chunks)))
         pending: dict[int, Any] = {}
         done = begun = losses = 0

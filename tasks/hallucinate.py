@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from planners.memory.experience import Experience
 from planners.memory.hallucination.mixture import LEARNED, hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
@@ -15,6 +16,7 @@ from planners.memory.labels import PlanSweeps, sweep_plans
 from planners.world.problem import Integers, Problem
 from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
+from storage.errors import StorageError
 from storage.hallucinated import (
     read_hallucinated_problems,
     read_labelled,
@@ -24,6 +26,7 @@ from storage.hallucinated import (
 from storage.hallucinators import load_hallucinator
 from storage.shards import shard_is_done
 from tasks.caching import Chunk, chunk_task, chunks_of
+from tasks.champion_run import champion_run_of
 from tasks.collect import experiences_key
 from tasks.growth import taught_experiences
 from tasks.settings import COMBINED, RunSettings
@@ -51,14 +54,15 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     weights = load_hallucinator(chunk.run.hallucinator(name), vehicle) if LEARNED in mixture else None
     problems: list[Problem] = []
     methods: list[str] = []
-    for i in range(chunk.first, chunk.last):
-        rng = generator(settings.seed, "hallucinate", name, i)
-        problems.append(experiences[i].problem)
-        methods.append(ORIGIN)
-        made = hallucinate(experiences[i], mixture, source.draw, rng, weights)
-        for problem, method in islice(made, settings.problems_per_experience - 1):
-            problems.append(problem)
-            methods.append(method)
+    taken = known_problems(chunk, experiences[chunk.first : chunk.last])
+    for experience in experiences[chunk.first : chunk.last]:
+        known = taken.get(mark_of(experience))
+        if known is None:
+            rng = generator(settings.seed, "hallucinate", name, experience.problem.id)
+            made = hallucinate(experience, mixture, source.draw, rng, weights)
+            known = [(experience.problem, ORIGIN), *islice(made, settings.problems_per_experience - 1)]
+        problems += [problem for problem, _ in known]
+        methods += [method for _, method in known]
     made_for = np.repeat(np.arange(chunk.first, chunk.last), settings.problems_per_experience)
     share = NO_PLAN_SHARE * settings.problems_per_experience
     first, last = round(share * chunk.first), round(share * chunk.last)
@@ -73,7 +77,7 @@ def hallucinate_chunk(chunk: Chunk) -> dict[str, Any]:
     methods += [DRAWN] * (last - first)
     for_none = np.full(len(problems) - len(made_for), -1)
     _write(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), methods, sweeps)
-    return {"problems": len(problems)}
+    return {"problems": len(problems), "taken": len(taken), "plans": chunk.last - chunk.first}
 
 
 hallucinate_problems = chunk_task(hallucinate_chunk)
@@ -86,26 +90,67 @@ def is_hallucinated(chunk: Chunk) -> bool:
 
 def hallucination_chunks(data: str, settings: RunSettings) -> list[Chunk]:
     """Chunks of experiences of every class."""
-    size = max(1, CHUNK_PROBLEMS // settings.problems_per_experience)
-    return [
-        chunk
-        for name in settings.class_names
-        for chunk in chunks_of(
-            data,
-            settings,
-            "hallucinate",
-            name,
-            settings.taught,
-            size,
-            [
-                settings.seed,
-                settings.problems_per_experience,
-                settings.hallucination,
-                experiences_key(data, settings, name),
-                *source_key(settings, name),
-            ],
-        )
-    ]
+    return [chunk for name in settings.class_names for chunk in _chunks(data, settings, name)]
+
+
+def _chunks(data: str, settings: RunSettings, name: str) -> list[Chunk]:
+    inputs = [*_making(settings, name), experiences_key(data, settings, name)]
+    return chunks_of(data, settings, "hallucinate", name, settings.taught, plans_at_once(settings), inputs)
+
+
+def plans_at_once(settings: RunSettings) -> int:
+    """Plans a shard."""
+    return max(1, CHUNK_PROBLEMS // settings.problems_per_experience)
+
+
+def _making(settings: RunSettings, name: str) -> list[Any]:
+    """All but experiences that problems around a plan depend on."""
+    made = [settings.seed, settings.problems_per_experience, settings.hallucination]
+    return [*made, *source_key(settings, name)]
+
+
+def mark_of(experience: Experience) -> tuple[str, bytes]:
+    """What tells an experience from all others: its problem and its plan."""
+    return experience.problem.id, experience.plan.states.tobytes() + experience.plan.controls.tobytes()
+
+
+def known_problems(
+    chunk: Chunk, experiences: Sequence[Experience]
+) -> dict[tuple[str, bytes], list[tuple[Problem, str]]]:
+    """What the run of the champion made for some of these experiences, with methods, in its order.
+
+    The same would be made again: it depends on nothing but experience, settings and code. (A network that
+    hallucinates depends on all experiences; so nothing of that is known.)
+    """
+    before, name = champion_run_of(chunk), chunk.class_name
+    if before is None or LEARNED in dict(chunk.settings.hallucination):
+        return {}
+    alike = _making(before.settings, name) == _making(chunk.settings, name)
+    if not alike or (name not in chunk.settings.classes and before.settings.wanted != chunk.settings.wanted):
+        return {}  # from a map as many problems are cut as are wanted
+    wanted = {mark_of(experience) for experience in experiences}
+    try:
+        theirs = [mark_of(each) for each in taught_experiences(before.folder, before.settings, name)]
+        shards = [part for part in _chunks(chunk.data, before.settings, name) if is_hallucinated(part)]
+    except StorageError:  # it is not whole any more
+        return {}
+    known: dict[tuple[str, bytes], list[tuple[Problem, str]]] = {}
+    for part in shards:
+        if not wanted.isdisjoint(theirs[part.first : part.last]):
+            place = part.run.shard("hallucinated", name, part.index)
+            made_for = read_labelled([place]).plan_index.tolist()
+            rows = zip(made_for, read_hallucinated_problems(place), read_methods(place), strict=True)
+            for plan, problem, method in rows:
+                if plan >= 0 and theirs[plan] in wanted:
+                    known.setdefault(theirs[plan], []).append((problem, method))
+    return known
+
+
+def tell_taken(results: Sequence[dict[str, Any]]) -> None:
+    """Say of how many plans the problems were there already, if they were of some."""
+    taken, plans = (sum(result[name] for result in results) for name in ("taken", "plans"))
+    if taken:
+        print(f"hallucinated anew for {plans - taken} of {plans} plans; the champion's run had the others'")
 
 
 def relabel_chunk(chunk: Chunk) -> dict[str, Any]:

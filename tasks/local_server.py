@@ -112,6 +112,11 @@ def local_server(data: Path) -> Iterator[LocalServer | None]:
         _leave(folder, user)
 
 
+def running_server(data: Path) -> str | None:
+    """Address of the API of the server that lives in a data folder, if one does."""
+    return _find(data / "prefect")
+
+
 def _register(folder: Path) -> tuple[LocalServer, IO[str]]:
     """Become a user of the server, one who holds a file locked; start the server where there is none."""
     (folder / "users").mkdir(parents=True, exist_ok=True)

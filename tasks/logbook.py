@@ -5,23 +5,31 @@ from __future__ import annotations
 import functools
 import math
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
-from typing import Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
 
 import pandas as pd
 
+from dashboards.headline import headline, headline_retrieval
+from dashboards.promotion import Judgement
 from storage.layout import open_data_folder
 from tasks.attempts import commit
 from tasks.benchmark import benchmark_chunks
 from tasks.build_memory import figure_names
 from tasks.caching import Chunk, run_folder
+from tasks.collect import experiences_key
+from tasks.judge import judged_key
 from tasks.keys import key_of
+from tasks.parameters import parameters_of
 from tasks.report import Report
 from tasks.settings import RunSettings
 from tasks.sweep import swept
-from tasks.tracking import Tracker
+from tasks.tracking import MEMORY_TAG, MODEL_TAG, Tracker
+
+COMPARED: Final = ("controls", "planning-times", "retrieval")  # pictures on the parent run
 
 _SHOWN = (
     "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
@@ -37,10 +45,15 @@ def tracker(data: str) -> Tracker:
 
 @contextmanager
 def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
-    """The parent run: settings as parameters, where and from which commit it was made."""
-    tags = {"commit": commit(), "host": platform.node(), "vehicle": settings.vehicle}
+    """The parent run: settings as parameters and tags, where and from which commit it was made.
+
+    What it brings forth is among its children; the figures by which runs are compared are its own, too.
+    """
+    tags = {"commit": commit(), "host": platform.node(), "learned": settings.learned}
+    tags |= {name: str(getattr(settings, name)) for name in ("vehicle", "preset", "objective", "difficulty")}
+    tags |= {"classes": ", ".join(settings.class_names)}
     with tracker(data).run(settings.run_name, "run", tags) as run_id:
-        tracker(data).parameters(run_id, asdict(settings))
+        tracker(data).parameters(run_id, parameters_of(settings))
         yield run_id
 
 
@@ -53,9 +66,8 @@ def log_training(
         with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
-            asked = {name: getattr(settings, name) for name in ("objective", "epochs", "vehicle")}
-            asked |= {"class": chunk.class_name, "seed": settings.seed + chunk.index}
-            asked |= asdict(settings.learning)
+            asked = parameters_of(settings) | {"class": chunk.class_name}
+            asked |= {"training_seed": settings.seed + chunk.index}
             log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
             log.metrics(run_id, result["epochs"], step="epoch")
             place = run.path / "hallucinated" / chunk.class_name
@@ -76,18 +88,22 @@ def log_memories(
         name = chunk.class_name
         with _child(data, settings, _stage(settings, name, result["training_seed"])) as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
-                log.memory(run_id, "memory", run.memory(name), settings.vehicle)
+                model_id = log.memory(run_id, "memory", run.memory(name), settings.vehicle)
+                log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
                 for figure in ("retrieval", *figure_names(name)):
                     log.artifacts(run_id, run.figures / f"{figure}.png", "figures")
                 log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
                 log.mark_logged(run_id, chunk.key, "memory")
+    _log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
 
 
 def log_report(data: str, settings: RunSettings, report: Report) -> None:
     """The benchmark's child run: every figure of the summary as a metric, figures and tables as artifacts."""
     log, run = tracker(data), run_folder(data, settings)
     key = key_of([chunk.key for chunk in benchmark_chunks(data, settings)])
+    _log_headline(data, settings, headline(report.summary, report.retrieval), COMPARED)
     with _child(data, settings, "benchmark") as run_id:
+        log.parameters(run_id, parameters_of(settings))
         log.artifacts(run_id, run.figures, "figures")
         for path in (run.summary("csv"), run.summary("md"), run.report):
             log.artifacts(run_id, path)
@@ -101,6 +117,62 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
         log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
         log.dataset(run_id, "attempts", run.results, key, "benchmark")
         log.mark_logged(run_id, key)
+
+
+def _log_headline(
+    data: str, settings: RunSettings, figures: Mapping[str, float], pictures: Sequence[str]
+) -> None:
+    """On the parent run, if there is one: figures, pictures and the data that it rests on."""
+    log, run = tracker(data), run_folder(data, settings)
+    parent = log.find(settings.run_name, "run")
+    if parent is None:
+        return
+    log.metrics(parent, [figures])
+    for picture in pictures:
+        log.artifacts(parent, run.figures / f"{picture}.png", "figures")
+    for name in settings.class_names:
+        key = experiences_key(data, settings, name)
+        if not log.is_logged(parent, key, f"experiences.{name}"):
+            log.dataset(parent, f"experiences-{name}", run.experiences(name), key, "experiences")
+            log.mark_logged(parent, key, f"experiences.{name}")
+
+
+def log_judgement(
+    data: str,
+    settings: RunSettings,
+    memory: str,
+    verdict: str,
+    judgement: Judgement | None,
+    markdown: str,
+    attempts: Sequence[pd.DataFrame],
+) -> None:
+    """One child run for each memory that was judged: the verdict, every figure, the attempts it rests on."""
+    log, run = tracker(data), run_folder(data, settings)
+    key = key_of(judged_key(data, settings, memory))
+    with _child(data, settings, f"judge {memory}") as run_id:
+        log.tag(run_id, {"verdict": verdict, "memory": memory})
+        if log.is_logged(run_id, key):
+            return
+        log.parameters(run_id, parameters_of(settings) | {"memory": memory})
+        if judgement is not None:
+            log.metrics(run_id, [_judgement_metrics(judgement)])
+        with TemporaryDirectory(prefix="motion-memory-") as scratch:
+            told = Path(scratch) / "verdict.md"
+            told.write_text(markdown, encoding="utf-8")
+            log.artifacts(run_id, told)
+        problems = {str(each) for side in attempts for each in side["problem_id"].unique()}
+        log.metrics(run_id, [{"problems": float(len(problems))}])
+        log.dataset(run_id, f"judged-{memory}", run.judged, key, "promotion")
+        log.mark_logged(run_id, key)
+
+
+def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
+    figures = {name: float(getattr(judgement, name)) for name in ("reduction", "low", "high")}
+    for row in judgement.columns.to_dict("records"):
+        place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
+        names = ("champion_ms", "ms", "reduction", "champion_solved", "solved", "champion_hits", "hits")
+        figures |= {f"{place}/{name}": float(row[name]) for name in names}
+    return figures
 
 
 def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:

@@ -33,6 +33,12 @@ _SETTINGS: Final = {
 }
 
 
+def set_mlflow_environment() -> None:
+    """Quiet and impatient defaults of MLflow and its password, where the user has not decided otherwise."""
+    for name, value in (_SETTINGS | auth_environment()).items():
+        os.environ.setdefault(name, value)
+
+
 def is_model_uri(place: str) -> bool:
     """Whether a place is MLflow's to find rather than a folder."""
     return URI.fullmatch(place) is not None
@@ -48,7 +54,7 @@ def memory_folder(place: str | None) -> Iterator[Path | None]:
         yield place if place is None else Path(place)
         return
     with TemporaryDirectory(prefix="motion-memory-") as scratch:
-        yield _downloaded(place, scratch)
+        yield download(place, scratch, _tracking_uri(place))
 
 
 def memory_digest(folder: Path | None) -> str:
@@ -72,13 +78,15 @@ def load_from(place: str, vehicle: Vehicle) -> Memory:
 
 def _registered(uri: str, vehicle: Vehicle) -> Memory:
     with TemporaryDirectory(prefix="motion-memory-") as scratch:  # mapped files outlive their names
-        return load_memory(_downloaded(uri, scratch), vehicle)
+        return load_memory(download(uri, scratch, _tracking_uri(uri)), vehicle)
 
 
-def _downloaded(uri: str, scratch: str) -> Path:
-    where = _tracking_uri(uri)
-    for name, value in (_SETTINGS | auth_environment()).items():
-        os.environ.setdefault(name, value)
+def download(uri: str, scratch: str, where: str) -> Path:
+    """The memory of a model in MLflow at ``where``, downloaded into a folder.
+
+    RunError: MLflow does not answer, or holds no such model.
+    """
+    set_mlflow_environment()
     from unittest.mock import patch
 
     from mlflow.artifacts import download_artifacts

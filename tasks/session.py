@@ -8,10 +8,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 from storage.layout import MARK, DataFolder, open_data_folder
 from storage.mirror import fetch, is_there, local_place, shown
+from tasks.hold import hold
 from tasks.local_server import LocalServer, local_server, set_environment
 from tasks.redaction import redacted
 from tasks.settings import RunError, RunSettings, UsageError, default_scheduler
@@ -19,20 +21,25 @@ from tasks.tracking import tracking_uri
 
 
 def run_stage(
-    module: str, name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
+    module: str,
+    name: str,
+    settings: RunSettings,
+    data: Path,
+    workers: int,
+    scheduler: str | None,
+    **more: Any,
 ) -> None:
-    """Run the flow ``module.name``; afterwards say where everything lies."""
+    """Run the flow ``module.name``, with ``more`` parameters; afterwards say where everything lies."""
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)
     tracking_uri(DataFolder(local_place(data)))  # which refuses a place that cannot be tracked
-    folder = open_data_folder(data)
     with (
-        folder.lock(),
+        hold(data) as folder,
         local_server(folder.path) as server,
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         flow = getattr(importlib.import_module(module), name)
-        flow(settings, folder.place)
+        flow(settings, folder.place, **more)
     _tell(folder, settings)
 
 
@@ -76,7 +83,7 @@ def _workers_for(
 
 def _tell(folder: DataFolder, settings: RunSettings) -> None:
     run = folder.run(settings.run_name)
-    print(f"data     {shown(run.path)}")
+    print(f"data     {shown(run.path if is_there(run.settings) else folder.path)}")
     if is_there(run.figures):
         print(f"figures  {shown(run.figures)}")
     uri = redacted(tracking_uri(folder))

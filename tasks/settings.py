@@ -13,6 +13,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 
 from planners.world.vehicle import VEHICLES
 from tasks.learning import Learning
+from tasks.retraining import Retraining
 
 Objective = Literal["labels", "triplet"]
 
@@ -72,6 +73,7 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "candidates": 0,
     "continual": "none",
     "learned": "",
+    "retraining": None,
 }
 
 
@@ -102,6 +104,7 @@ class RunSettings:
 
     learned: str = ""  # snapshot of what was learned on the job, and a digest of it; more candidates
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
+    retraining: Retraining | None = None  # what it begins from, where it is one
 
     @property
     def wanted(self) -> int:
@@ -161,6 +164,8 @@ class RunSettings:
         for name in ("classes", "worlds", "planners"):
             values[name] = tuple(values[name])
         values["learning"] = Learning(**values["learning"])
+        if values["retraining"] is not None:
+            values["retraining"] = Retraining(**values["retraining"])
         return cls(**values)
 
 

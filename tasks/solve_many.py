@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import count, islice
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from tasks.parts import Asked, Part, is_solved, parts_of, solve_telling, unfinis
 from tasks.progress import progress
 from tasks.settings import UsageError
 from tasks.solve import Assistant, Way
+
+if TYPE_CHECKING:
+    from tasks.watch import Watched
 
 FEW: Final = 2  # parts: starting a server and workers for so many takes longer than doing them here
 
@@ -56,6 +59,7 @@ def solve_many(
     Assistant(*way)  # which refuses what cannot be asked
     if learn is not None:
         open_data_folder(learn)
+    known = None if way.memory is None or way.improve_seconds else _watched(way.memory)
     began = time.monotonic()
     with memory_folder(way.memory) as memory:
         way = way._replace(memory=None if memory is None else str(memory))
@@ -73,6 +77,8 @@ def solve_many(
             join_attempts(out, [part.shard for part in parts])
             remove_folder(asked.folder)
     _tell(asked, tally, sum(part.piece.count for part in left), seconds)
+    if known is not None:
+        _watch(known, asked, tally)
 
 
 def _here(parts: Sequence[Part]) -> list[str]:
@@ -116,6 +122,29 @@ def _tally(parts: Sequence[Part]) -> Tally:
         seconds.append(np.array(rows["planning_seconds"]))
         marks.append(np.array([hash(identity) for identity in rows["problem_id"]]))
     return Tally(outcomes, np.concatenate(seconds), _repeated(parts, np.concatenate(marks)))
+
+
+def _watched(memory: str) -> Watched | None:
+    from tasks.watch import watched  # late: statistics cost a third of a second
+
+    return watched(memory)
+
+
+def _watch(known: Watched, asked: Asked, tally: Tally) -> None:
+    """Tell how useful the memory was beside its benchmark; all rows are of one planner and configuration."""
+    import pandas as pd
+
+    from dashboards.drift import Usefulness
+    from storage.configurations import configured
+    from tasks.watch import watch
+
+    way = asked.way
+    columns = attempt_columns(asked.out, ["assist", "top_k", "recall"])
+    (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
+    times = 1e3 * tally.seconds
+    now = Usefulness(len(times), tally.outcomes["recalled"], float(times.mean()), float(np.median(times)))
+    for line in watch(known, {f"{way.planner} {label}": now}, asked.learn):
+        print(f"watched  {line}")
 
 
 def _repeated(parts: Sequence[Part], marks: Floats) -> str | None:

@@ -27,6 +27,8 @@ EXPERIMENT: Final = "motion-memory"
 RUN_TAG: Final = "motion_memory.run"  # name of the run's folder
 STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
 KEY_TAG: Final = "motion_memory.key"  # what the logged content depends on
+MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was made of its encoder
+MODEL_TAG: Final = "motion_memory.model"  # and the id of that memory's model
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
@@ -89,8 +91,7 @@ class Tracker:
             own = {RUN_TAG: run_name, STAGE_TAG: stage} | ({PARENT_TAG: parent} if parent else {})
             name = run_name if stage == "run" else stage
             run_id = str(client.create_run(self._experiment, tags=own, run_name=name).info.run_id)
-        for tag, value in tags.items():
-            client.set_tag(run_id, tag, value)
+        self.tag(run_id, tags)
         try:
             yield run_id
         except BaseException:
@@ -111,6 +112,21 @@ class Tracker:
     def mark_logged(self, run_id: str, key: str, what: str = "content") -> None:
         """Note that the content is logged."""
         self._client.set_tag(run_id, f"{KEY_TAG}.{what}", key)
+
+    def tag(self, run_id: str, tags: Mapping[str, str]) -> None:
+        """Set tags of a run."""
+        for tag, value in tags.items():
+            self._client.set_tag(run_id, tag, value)
+
+    def logged_memory(self, run_name: str, memory: str, key: str) -> tuple[str, str]:
+        """Ids of the training that a memory came from, and of its model; RuntimeError: it is not logged."""
+        asked = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
+        for run in self._client.search_runs([self._experiment], filter_string=asked):
+            if run.data.tags.get(f"{KEY_TAG}.memory") == key:
+                return str(run.info.run_id), str(run.data.tags[MODEL_TAG])
+        raise RuntimeError(
+            f"Memory {memory} of {run_name} is not in MLflow at {self.uri}; run build-memory again."
+        )
 
     def parameters(self, run_id: str, values: Mapping[str, Any]) -> None:
         """Log parameters that the run does not have yet; a run's parameters never change."""

@@ -7,14 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from planners.memory.encoder import Architecture, Weights, architecture_of
 from planners.memory.training import Checkpoint, train
 from planners.world.vehicle import vehicle_named
 from storage.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
 from storage.encoders import save_encoder
 from storage.hallucinated import Labelled, read_labelled
+from storage.memories import load_memory
 from storage.mirror import remove
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
 from tasks.hallucinate import hallucination_chunks, relabel_chunks
+from tasks.retraining import champions_of
 from tasks.settings import COMBINED, RunSettings
 
 
@@ -24,7 +27,10 @@ def memory_names(settings: RunSettings) -> tuple[str, ...]:
 
 
 def train_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Train one encoder, from where it stood if it was interrupted."""
+    """Train one encoder, from where it stood if it was interrupted.
+
+    A retraining begins with the encoder of the champion, where that has the same sizes.
+    """
     asked = chunk.settings
     problems = problems_of_memory(chunk.data, asked, chunk.class_name)
     settings = asked.learning.settings(asked.objective, asked.epochs, asked.seed + chunk.index)
@@ -34,7 +40,8 @@ def train_chunk(chunk: Chunk) -> dict[str, Any]:
         save_checkpoint(place, checkpoint, chunk.key)
 
     before = load_checkpoint(place, chunk.key)
-    trained = train(problems.grids, problems.plan_index, problems.free, settings, on_epoch, before)
+    warm = _champion_weights(chunk, settings.architecture)
+    trained = train(problems.grids, problems.plan_index, problems.free, settings, on_epoch, before, warm)
     model = chunk.run.model(chunk.class_name, chunk.index)
     save_encoder(model, trained, vehicle_named(asked.vehicle))
     mark_done(model, chunk.key)
@@ -71,6 +78,7 @@ def train_chunks(data: str, settings: RunSettings) -> list[Chunk]:
                 settings.objective,
                 settings.seed,
                 asdict(settings.learning),
+                *champions_of([name], settings.retraining),
                 *(part.key for part in made if part.class_name == name),
             ],
         )
@@ -104,6 +112,14 @@ def problems_of_memory(data: str, settings: RunSettings, name: str) -> Labelled:
     return read_labelled(
         [run.shard("hallucinated", name, part.index) for part in made if part.class_name == name]
     )
+
+
+def _champion_weights(chunk: Chunk, architecture: Architecture) -> Weights | None:
+    if not champions_of([chunk.class_name], chunk.settings.retraining):
+        return None
+    place = chunk.run.champion(chunk.class_name)
+    weights = load_memory(place, vehicle_named(chunk.settings.vehicle)).weights
+    return weights if architecture_of(weights) == architecture else None
 
 
 def _checkpoint(chunk: Chunk) -> Path:

@@ -41,7 +41,7 @@ from tasks.growth import taught_experiences
 from tasks.recalls import LONGEST_ORDER
 from tasks.settings import RunError, RunSettings
 from tasks.train import memory_names
-from tasks.worlds import source_of
+from tasks.worlds import held_back, source_of
 
 LABELS_EVERY: Final = 50  # hallucinated problems whose grid and labels are drawn again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
@@ -105,7 +105,9 @@ def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
                 yield partial(_encoder, run.model(name, seed), vehicle)
         if is_there(run.memory(name)):
             yield partial(_memory, run, name, vehicle)
-        for path in run.shards("results", name):
+        if is_there(run.champion(name)):
+            yield partial(_champion, run, name, vehicle)
+        for path in [*run.shards("results", name), *run.shards("judged", name)]:
             yield partial(_attempts, data, settings, run, name, path, sample)
 
 
@@ -169,18 +171,24 @@ def _memory(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
     return Counter({"memories read": 1, "plans of memories compared with experiences": len(kept)}), wrong
 
 
+def _champion(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
+    load_memory(run.champion(name), vehicle)
+    return Counter({"champions read": 1}), []
+
+
 def _attempts(
     data: str, settings: RunSettings, run: RunFolder, name: str, path: Path, sample: float
 ) -> Findings:
     rows = _records(read_attempts(path))
-    source, vehicle = source_of(data, settings, name), vehicle_named(settings.vehicle)
+    drawn = held_back if path.is_relative_to(run.judged) else source_of
+    source, vehicle = drawn(data, settings, name), vehicle_named(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
     wrong = [
         f"{path}: a plan for {row['problem_id']} was never checked" for row in solved if not row["verified"]
     ]
     memories = {
-        name: load_memory(run.memory(name), vehicle)
-        for name in {row["memory"] for row in rows if row["memory"]}
+        (name, made): load_memory((run.memory if made == settings.run_name else run.champion)(name), vehicle)
+        for name, made in {(row["memory"], row["run_id"]) for row in rows if row["memory"]}
     }
     again = plans = 0
     for place, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
@@ -191,7 +199,7 @@ def _attempts(
             wrong.append(f"{path}: {identity} is not where it should be, {problem.id} is")
             continue
         for row in attempts:
-            memory = memories[row["memory"]] if row["memory"] else None
+            memory = memories[row["memory"], row["run_id"]] if row["memory"] else None
             attempt = solve(
                 problem,
                 row["planner"],

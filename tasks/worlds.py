@@ -21,6 +21,7 @@ from storage.mirror import fetch
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Part, source_at
 from tasks.caching import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
+from tasks.retraining import held_back_seed, number_of
 from tasks.settings import RunError, RunSettings, world_class
 
 Purpose = Literal["collect", "test"]
@@ -85,6 +86,17 @@ def source_of(data: str, settings: RunSettings, class_name: str) -> Generated | 
         vehicle = vehicle_named(settings.vehicle)
         return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
     return Worlds(run_folder(data, settings).path / "worlds" / class_name)
+
+
+def held_back(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
+    """Where the problems (``test``) come from that a retraining is judged by: no other run or retraining's.
+
+    A folder of worlds, or a map, has but the one part to test with, whoever asks.
+    """
+    source = source_of(data, settings, class_name)
+    if isinstance(source, Worlds):
+        return source
+    return replace(source, seed=held_back_seed(settings.seed, number_of(settings.retraining)))
 
 
 def source_key(settings: RunSettings, class_name: str) -> list[str | int]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from flows.commands.run_options import Options, worker_count
+
+if TYPE_CHECKING:
+    from tasks.settings import RunSettings
 
 NO_OPTIONS: Final = Options()
 
@@ -54,11 +57,11 @@ def report(options: Options = NO_OPTIONS) -> None:
     _do("report", options)
 
 
-def _do(stage: str, options: Options) -> None:
-    from tasks.session import run_stage
+def settings_of(options: Options) -> RunSettings:
+    """The settings that options ask for, but for what was learned; UsageError where there are none."""
     from tasks.settings import for_preset
 
-    settings = for_preset(
+    return for_preset(
         options.preset,
         classes=options.classes,
         worlds=[str(folder) for folder in options.worlds or []],
@@ -77,6 +80,12 @@ def _do(stage: str, options: Options) -> None:
         learning=options.learning,
         hallucination=options.hallucination,
     )
+
+
+def _do(stage: str, options: Options) -> None:
+    from tasks.session import run_stage
+
+    settings = settings_of(options)
     if options.learned is not None:
         from tasks.learned import with_learned
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.encoder import Architecture, Floats32, Weights, initial_weights
+from planners.memory.encoder import Architecture, Floats32, Weights, architecture_of, initial_weights
 from planners.memory.labels import Flags
 from planners.memory.readout import centroids_of, label_readout, nearest_readout
 from planners.memory.splits import first_of_each, split
@@ -113,12 +113,14 @@ def train(
     settings: TrainingSettings,
     on_epoch: Callable[[Checkpoint], None] | None = None,
     checkpoint: Checkpoint | None = None,
+    warm: Weights | None = None,
 ) -> TrainedEncoder:
     """Train on n problems: grids as bits uint8 ``[n, 512]``, and which of N plans are free bool ``[n, N]``.
 
     ``plan_index [n]`` is the plan that each problem was made for, -1 where it was made for none. Calls
     ``on_epoch`` after each epoch; given what that got, training goes on from there to the same end. Uses a
-    GPU where torch sees one. ValueError: not one of each for every problem, or a plan without problems.
+    GPU where torch sees one. ``warm``: the encoder begins with these weights instead of random ones.
+    ValueError: not one of each for every problem, a plan without problems, weights of another architecture.
     """
     from planners.memory.device import deterministic
     from planners.memory.learner import Learner
@@ -128,6 +130,11 @@ def train(
             f"{len(grids_packed)} grids, {len(plan_index)} plan indices and {len(labels)} label vectors: "
             "training needs one of each for every problem"
         )
+    if warm is not None and architecture_of(warm) != settings.architecture:
+        raise ValueError(
+            f"weights to begin with are of {architecture_of(warm)}, wanted was {settings.architecture}: "
+            "begin anew, or with the same sizes"
+        )
     parts = split(plan_index, labels, settings.validation_share, settings.held_out_share)
     free = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
     rows = np.where(plan_index >= 0, plan_index + 1, np.where(free[:, 0], 0, -1)).astype(np.int32)
@@ -135,6 +142,8 @@ def train(
     steps = -(-len(parts.training) // settings.batch)  # an epoch
     objective = _objective(settings, 0)
     weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
+    if warm is not None:
+        weights = {name: warm[name] for name in weights}  # in the same order, whoever kept them
     dimensions = settings.architecture.dimensions
     own = objective.initial(free.shape[1], dimensions, generator(settings.seed, "readout"))
     history = list(checkpoint.history) if checkpoint else []

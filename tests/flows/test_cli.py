@@ -17,6 +17,7 @@ COMMANDS = (
     "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
     "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
     "serve-memory", "servers",
+    "retrain", "serve", "promote", "rollback",
 )  # fmt: skip
 
 
@@ -59,6 +60,12 @@ COMMANDS = (
         (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
         (["solve", "p.jsonl", "--out", "rows.parquet"], 1, "p.jsonl does not exist"),
         (["solve", "p.jsonl", "--out", "rows.parquet", "--workers", "0"], 2, "0 workers: give 1 or more."),
+        (["retrain", "--learned", "monday"], 2, "--learned is not for retraining"),
+        (["retrain", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["serve", "--every", "9", "--cron", "0 3 * * *"], 2, "--every and --cron are given"),
+        (["serve", "--every", "0"], 2, "Every 0 seconds: give 1 or more."),
+        (["promote"], 1, "data is no data folder"),
+        (["rollback", "--data", "nowhere"], 1, "nowhere is no data folder"),
         (["export", "nowhere", "--format", "xml", "--out", "a.csv"], 2, "Unknown format 'xml'. Known: ompl,"),
         (["export", "nowhere", "--format", "csv", "--out", "a.db"], 2, "a.db does not end in .csv"),
         (["export", "nowhere", "--format", "ompl", "--out", "."], 2, ". is there already; give a new folder"),

@@ -126,9 +126,29 @@ def test_mlflow_has_one_parent_and_its_children(runs: tuple[RunFolder, RunFolder
     assert sorted(stages.values()) == sorted([*children, "run"])
     assert parents == {run: parent for run in stages if run != parent}
     assert {"loss", "hit_1", "hit_5", "trap/gust/none/mean_ms"} <= metrics
-    assert inputs == 7
+    assert inputs == 9  # what each of six trainings and the benchmark rest on, and two classes' experiences
     assert [name for name, _ in models] == ["memory"] * 3
     assert {stages[run].split()[1] for _, run in models} == {"combined", "random", "trap"}
+
+
+def test_mlflow_compares_runs_by_one_name_a_setting_and_the_same_figures(
+    runs: tuple[RunFolder, RunFolder],
+) -> None:
+    with sqlite3.connect(runs[0].path.parents[1] / "mlflow.db") as database:
+        (parent,) = database.execute("SELECT run_uuid FROM tags WHERE value = 'run'").fetchone()
+        asked = "SELECT key, value FROM {} WHERE run_uuid = ?"
+        parameters = dict(database.execute(asked.format("params"), (parent,)).fetchall())
+        figures = dict(database.execute(asked.format("latest_metrics"), (parent,)).fetchall())
+    settings = {
+        "objective": "labels",
+        "experiences": "4",
+        "hallucination": "rearrange 1",
+        "learning.seeds": "2",
+    }
+    assert settings.items() <= parameters.items()
+    wanted = {"reduction", "reduction/open-5-exhaustive", "solved/none", "fresh_hit_1", "fresh_oracle"}
+    assert wanted <= set(figures)
+    assert 0.0 <= figures["fresh_hit_1"] <= figures["fresh_oracle"] <= 1.0
 
 
 FIGURES = {

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tasks.learning import Learning
+from tasks.retraining import Champion, Retraining
 from tasks.settings import PRESETS, Assist, RunSettings, UsageError, for_preset
 
 SETTINGS = st.builds(
@@ -38,6 +39,14 @@ SETTINGS = st.builds(
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
     optimised=st.booleans(),
     learned=st.sampled_from(["", "monday-12345678"]),
+    retraining=st.none()
+    | st.builds(
+        Retraining,
+        st.integers(1, 99),
+        st.lists(
+            st.builds(Champion, st.sampled_from(["trap", "combined"]), st.just("run"), st.text("0f"))
+        ).map(tuple),
+    ),
     learning=st.builds(
         Learning,
         seeds=st.integers(1, 3),

@@ -238,3 +238,24 @@ def test_the_first_of_each_value_are_those_of_a_plain_loop(values, count):
     found = first_of_each(np.array(values, np.int32), count)
     expected = [i for i, value in enumerate(values) if value >= 0 and values[:i].count(value) < count]
     assert found.tolist() == expected
+
+
+def test_a_warm_start_begins_where_another_training_ended():
+    given = problems(2000)
+    first = train(*given, settings("labels"))
+    short = replace(settings("labels"), epochs=1)
+    cold, warm = train(*given, short), train(*given, short, warm=first.weights)
+    assert warm.history[0].hit_1 > cold.history[0].hit_1
+    still = train(*given, replace(short, learning_rate=1e-9), warm=first.weights)
+    for name, weight in first.weights.items():
+        assert np.allclose(still.weights[name], weight, atol=1e-6)
+    again = train(*given, short, warm=dict(reversed(first.weights.items())))
+    assert all((again.weights[name] == weight).all() for name, weight in warm.weights.items())
+
+
+def test_a_warm_start_from_a_network_of_another_size_is_refused():
+    bits, plan_index, labels = problems(300)
+    weights = train(bits, plan_index, labels, replace(settings("labels"), epochs=1)).weights
+    other = replace(settings("labels"), architecture=Architecture((4,), (8,), 12))
+    with pytest.raises(ValueError, match="weights to begin with are of"):
+        train(bits, plan_index, labels, other, warm=weights)

@@ -1,0 +1,40 @@
+"""Retrain: challengers from what was learned since, promoted where they are better."""
+
+from __future__ import annotations
+
+from prefect import flow
+
+from flows.build_memory import build_memory
+from flows.collect import collect
+from flows.hallucinate import hallucinate
+from flows.judge import judge
+from flows.train import train
+from tasks.engine import cluster
+from tasks.hold import hold
+from tasks.logbook import run_logged
+from tasks.news import rounds
+from tasks.registry import Registry
+from tasks.retrain import conclude
+from tasks.schedule import tell_failure
+from tasks.settings import RunSettings
+
+
+@flow(name="retrain", on_failure=[tell_failure])
+def retrain(
+    settings: RunSettings,
+    data: str,
+    approve: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> None:
+    """Make memories of what was learned since the champions, judge them, and promote what is better."""
+    with hold(data) as folder, cluster(workers, scheduler):
+        registry = Registry(folder)
+        for made in rounds(folder, settings, registry):
+            with run_logged(data, made.settings):
+                collect(made.settings, data)
+                hallucinate(made.settings, data)
+                train(made.settings, data)
+                build_memory(made.settings, data)
+                judge(made.settings, data)
+                conclude(data, made, registry, approve)

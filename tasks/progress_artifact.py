@@ -1,0 +1,42 @@
+"""How far long work has come, as an artifact of the Prefect flow that does it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Final
+
+from tasks.artifacts import key_of
+
+EVERY_SECONDS: Final = 10.0  # what is over sooner has none; an update costs a request
+
+Show = Callable[[int], Any]
+
+
+@contextmanager
+def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show]:
+    """Yields what is told how many are done, and tells ``show``; where Prefect does not answer, only that."""
+    from prefect import artifacts
+
+    made: Any = None
+    told, answers = time.monotonic(), True
+
+    def tell(done: int) -> None:
+        nonlocal made, told, answers
+        show(done)
+        if not answers or not total or time.monotonic() - told < EVERY_SECONDS:
+            return
+        told, share = time.monotonic(), 100.0 * done / total
+        try:
+            if made is None:
+                made = artifacts.create_progress_artifact(share, key_of(description), description)
+            else:
+                artifacts.update_progress_artifact(made, share)
+        except Exception:  # the work is what counts, and the bar shows it
+            answers = False
+
+    yield tell
+    if made is not None and answers:
+        told = -EVERY_SECONDS
+        tell(total)

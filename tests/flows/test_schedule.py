@@ -1,0 +1,129 @@
+"""A schedule fires again and again, retrains on what was learned in between, and ends with all it started."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+
+from dashboards.drift import Usefulness
+from storage.layout import DataFolder
+from tasks.local_server import running_server
+from tasks.registry import FIRST, PROMOTED, Registry, registered_name
+from tasks.settings import UsageError
+from tasks.watch import DRIFT, Watched, watch
+from tests.tasks.retrained import CLASS, SETTINGS, learn
+
+ROOT = Path(__file__).parents[2]
+EVERY_SECONDS = 15.0
+PATIENCE_SECONDS = 400.0  # of a busy machine; half a minute each on an idle one
+pytestmark = [
+    pytest.mark.timeout(900),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*type hint"),
+]
+
+
+def _wait(what: Callable[[], Any], process: subprocess.Popen[bytes], log: Path) -> Any:
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while not (found := what()):
+        assert process.poll() is None, log.read_text()[-3000:]
+        assert time.monotonic() < deadline, log.read_text()[-3000:]
+        time.sleep(0.5)
+    return found
+
+
+@pytest.fixture
+def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Path, Path, Any]]:
+    """A data folder whose retraining is served, the log of that, and its process."""
+    for name in [name for name in os.environ if name.startswith(("PREFECT_", "MLFLOW_"))]:
+        monkeypatch.delenv(name)
+    data, log, settings = (tmp_path / name for name in ("data", "log", "settings.json"))
+    settings.write_text(SETTINGS.to_json())
+    asked = map(str, (settings, data, EVERY_SECONDS))
+    command = [sys.executable, "-m", "tests.flows.served", *asked]
+    with log.open("wb") as sink:
+        process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=sink,
+            stderr=sink,
+            start_new_session=True,
+        )
+    try:
+        yield data, log, process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_schedule_retrains_on_what_was_learned_in_between(
+    served: tuple[Path, Path, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, log, process = served
+    registry_of = lambda: Registry(DataFolder(data))  # noqa: E731  the database may not be there yet
+    name = registered_name(CLASS, "car")
+    (first,) = _wait(lambda: _judged(registry_of(), name, 1), process, log)
+    assert first.tag("verdict") == FIRST
+    learn(str(data), seed=901, count=150)
+    two = _wait(lambda: _judged(registry_of(), name, 2), process, log)
+    assert two[1].tag("verdict") == PROMOTED, log.read_text()[-3000:]
+    assert _wait(lambda: registry_of().aliased(name).number == 2, process, log)  # type: ignore[union-attr]
+    assert "champion is version 1; " in log.read_text()
+
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(data))
+    then = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
+    known = Watched(f"{name}/2", {"gust open 5 exhaustive": then})
+    now = {"gust open 5 exhaustive": replace(then, problems=200, hits=80)}
+    assert any(DRIFT in line for line in watch(known, now, data))
+    _wait(lambda: _automated(data), process, log)
+
+    family = psutil.Process(process.pid).children(recursive=True)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 130, log.read_text()[-3000:]
+    _, alive = psutil.wait_procs(family, timeout=20)
+    assert not alive
+    assert running_server(data) is None
+
+
+def _judged(registry: Registry, name: str, count: int) -> Any:
+    found = registry.versions(name)
+    return len(found) == count and all(each.tag("verdict") for each in found) and found
+
+
+def _automated(data: Path) -> int:
+    """Retrainings that an event has started."""
+    with closing(sqlite3.connect(f"file:{data / 'prefect' / 'prefect.db'}?mode=ro", uri=True)) as database:
+        (found,) = database.execute(
+            "SELECT count(*) FROM flow_run WHERE deployment_id IS NOT NULL AND NOT auto_scheduled"
+        ).fetchone()
+    return int(found)
+
+
+@pytest.mark.parametrize(
+    ("every", "cron", "told"),
+    [
+        (60.0, "0 3 * * *", "--every and --cron are given"),
+        (0.5, None, "Every 0.5 seconds: give 1 or more"),
+        (None, "at night", "'at night' is no cron expression"),
+    ],
+)
+def test_a_schedule_that_cannot_be_is_refused_before_anything_starts(
+    every: float | None, cron: str | None, told: str, tmp_path: Path
+) -> None:
+    from tasks.schedule import serve
+
+    with pytest.raises(UsageError, match=told):
+        serve(SETTINGS, tmp_path / "data", every, cron, False, 1)
+    assert not (tmp_path / "data").exists()
