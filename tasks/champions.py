@@ -85,7 +85,7 @@ def roll_back(data: Path, memory: str | None) -> None:
 
 
 def _registry(data: Path) -> Registry:
-    folder = local_place(data)
+    folder = local_place(data).expanduser().absolute()
     if not fetch(folder / MARK).is_file():
         raise RunError(f"{data} is no data folder: it has no {MARK}.")
     return Registry(DataFolder(folder))

@@ -25,7 +25,7 @@ HEADINGS: Final = ("class", "champion", "new experiences", "plans that change", 
 
 def dry_run(data: Path, settings: RunSettings) -> None:
     """Print what there is to do. RunError: the registry cannot be reached."""
-    place = local_place(data)
+    place = local_place(data).expanduser().absolute()
     if not fetch(place / MARK).is_file():
         print(f"{data} is no data folder yet: the run {settings.run_name} would make the first champions.")
         return
