@@ -13,7 +13,7 @@ from typing import Final
 
 from cyclopts import App, CycloptsError
 
-from flows.commands import maps, problems, results, stages
+from flows.commands import dashboard, maps, problems, results, stages
 
 FAILURE: Final = 1
 WRONG_USE: Final = 2
@@ -31,7 +31,7 @@ for command in (
     *(stages.report, stages.sweep, stages.experience_curve),
     *(problems.plan, problems.optimise, problems.solve),
     *(maps.import_worlds, maps.route),
-    *(results.verify, results.export, results.compare),
+    *(results.verify, results.export, results.compare, dashboard.dashboard),
 ):
     app.command(command)
 
