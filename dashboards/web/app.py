@@ -102,7 +102,10 @@ def _tabs(run: str) -> list[tuple[str, str]]:
         "Memory": f"{base}/memory",
         "Try it": f"{base}/try",
     }
-    wherever = {"Progress": "/progress", "Compare": link("/compare", {"other": run})}
+    wherever = {
+        "Progress": link("/progress", {"run": run}),
+        "Compare": link("/compare", {"run": run, "other": run}),
+    }
     return [(name, place) for name, place in ((of_run if run else {}) | wherever).items()]
 
 

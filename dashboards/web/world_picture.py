@@ -27,9 +27,14 @@ def world(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
     start = start_state(problem, vehicle)[np.newaxis]
     x, y, heading = problem.start
     tip = 4.5 * np.array([math.cos(heading), math.sin(heading)])
+    place = {"x": x_min, "y": y_min, "width": x_max - x_min, "height": y_max - y_min}
+    inner = f"M{x_min:g} {y_min:g}H{x_max:g}V{y_max:g}H{x_min:g}Z"
+    beyond = f"M{x_min - 99:g} {y_min - 99:g}H{x_max + 99:g}V{y_max + 99:g}H{x_min - 99:g}Z{inner}"
     drawn = [
-        element("rect", x=x_min, y=y_min, width=x_max - x_min, height=y_max - y_min, class_="bounds"),
+        element("rect", **place, class_="bounds"),
         element("g", *obstacles(problem), class_="obstacles"),
+        element("path", d=beyond, class_="beyond"),
+        element("rect", **place, class_="frame"),
         element(
             "circle",
             told("goal"),
@@ -44,9 +49,9 @@ def world(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
         element("g", class_="moving"),
     ]
     turned = element("g", *drawn, transform="scale(1 -1)")
-    place = f"{x_min - _MARGIN_M:g} {-y_max - _MARGIN_M:g} {width:g} {height:g}"
+    seen = f"{x_min - _MARGIN_M:g} {-y_max - _MARGIN_M:g} {width:g} {height:g}"
     said = f"World of problem {problem.id}"
-    return element("svg", turned, viewBox=place, class_="world", role="img", aria_label=said)
+    return element("svg", turned, viewBox=seen, class_="world", role="img", aria_label=said)
 
 
 def obstacles(problem: Problem) -> list[str]:

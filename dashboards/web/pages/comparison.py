@@ -14,7 +14,7 @@ from dashboards.web.asked import Asked
 from dashboards.web.charts import Chart, Interval, intervals
 from dashboards.web.notices import WrongQuestionError
 from dashboards.web.page import Page
-from dashboards.web.pages.overview import PLANNING_TIME, panel_title
+from dashboards.web.pages.overview import PLANNING_TIME, in_percent, panel_title
 from dashboards.web.site import Site, stamp_of
 from storage.layout import RunFolder
 
@@ -29,6 +29,7 @@ def comparison(site: Site, asked: Asked) -> Page:
     names = [run.path.name for run in site.runs()]
     first, other = asked.one_of("first", names, ""), asked.one_of("other", names, "")
     options = [("", "choose"), *((name, name) for name in names)]
+    run = asked.one_of("run", names, "") or other
     values: dict[str, Any] = {
         "path": asked.path, "names": names, "verdict": "", "settings": [], "tables": [], "first": first, "other": other,
         "menus": [
@@ -38,7 +39,7 @@ def comparison(site: Site, asked: Asked) -> Page:
         "swapped": asked.also(first=other, other=first), "resamples": RESAMPLES,
     }  # fmt: skip
     if not (first and other):
-        return Page("compare.html.jinja", "Compare", "Compare", values=values)
+        return Page("compare.html.jinja", "Compare", "Compare", run, values)
     if first == other:
         raise WrongQuestionError(f"{first} is both runs; choose two.")
     one, two = site.run(first), site.run(other)
@@ -48,7 +49,7 @@ def comparison(site: Site, asked: Asked) -> Page:
             f"{other} and {first} have no attempt at the same problem in common; benchmark both with the same "
             "classes, difficulty and seed."
         )
-        return Page("compare.html.jinja", "Compare", "Compare", values=values)
+        return Page("compare.html.jinja", "Compare", "Compare", run, values)
     values |= {
         "verdict": f"{other} against {first}: {verdict(table)}.",
         "settings": _different(site.settings(one), site.settings(two)),
@@ -56,7 +57,7 @@ def comparison(site: Site, asked: Asked) -> Page:
         "resamples": resamples,
     }
     return Page(
-        "compare.html.jinja", "Compare", "Compare", values=values, charts=[_chart(table, first, other)]
+        "compare.html.jinja", "Compare", "Compare", run, values, charts=[_chart(table, first, other)]
     )
 
 
@@ -86,7 +87,7 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
         ]  # fmt: skip
         title = panel_title(str(panel), str(planner))
         axis = "less planning time than the first run, %"
-        panels.append(intervals(title, found, axis, ends, lambda value: f"{100 * value:.0f}"))
+        panels.append(intervals(title, found, axis, ends, in_percent))
     return Chart(
         "comparison",
         "How much less time the other run needs",

@@ -17,6 +17,7 @@ from dashboards.web.charts import Chart, Interval, Panel, intervals, stacks
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
 from dashboards.web.site import Site, stamp_of
+from dashboards.web.svg import short
 from storage.configurations import BASELINE
 from storage.layout import RunFolder
 from storage.results import readable_attempts
@@ -119,9 +120,9 @@ def reduction_chart(summary: pd.DataFrame, run: str, told: str) -> Chart:
             )
             for row in of_panel.to_dict("records")
         ]
-        axis = "less mean planning time than without memory, %"
+        axis = "less mean planning time, %"
         drawn.append(
-            intervals(panel_title(panel, planner), found, axis, ends, lambda value: f"{100 * value:.0f}")
+            intervals(panel_title(panel, planner), found, axis, ends, in_percent)
         )
     legend = [
         (COLOURS.get(name, "5"), "random plans" if name.startswith("random") else name)
@@ -157,7 +158,7 @@ def solved_chart(summary: pd.DataFrame, run: str) -> Chart:
         ends = (max(0.0, low), 1.0)
         drawn.append(
             intervals(
-                panel_title(panel, planner), found, "problems solved, %", ends, lambda v: f"{100 * v:.4g}"
+                panel_title(panel, planner), found, "problems solved, %", ends, in_percent
             )
         )
     return Chart(
@@ -201,6 +202,11 @@ def time_chart(site: Site, run: RunFolder) -> Chart:
     )
 
 
+def in_percent(fraction: float) -> str:
+    """A tick of a fraction, in per cent."""
+    return short(round(100.0 * fraction, 6))
+
+
 def _tables(summary: pd.DataFrame, run: str) -> list[dict[str, Any]]:
     """A table a panel: every figure of the summary that is read most."""
     tables = []
@@ -231,7 +237,10 @@ def _best(summary: pd.DataFrame) -> list[dict[str, str]]:
     best = []
     for panel, rows in summary.groupby("panel", sort=False):
         row = rows.loc[rows["mean_ms"].idxmin()]
-        said = "" if row["configuration"] == BASELINE.label else f", {_reduction(row.to_dict())} % less"
+        ends = [100.0 * row.get(f"reduction_{end}", float("nan")) for end in ("low", "high")]
+        between = f" [{ends[0]:.0f}, {ends[1]:.0f}]" if ends[0] == ends[0] else ""
+        alone = row["configuration"] == BASELINE.label
+        said = "" if alone else f": {100.0 * row['reduction']:.0f} % less{between}"
         best.append(
             {
                 "panel": "combined memory" if panel == COMBINED else str(panel),

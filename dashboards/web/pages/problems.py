@@ -17,7 +17,7 @@ from dashboards.web.site import Site
 
 ROWS: Final = 50  # a page
 HEADINGS: Final = {
-    "id": "problem", "": "planner, configuration", "ms": "ms", "ratio": "× alone", "checks": "checks",
+    "id": "problem", "ms": "ms", "ratio": "× alone", "": "planner, configuration", "checks": "checks",
     "length": "length m",
 }  # fmt: skip
 _FIRST: Final = {"slowest": ("ms", True), "hurt": ("ratio", True), "helped": ("ratio", False)}

@@ -42,6 +42,7 @@ class Made(NamedTuple):
 def progress(site: Site, asked: Asked) -> Page:
     """All runs that were measured, by time and by experience."""
     configuration = asked.text("configuration")
+    run = asked.one_of("run", [each.path.name for each in site.runs()], "")
     found, left_out = _made(site)
     labels = list(
         dict.fromkeys(label for each in found for label in each.summary["configuration"] if label != "none")
@@ -51,13 +52,13 @@ def progress(site: Site, asked: Asked) -> Page:
     if found and chosen:
         charts = [*_continual(found, chosen), *_recall(site, found), *_over_time(found, chosen)]
     values = {
-        "path": asked.path, "left_out": left_out, "count": len(found), "learned": list(_learned(site)),
+        "path": asked.path, "run": run, "left_out": left_out, "count": len(found), "learned": list(_learned(site)),
         "menu": {"name": "configuration", "title": "Configuration", "value": chosen,
                  "options": [(label, label) for label in labels]},
         "rows": [_row(each) for each in reversed(found)],
         "continual": any(chart.name == "continual" for chart in charts),
     }  # fmt: skip
-    return Page("progress.html.jinja", "Progress", "Progress", values=values, charts=charts)
+    return Page("progress.html.jinja", "Progress", "Progress", run, values, charts)
 
 
 def _default(labels: list[str]) -> str:

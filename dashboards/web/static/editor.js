@@ -52,6 +52,9 @@ const draw = (focus = false) => {
     const group = make("g", { class: `obstacle${i === chosen ? " chosen" : ""}`, "data-thing": i }, flipped);
     for (const polygon of thing) make("polygon", { points: written(polygon) }, group);
   });
+  const far = 99, inner = `M${xMin} ${yMin}H${xMax}V${yMax}H${xMin}Z`;
+  make("path", { d: `M${xMin - far} ${yMin - far}H${xMax + far}V${yMax + far}H${xMin - far}Z${inner}`, class: "beyond" }, flipped);
+  make("rect", { x: xMin, y: yMin, width: xMax - xMin, height: yMax - yMin, class: "frame" }, flipped);
   for (const answer of answers) {
     if (!answer.way.length) continue;
     const alone = answer.assist === "none";
