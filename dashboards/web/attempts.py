@@ -67,10 +67,7 @@ class Attempts:
 def ordered(rows: pd.DataFrame, sort: str, descending: bool) -> pd.DataFrame:
     """Rows sorted by one of ``SORTS``; ties in the order of the file, what is missing at the end."""
     column = {"ms": "ms", "ratio": "ratio", "checks": "collision_checks", "length": "length_m"}.get(sort)
-    if column is None:
-        key = rows["problem_id"].cat.codes.to_numpy(float)
-    else:
-        key = rows[column].to_numpy(float)
+    key = (rows["problem_id"].cat.codes if column is None else rows[column]).to_numpy(float)
     key = np.where(np.isnan(key), np.inf, -key if descending else key)
     return rows.iloc[np.argsort(key, kind="stable")]
 

@@ -163,8 +163,8 @@ def lines(
         )  # fmt: skip
         if line.dots:
             marks += [
-                element("circle", told(f"{line.label}: {short(value)} at {x_written(at)}"), cx=cx, cy=cy, r=3.5,
-                        class_=f"f{line.colour}")
+                element("circle", told(f"{line.label}: {short(value)} at {x_written(at)}"), cx=cx, cy=cy,
+                        r=3.5, class_=f"f{line.colour}")
                 for cx, cy, at, value in zip(
                     x.tolist(), y.tolist(), line.x[sound].tolist(), line.y[sound].tolist(), strict=True
                 )

@@ -1,4 +1,4 @@
-"""What pages are made of: the runs of one data folder, read as asked for and kept while files stay as they are."""
+"""What pages are made of: the runs of one data folder, read when asked for, kept while files stay so."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -83,8 +84,10 @@ class Site:
 
     def settings(self, run: RunFolder) -> dict[str, Any]:
         """What a run was asked for."""
-        found = read_json(run.settings)
-        if not isinstance(found, dict) or not isinstance(found.get("classes"), list):
+        found: dict[str, Any] = read_json(run.settings)
+        lists = ("classes", "planners", "worlds")
+        whole = isinstance(found, dict) and isinstance(found.get("experiences"), int)
+        if not (whole and all(isinstance(found.get(name), list) for name in lists)):
             raise StorageError(f"{run.settings} does not hold a run's settings; run its first stage again.")
         return found
 
@@ -111,7 +114,8 @@ class Site:
         """The attempts of a run; a NoticeError where there are none yet."""
         if not any(run.results.rglob("*.parquet")):
             raise NoticeError(
-                f"{run.path.name} has no attempts yet. Continue it with the command it was begun with, or run "
+                f"{run.path.name} has no attempts yet. Continue it with the command it was begun with, or "
+                "run "
                 "its benchmark; this page shows what is there as soon as the first rows are written.",
                 "No attempts yet",
             )
@@ -141,7 +145,7 @@ class Site:
         for part in ("test", "train"):
             path = run.worlds(class_name, part) if NAME.fullmatch(class_name) else None
             if path is not None and path.is_file():
-                worlds = self.kept(("worlds", stamp_of(path)), lambda path=path: _by_id(path))  # type: ignore[misc]
+                worlds = self.kept(("worlds", stamp_of(path)), partial(_by_id, path))
                 if identity in worlds:
                     return worlds[identity]
         raise MissingError(f"Run {run.path.name} has no problem {identity[:80]!r}.")

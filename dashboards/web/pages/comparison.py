@@ -31,13 +31,20 @@ def comparison(site: Site, asked: Asked) -> Page:
     options = [("", "choose"), *((name, name) for name in names)]
     run = asked.one_of("run", names, "") or other
     values: dict[str, Any] = {
-        "path": asked.path, "names": names, "verdict": "", "settings": [], "tables": [], "first": first, "other": other,
+        "path": asked.path,
+        "names": names,
+        "verdict": "",
+        "settings": [],
+        "tables": [],
+        "first": first,
+        "other": other,
         "menus": [
             {"name": "first", "title": "First run", "options": options, "value": first},
             {"name": "other", "title": "Other run", "options": options, "value": other},
         ],
-        "swapped": asked.also(first=other, other=first), "resamples": RESAMPLES,
-    }  # fmt: skip
+        "swapped": asked.also(first=other, other=first),
+        "resamples": RESAMPLES,
+    }
     if not (first and other):
         return Page("compare.html.jinja", "Compare", "Compare", run, values)
     if first == other:
@@ -46,7 +53,8 @@ def comparison(site: Site, asked: Asked) -> Page:
     table, resamples = _compared(site, one, two)
     if table.empty:
         values["verdict"] = (
-            f"{other} and {first} have no attempt at the same problem in common; benchmark both with the same "
+            f"{other} and {first} have no attempt at the same problem in common; benchmark both with the "
+            "same "
             "classes, difficulty and seed."
         )
         return Page("compare.html.jinja", "Compare", "Compare", run, values)
@@ -56,9 +64,7 @@ def comparison(site: Site, asked: Asked) -> Page:
         "tables": _tables(table),
         "resamples": resamples,
     }
-    return Page(
-        "compare.html.jinja", "Compare", "Compare", run, values, charts=[_chart(table, first, other)]
-    )
+    return Page("compare.html.jinja", "Compare", "Compare", run, values, charts=[_chart(table, first, other)])
 
 
 def _compared(site: Site, one: RunFolder, two: RunFolder) -> tuple[pd.DataFrame, int]:
@@ -80,7 +86,8 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
             Interval(
                 row["configuration"], row["reduction"], row["reduction_low"], row["reduction_high"],
                 _COLOURS.get(row["verdict"], "6"),
-                f"{panel_title(str(panel), str(planner))}, {row['configuration']}: {100 * row['reduction']:.0f} % less "
+                f"{panel_title(str(panel), str(planner))}, {row['configuration']}: "
+                f"{100 * row['reduction']:.0f} % less "
                 f"[{100 * row['reduction_low']:.0f}, {100 * row['reduction_high']:.0f}], {row['verdict']}",
             )
             for row in rows.to_dict("records")
@@ -91,8 +98,10 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
     return Chart(
         "comparison",
         "How much less time the other run needs",
-        f"{other} against {first}, on the problems that are in both. A planner's times are taken relative to what it "
-        "needed without memory in the same run, so a faster machine is no progress; the row “none” shows how much the "
+        f"{other} against {first}, on the problems that are in both. A planner's times are taken relative "
+        "to what it "
+        "needed without memory in the same run, so a faster machine is no progress; the row “none” shows "
+        "how much the "
         f"machines differ. Bootstrap 95 % intervals. {PLANNING_TIME}",
         panels, table, [("2", FASTER), ("1", SLOWER), ("6", "open: the interval reaches over 0")],
     )  # fmt: skip

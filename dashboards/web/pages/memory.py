@@ -59,10 +59,21 @@ def memory(site: Site, asked: Asked) -> Page:
     asked_plan = asked.number("plan", 0, len(known.plans) - 1, 0) if asked.values.get("plan") else -1
     identity = asked.text("problem")
     values: dict[str, Any] = {
-        "menu": {"name": "memory", "title": "Memory", "options": [(each, each) for each in names], "value": name},
-        "path": asked.path, "identity": identity, "known": known, "name": name,
-        "near": None, "plan": None, "helpful": None, "examples": _examples(site, run, name),
-    }  # fmt: skip
+        "menu": {
+            "name": "memory",
+            "title": "Memory",
+            "options": [(each, each) for each in names],
+            "value": name,
+        },
+        "path": asked.path,
+        "identity": identity,
+        "known": known,
+        "name": name,
+        "near": None,
+        "plan": None,
+        "helpful": None,
+        "examples": _examples(site, run, name),
+    }
     drawn = site.problem(run, asked.text("class") or name, identity) if identity else None
     charts = []
     placed = _placed(site, run, name, known)
@@ -147,9 +158,15 @@ def _map_chart(
     colours = dict(zip(coloured, _COLOURS, strict=False))
     base = {"memory": name}
     marks = [
-        Place(x, y, "cross" if of < 0 else "dot", colours.get(of, "8"), f"made for plan {of}" if of >= 0 else "for no plan")
+        Place(
+            x,
+            y,
+            "cross" if of < 0 else "dot",
+            colours.get(of, "8"),
+            f"made for plan {of}" if of >= 0 else "for no plan",
+        )
         for (x, y), of in zip(spots.tolist(), placed.plan_index.tolist(), strict=True)
-    ]  # fmt: skip
+    ]
     centroids = known.centroids
     sound = np.isfinite(centroids).all(axis=1)
     centres = at(np.where(sound[:, np.newaxis], centroids, 0.0))
@@ -165,7 +182,8 @@ def _map_chart(
     table = pd.DataFrame(spots, columns=["first_axis", "second_axis"]).assign(plan=placed.plan_index)
     note = (
         f"{len(spots):,} hallucinated problems on the two axes along which their embeddings differ most "
-        f"({100 * share:.0f} % of all variance). Dots: problems, coloured for {len(coloured)} of {count:,} plans; "
+        f"({100 * share:.0f} % of all variance). Dots: problems, coloured for {len(coloured)} of "
+        f"{count:,} plans; "
         "crosses: problems made for no plan; discs: centroids, each opens its plan; star: c_0."
         + (" Ring: the problem asked for." if embedding is not None else "")
     )
@@ -191,7 +209,8 @@ def _coverage_chart(found: Helpful) -> Chart:
         "", [line], "plans, the most useful first", "problems covered, %", y_ends=(0.0, 100.0), height=240.0
     )
     note = (
-        f"Share of {len(found.free):,} fresh problems that at least one of the first plans solves as it is. Plans in "
+        f"Share of {len(found.free):,} fresh problems that at least one of the first plans solves as it "
+        "is. Plans in "
         f"the order that covers most (greedy): {len(order)} of {found.free.shape[1]} cover what all cover, "
         f"{covered[-1] * 100:.1f} %."
     )

@@ -121,9 +121,7 @@ def reduction_chart(summary: pd.DataFrame, run: str, told: str) -> Chart:
             for row in of_panel.to_dict("records")
         ]
         axis = "less mean planning time, %"
-        drawn.append(
-            intervals(panel_title(panel, planner), found, axis, ends, in_percent)
-        )
+        drawn.append(intervals(panel_title(panel, planner), found, axis, ends, in_percent))
     legend = [
         (COLOURS.get(name, "5"), "random plans" if name.startswith("random") else name)
         for name in dict.fromkeys(
@@ -133,7 +131,8 @@ def reduction_chart(summary: pd.DataFrame, run: str, told: str) -> Chart:
     return Chart(
         "reduction",
         "How much less time planning takes with memory",
-        "Reduction of the mean planning time against the same planner without memory, paired by problem, with "
+        "Reduction of the mean planning time against the same planner without memory, paired by problem, "
+        "with "
         f"bootstrap 95 % intervals; right of the line at 0 is faster. {PLANNING_TIME} {told}",
         drawn,
         rows,
@@ -148,23 +147,24 @@ def solved_chart(summary: pd.DataFrame, run: str) -> Chart:
     for panel, planner, of_panel in panels_of(summary):
         found = [
             Interval(
-                row["configuration"], row["solved"], float("nan"), float("nan"), COLOURS.get(row["assist"], "5"),
+                row["configuration"],
+                row["solved"],
+                float("nan"),
+                float("nan"),
+                COLOURS.get(row["assist"], "5"),
                 f"{panel_title(panel, planner)}, {row['configuration']}: {percent(row['solved'])} % of "
                 f"{row['problems']} problems solved",
                 problems_address(run, panel, planner, row["configuration"], show="failed"),
             )
             for row in of_panel.to_dict("records")
-        ]  # fmt: skip
+        ]
         ends = (max(0.0, low), 1.0)
-        drawn.append(
-            intervals(
-                panel_title(panel, planner), found, "problems solved, %", ends, in_percent
-            )
-        )
+        drawn.append(intervals(panel_title(panel, planner), found, "problems solved, %", ends, in_percent))
     return Chart(
         "solved",
         "Share of the problems that were solved",
-        "Attempts end without a plan when the planner's expansions are used up; such attempts count in every time.",
+        "Attempts end without a plan when the planner's expansions are used up; such attempts count in "
+        "every time.",
         drawn,
         summary[["panel", "planner", "configuration", "problems", "solved"]],
     )

@@ -56,25 +56,38 @@ def problem(site: Site, asked: Asked) -> Page:
         (rows["problem_id"].cat.codes == rows["problem_id"].cat.categories.get_loc(row["problem_id"]))
     ]
     values: dict[str, Any] = {
-        "row": fields, "facts": _facts(fields, found), "recalled": _recalled(found), "note": _note(fields, found),
-        "layers": _layers(asked, found, show_tree, show_roads), "drive": _drive(plan, vehicle),
+        "row": fields,
+        "facts": _facts(fields, found),
+        "recalled": _recalled(found),
+        "note": _note(fields, found),
+        "layers": _layers(asked, found, show_tree, show_roads),
+        "drive": _drive(plan, vehicle),
         "before": _beside(asked, chosen.rows, place - 1, chosen.values),
         "after": _beside(asked, chosen.rows, place + 1, chosen.values) if place >= 0 else "",
-        "table": link(f"/runs/{asked.run}/problems", {**chosen.values, "page": place // 50 + 1 if place > 0 else ""}),
+        "table": link(
+            f"/runs/{asked.run}/problems", {**chosen.values, "page": place // 50 + 1 if place > 0 else ""}
+        ),
         "where": f"{place + 1:,} of {len(chosen.rows):,} in this selection" if place >= 0 else "",
         "others": _others(asked.run, same, row.name),
         "try_it": link(
             f"/runs/{asked.run}/try",
-            {"problem": row["problem_id"], "class": row["problem_class"], "planner": row["planner"],
-             "memory": fields["memory"] if isinstance(fields["memory"], str) else ""},
+            {
+                "problem": row["problem_id"],
+                "class": row["problem_class"],
+                "planner": row["planner"],
+                "memory": fields["memory"] if isinstance(fields["memory"], str) else "",
+            },
         ),
         "neighbours": link(
             f"/runs/{asked.run}/memory",
-            {"problem": row["problem_id"], "class": row["problem_class"],
-             "memory": fields["memory"] if isinstance(fields["memory"], str) else ""},
+            {
+                "problem": row["problem_id"],
+                "class": row["problem_class"],
+                "memory": fields["memory"] if isinstance(fields["memory"], str) else "",
+            },
         ),
         "faults": chosen.attempts.faults,
-    }  # fmt: skip
+    }
     return Page("problem.html.jinja", str(row["problem_id"]), "Problems", asked.run, values, charts)
 
 
@@ -143,7 +156,8 @@ def _world_chart(drawn: Problem, found: Again, vehicle: Vehicle, show_tree: bool
     if show_roads and found.roadmap is not None:
         legend = (*legend, ("road", "roadmap: strips found free"))
     note = (
-        f"Bounds {x_max - x_min:.0f} × {y_max - y_min:.0f} m; the dark box is the vehicle at its start, its line "
+        f"Bounds {x_max - x_min:.0f} × {y_max - y_min:.0f} m; the dark box is the vehicle at its start, "
+        "its line "
         "the heading; the disc is the goal. The plan is the one of the row: made again from the same seed."
     )
     return Chart(
@@ -220,7 +234,10 @@ def _note(row: dict[str, Any], found: Again) -> str:
     now = found.attempt.source if found.attempt.solved else found.attempt.status
     if then == now:
         return ""
-    return f"The row says “{then}”, made again it is “{now}”: the memory or the program is not the one that wrote it."
+    return (
+        f"The row says “{then}”, made again it is “{now}”: the memory or the program is not the one that "
+        "wrote it."
+    )
 
 
 def _recalled(found: Again) -> list[dict[str, Any]]:

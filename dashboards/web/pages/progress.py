@@ -1,4 +1,4 @@
-"""Progress: more experience, more runs: is planning getting faster, is recall getting better, what was learned."""
+"""Progress: more experience, more runs: is planning getting faster, and recall better; what was learned."""
 
 from __future__ import annotations
 
@@ -52,12 +52,20 @@ def progress(site: Site, asked: Asked) -> Page:
     if found and chosen:
         charts = [*_continual(found, chosen), *_recall(site, found), *_over_time(found, chosen)]
     values = {
-        "path": asked.path, "run": run, "left_out": left_out, "count": len(found), "learned": list(_learned(site)),
-        "menu": {"name": "configuration", "title": "Configuration", "value": chosen,
-                 "options": [(label, label) for label in labels]},
+        "path": asked.path,
+        "run": run,
+        "left_out": left_out,
+        "count": len(found),
+        "learned": list(_learned(site)),
+        "menu": {
+            "name": "configuration",
+            "title": "Configuration",
+            "value": chosen,
+            "options": [(label, label) for label in labels],
+        },
         "rows": [_row(each) for each in reversed(found)],
         "continual": any(chart.name == "continual" for chart in charts),
-    }  # fmt: skip
+    }
     return Page("progress.html.jinja", "Progress", "Progress", run, values, charts)
 
 
@@ -203,14 +211,22 @@ def _over_time(found: list[Made], configuration: str) -> Iterator[Chart]:
         low = min(0.0, max(-100.0, 100.0 * float(of_panel["reduction"].min())))
         numbers = np.arange(1, len(found) + 1, max(1, len(found) // 8), dtype=float).tolist()
         panels.append(
-            lines(str(panel), drawn, "run, the oldest first (table below)", "less planning time, %", y_ends=(low, 100.0),
-                  x_ends=(0.8, len(found) + 0.2), x_ticks=numbers)
-        )  # fmt: skip
+            lines(
+                str(panel),
+                drawn,
+                "run, the oldest first (table below)",
+                "less planning time, %",
+                y_ends=(low, 100.0),
+                x_ends=(0.8, len(found) + 0.2),
+                x_ticks=numbers,
+            )
+        )
     planners = [str(each) for each in rows["planner"].drop_duplicates()]
     yield Chart(
         "runs",
         f"Run after run: {configuration}",
-        "Reduction of the mean planning time in each run of this folder. Runs may differ in their settings and "
+        "Reduction of the mean planning time in each run of this folder. Runs may differ in their "
+        "settings and "
         f"machines: Compare shows two of them paired. {PLANNING_TIME}",
         panels, rows, [(_COLOURS[i % 8], planner_title(name)) for i, name in enumerate(planners)],
     )  # fmt: skip

@@ -56,14 +56,29 @@ def try_it(site: Site, asked: Asked) -> Page:
     values: dict[str, Any] = {
         "fields": [
             _menu("class", "Fresh world of", [(name, name) for name in CLASSES], class_name),
-            _menu("memory", "Memory", [(name, name) for name in names], asked.one_of("memory", names, default)),
-            _menu("planner", "Planner", [(name, name) for name in PLANNERS], asked.one_of("planner", tuple(PLANNERS), "gust")),
-            _menu("assist", "Use of memory", [(name, name) for name in ASSISTS], asked.one_of("assist", ASSISTS, "repair")),
+            _menu(
+                "memory", "Memory", [(name, name) for name in names], asked.one_of("memory", names, default)
+            ),
+            _menu(
+                "planner",
+                "Planner",
+                [(name, name) for name in PLANNERS],
+                asked.one_of("planner", tuple(PLANNERS), "gust"),
+            ),
+            _menu(
+                "assist",
+                "Use of memory",
+                [(name, name) for name in ASSISTS],
+                asked.one_of("assist", ASSISTS, "repair"),
+            ),
         ],
-        "world": fields_of(drawn), "start": _outline(drawn, vehicle), "names": names,
+        "world": fields_of(drawn),
+        "start": _outline(drawn, vehicle),
+        "names": names,
         "another": asked.also(problem=None, index=asked.number("index", 0, 10**9, 0) + 1),
-        "limits": {"obstacles": MOST_OBSTACLES, "corners": MOST_CORNERS}, "identity": drawn.id,
-    }  # fmt: skip
+        "limits": {"obstacles": MOST_OBSTACLES, "corners": MOST_CORNERS},
+        "identity": drawn.id,
+    }
     return Page("try_it.html.jinja", "Try it", "Try it", asked.run, values)
 
 
@@ -109,12 +124,18 @@ def plan_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
             )
             answers.append(
                 {
-                    "assist": way, "solved": attempt.solved, "ended": attempt.source or attempt.status,
-                    "ms": milliseconds, "checks": attempt.collision_checks, "nodes": attempt.nodes,
-                    "length_m": plan.length_m if plan else None, "duration_s": plan.duration_s if plan else None,
-                    "way": way_m, "bodies": np.asarray(corners).reshape(-1, 8).tolist(),
+                    "assist": way,
+                    "solved": attempt.solved,
+                    "ended": attempt.source or attempt.status,
+                    "ms": milliseconds,
+                    "checks": attempt.collision_checks,
+                    "nodes": attempt.nodes,
+                    "length_m": plan.length_m if plan else None,
+                    "duration_s": plan.duration_s if plan else None,
+                    "way": way_m,
+                    "bodies": np.asarray(corners).reshape(-1, 8).tolist(),
                 }
-            )  # fmt: skip
+            )
     return {"answers": answers}
 
 

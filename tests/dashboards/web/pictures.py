@@ -34,7 +34,8 @@ def main(data: str, run: str, other: str, out: str) -> None:
                     )
                 if name == "problem":
                     driver.execute_script(
-                        "const t = document.getElementById('time'); t.value = 90; t.dispatchEvent(new Event('input'))"
+                        "const t = document.getElementById('time'); t.value = 90; t.dispatchEvent(new "
+                        "Event('input'))"
                     )
                 driver.save_screenshot(str(Path(out) / f"dashboard-{name}-{kind}.png"))
                 print(name, kind, complaints(driver), findings(driver))

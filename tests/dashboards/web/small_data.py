@@ -54,9 +54,17 @@ def write_settings(run: RunFolder, **changes: Any) -> None:
     """What a run was asked for, and when its benchmark ran."""
     run.path.mkdir(parents=True, exist_ok=True)
     settings = {
-        "preset": "smoke", "classes": [CLASS], "worlds": [], "planners": ["rrt", "gust"], "difficulty": "standard",
-        "seed": 1, "objective": "labels", "experiences": 6, "test_problems": PROBLEMS, "vehicle": "car",
-    }  # fmt: skip
+        "preset": "smoke",
+        "classes": [CLASS],
+        "worlds": [],
+        "planners": ["rrt", "gust"],
+        "difficulty": "standard",
+        "seed": 1,
+        "objective": "labels",
+        "experiences": 6,
+        "test_problems": PROBLEMS,
+        "vehicle": "car",
+    }
     run.settings.write_text(json.dumps(settings | changes), "utf-8")
     stage = {
         "stage": "benchmark",
@@ -95,12 +103,19 @@ def _labels(memory: Memory, problem: Problem) -> Flags:
 def _write_recalls(run: RunFolder, memory: Memory, problems: Sequence[Problem]) -> None:
     rows = [
         {
-            "problem_id": problem.id, "class": CLASS, "memory": CLASS, "protocol": "fresh",
-            "order": np.arange(len(memory.plans)), "free": _labels(memory, problem), "nothing_recalled": False,
-            "recall": "centroid", "training_seed": 0, "made_for": -1,
+            "problem_id": problem.id,
+            "class": CLASS,
+            "memory": CLASS,
+            "protocol": "fresh",
+            "order": np.arange(len(memory.plans)),
+            "free": _labels(memory, problem),
+            "nothing_recalled": False,
+            "recall": "centroid",
+            "training_seed": 0,
+            "made_for": -1,
         }
         for problem in problems
-    ]  # fmt: skip
+    ]
     write_recalls(run.shard("recalls", CLASS, 0), rows, plans=len(memory.plans))
 
 

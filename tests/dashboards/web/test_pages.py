@@ -116,9 +116,12 @@ def test_a_problem_shows_each_recalled_plan_in_order(client: httpx.Client) -> No
 
 def test_live_planning_answers_with_and_without_memory(client: httpx.Client) -> None:
     world = {
-        "start": [0.0, 0.0, 0.785], "goal": [50.0, 50.0], "goal_radius": 2.0, "bounds": [-7.0, -7.0, 57.0, 57.0],
+        "start": [0.0, 0.0, 0.785],
+        "goal": [50.0, 50.0],
+        "goal_radius": 2.0,
+        "bounds": [-7.0, -7.0, 57.0, 57.0],
         "obstacles": [[[20.0, 22.0], [24.0, 22.0], [24.0, 26.0], [20.0, 26.0]]],
-    }  # fmt: skip
+    }
     answer = client.post(
         "/runs/first/plan", json={"world": world, "planner": "gust", "assist": "repair", "memory": "trap"}
     )
@@ -132,9 +135,12 @@ def test_live_planning_answers_with_and_without_memory(client: httpx.Client) -> 
 
 def test_a_world_of_ones_own_is_checked(client: httpx.Client) -> None:
     blocked = {
-        "start": [0.0, 0.0, 0.0], "goal": [50.0, 50.0], "goal_radius": 2.0, "bounds": [-7.0, -7.0, 57.0, 57.0],
+        "start": [0.0, 0.0, 0.0],
+        "goal": [50.0, 50.0],
+        "goal_radius": 2.0,
+        "bounds": [-7.0, -7.0, 57.0, 57.0],
         "obstacles": [[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]],
-    }  # fmt: skip
+    }
     answer = client.post("/runs/first/check", json=blocked)
     assert answer.status_code == 400
     assert "start footprint" in answer.json()["error"]

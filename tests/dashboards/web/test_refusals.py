@@ -14,19 +14,59 @@ from tests.dashboards.web.conftest import ClientOf
 from tests.dashboards.web.small_data import write_settings
 
 PATHS = (
-    "/runs/{}", "/runs/{}/problems", "/runs/{}/memory", "/runs/first/problems?planner={}", "/runs/first?view={}",
-    "/runs/first/problems?page={}", "/runs/first/problems?sort={}", "/runs/first/problem?problem={}",
-    "/runs/first/problem?problem=trap-standard-3-0&by={}", "/runs/first/memory?memory={}", "/runs/first/memory?plan={}",
-    "/runs/first/memory?problem={}", "/runs/first/try?class={}", "/runs/first/try?problem={}", "/runs/first/try?index={}",
-    "/compare?first={}&other=first", "/progress?configuration={}", "/static/{}", "/runs/first?as={}",
-    "/runs/first?as=svg&chart={}", "/{}",
-)  # fmt: skip
+    "/runs/{}",
+    "/runs/{}/problems",
+    "/runs/{}/memory",
+    "/runs/first/problems?planner={}",
+    "/runs/first?view={}",
+    "/runs/first/problems?page={}",
+    "/runs/first/problems?sort={}",
+    "/runs/first/problem?problem={}",
+    "/runs/first/problem?problem=trap-standard-3-0&by={}",
+    "/runs/first/memory?memory={}",
+    "/runs/first/memory?plan={}",
+    "/runs/first/memory?problem={}",
+    "/runs/first/try?class={}",
+    "/runs/first/try?problem={}",
+    "/runs/first/try?index={}",
+    "/compare?first={}&other=first",
+    "/progress?configuration={}",
+    "/static/{}",
+    "/runs/first?as={}",
+    "/runs/first?as=svg&chart={}",
+    "/{}",
+)
 WORDS = (
-    "..%2f..%2fsecret.json", "../../secret.json", "..\\..\\secret.json", "%2e%2e/%2e%2e/secret.json", "....//secret.json",
-    "%00", "a%00b", "%ff%fe", "-1", "1e309", "99999999999999999999", "NaN", "٣", "' OR 1=1 --", "<script>alert(1)</script>",
-    "{{7*7}}", "${7*7}", "A" * 5000, "%0d%0aX-Injected:%201", "file:///etc/passwd", "//etc/passwd", "/etc/passwd", ".", "..",
-    "~", "first/../../secret.json", "first%2fresults", "trap-standard-3-999999999999999", "🦊",
-)  # fmt: skip
+    "..%2f..%2fsecret.json",
+    "../../secret.json",
+    "..\\..\\secret.json",
+    "%2e%2e/%2e%2e/secret.json",
+    "....//secret.json",
+    "%00",
+    "a%00b",
+    "%ff%fe",
+    "-1",
+    "1e309",
+    "99999999999999999999",
+    "NaN",
+    "٣",
+    "' OR 1=1 --",
+    "<script>alert(1)</script>",
+    "{{7*7}}",
+    "${7*7}",
+    "A" * 5000,
+    "%0d%0aX-Injected:%201",
+    "file:///etc/passwd",
+    "//etc/passwd",
+    "/etc/passwd",
+    ".",
+    "..",
+    "~",
+    "first/../../secret.json",
+    "first%2fresults",
+    "trap-standard-3-999999999999999",
+    "🦊",
+)
 ADDRESSES = [path.format(word) for path in PATHS for word in WORDS]
 
 
@@ -90,13 +130,25 @@ WORLD = {
 @pytest.mark.parametrize(
     "content",
     [
-        [], 7, None, "x", {}, {"world": 1}, {"world": {}}, {"world": WORLD | {"obstacles": [[[0, 0]] * 3] * 301}},
-        {"world": WORLD | {"obstacles": [[[0, 0]] * 5000]}}, {"world": WORLD | {"obstacles": {"a": 1}}},
-        {"world": WORLD | {"start": ["a", 0, 0]}}, {"world": WORLD | {"bounds": [0, 0, 1e308, 1e308]}},
-        {"world": WORLD | {"goal": [1, 1]}}, {"world": WORLD | {"obstacles": [[[0, 0], [1, 1], [0, 1], [1, 0]]]}},
-        {"world": WORLD, "planner": "nobody"}, {"world": WORLD, "memory": "../trap"}, {"world": WORLD, "assist": "x"},
+        [],
+        7,
+        None,
+        "x",
+        {},
+        {"world": 1},
+        {"world": {}},
+        {"world": WORLD | {"obstacles": [[[0, 0]] * 3] * 301}},
+        {"world": WORLD | {"obstacles": [[[0, 0]] * 5000]}},
+        {"world": WORLD | {"obstacles": {"a": 1}}},
+        {"world": WORLD | {"start": ["a", 0, 0]}},
+        {"world": WORLD | {"bounds": [0, 0, 1e308, 1e308]}},
+        {"world": WORLD | {"goal": [1, 1]}},
+        {"world": WORLD | {"obstacles": [[[0, 0], [1, 1], [0, 1], [1, 0]]]}},
+        {"world": WORLD, "planner": "nobody"},
+        {"world": WORLD, "memory": "../trap"},
+        {"world": WORLD, "assist": "x"},
     ],
-)  # fmt: skip
+)
 def test_a_world_that_makes_no_sense_is_told_why(client: httpx.Client, content: object) -> None:
     answer = client.post(
         "/runs/first/plan", content=json.dumps(content), headers={"content-type": "application/json"}
