@@ -21,6 +21,7 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((LOOPBACK, port))
+        listener.listen()  # from now on a browser waits
     except OSError as error:
         raise UsageError(
             f"Port {port} cannot be used ({error.strerror}): give another --port, or 0."

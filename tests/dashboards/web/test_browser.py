@@ -21,9 +21,9 @@ from tests.dashboards.web.browser import (
     browser,
     complaints,
     findings,
-    served,
     shown_at,
 )
+from tests.dashboards.web.server import served
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
 
