@@ -6,7 +6,7 @@ import re
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -123,6 +123,15 @@ class Site:
             ("attempts", stamp_of(run.results)),
             lambda: attempts_of(*readable_attempts(run.results, COLUMNS)),
         )
+
+    def read_ahead(self, run: RunFolder) -> None:
+        """Begin to read the attempts of a run: who looks at its overview mostly goes on to them."""
+
+        def read() -> None:
+            with suppress(NoticeError, StorageError):  # told on the page that needs them
+                self.attempts(run)
+
+        threading.Thread(target=read, name="read ahead", daemon=True).start()
 
     def memory_names(self, run: RunFolder) -> list[str]:
         """The memories of a run that are there."""

@@ -62,6 +62,7 @@ def overview(site: Site, asked: Asked) -> Page:
         charts = [
             reduction_chart(summary, name, told) if view == "reduction" else solved_chart(summary, name)
         ]
+    site.read_ahead(run)
     values["tables"] = _tables(summary, name)
     values["told"] = told
     values["best"] = _best(summary)
