@@ -30,7 +30,7 @@ if (source) {
   const frame = (now) => {
     if (began === null) return;
     const step = Math.floor((SPEED * (now - began)) / 1000 / dt);
-    show(Math.min(step, bodies.length - 1));
+    show(Math.max(0, Math.min(step, bodies.length - 1))); // a frame's time may lie before the click
     if (step < bodies.length - 1) requestAnimationFrame(frame); else stop();
   };
   play.addEventListener("click", () => {
