@@ -13,7 +13,7 @@ from typing import Final
 
 from cyclopts import App, CycloptsError
 
-from flows.commands import maps, operations, problems, results, serving, stages
+from flows.commands import dashboard, maps, operations, problems, results, serving, stages
 from tasks.redaction import redacted
 
 FAILURE: Final = 1
@@ -32,7 +32,7 @@ for command in (
     *(stages.report, stages.sweep, stages.experience_curve),
     *(problems.plan, problems.optimise, problems.solve),
     *(maps.import_worlds, maps.route),
-    *(results.verify, results.export, results.compare),
+    *(results.verify, results.export, results.compare, dashboard.dashboard),
     *(serving.serve_memory, serving.servers),
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):

@@ -11,7 +11,7 @@ import pyarrow as pa
 from storage.errors import StorageError
 from storage.mirror import files_in
 from storage.schemas import ATTEMPTS
-from storage.shards import read_table, table_of, write_table, write_tables
+from storage.shards import columns_of, read_table, table_of, write_table, write_tables
 
 if TYPE_CHECKING:  # pandas takes a fifth of a second to import, and who only writes rows needs none
     import pandas as pd
@@ -62,3 +62,26 @@ def tables_below(place: Path, stage: str) -> list[Path]:
     if not paths:
         raise StorageError(f"{place} holds no rows; run {stage}.")
     return paths
+
+
+def readable_attempts(place: Path, names: Sequence[str]) -> tuple[pd.DataFrame, list[str]]:
+    """Some columns of all attempts below a folder that can be read, and a line for each file that cannot.
+
+    Texts are categories: a run of half a million rows takes tens of megabytes. A column that a file lacks is
+    missing values. StorageError: there is no file, or none can be read.
+    """
+    tables, faults = [], []
+    for path in tables_below(place, "benchmark"):
+        try:
+            tables.append(read_table(path, ATTEMPTS, [name for name in names if name in columns_of(path)]))
+        except StorageError as error:
+            faults.append(str(error))
+    if not tables:
+        raise StorageError(f"none of the files in {place} can be read; the first: {faults[0]}")
+    rows = pa.concat_tables(tables, promote_options="default")
+    for number, field in enumerate(rows.schema):
+        if pa.types.is_string(field.type):
+            column = rows.column(number).combine_chunks().dictionary_encode()
+            rows = rows.set_column(number, field.name, column)
+    frame: pd.DataFrame = rows.to_pandas()
+    return frame.reindex(columns=list(names)), faults

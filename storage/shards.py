@@ -74,6 +74,14 @@ def metadata_of(path: Path) -> dict[bytes, bytes]:
         raise _damaged(path, error) from None
 
 
+def columns_of(path: Path) -> list[str]:
+    """The columns of a Parquet file; a StorageError where it is missing or damaged."""
+    try:
+        return list(pq.read_schema(path).names)
+    except (pa.ArrowException, OSError) as error:
+        raise _damaged(path, error) from None
+
+
 def shard_is_done(path: Path, key: str) -> bool:
     """Whether a readable shard made from the same ``key`` is already there; none is fetched to find out."""
     noted = note_of(path)

@@ -1,0 +1,1 @@
+"""The dashboard: pages over a data folder, rendered on the server, every state of them an address."""

@@ -1,0 +1,1 @@
+"""One file a page: what the address asked for in, a ``Page`` out."""

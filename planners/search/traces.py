@@ -1,0 +1,53 @@
+"""What the last search of this process left in its buffers: its tree and its roadmap, to look at."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.follow import FollowSettings
+from planners.search.gust import GustSettings
+from planners.search.neighbours import Indices
+from planners.search.outcome import Limits
+from planners.search.roadmap import BLOCKED, EDGES, FREE, NODES, allocate_roadmap
+from planners.search.tree import SIZE, allocate_tree
+from planners.world.problem import Floats
+from planners.world.vehicle import Vehicle, state_size
+
+
+class Trace(NamedTuple):
+    """A tree of states."""
+
+    places: Floats  # [n, 2] metres
+    parents: Indices  # [n] -1: the root
+
+
+class Roads(NamedTuple):
+    """A roadmap."""
+
+    nodes: Floats  # [n, 2] metres
+    free: Indices  # [e, 2] ends of strips that were found free
+    unknown: Indices  # [u, 2] of strips that no search wanted to use
+
+
+def last_tree(limits: Limits, vehicle: Vehicle) -> Trace:
+    """The tree of the last search with these limits and vehicle: of its last trial, after a restart."""
+    tree = allocate_tree(limits.nodes, state_size(vehicle))
+    size = int(tree.counts[SIZE])
+    parents = tree.parents[:size].copy()
+    parents[parents >= size] = -1
+    return Trace(tree.states[:size, :2].copy(), parents)
+
+
+def last_roadmap(planner: str) -> Roads | None:
+    """The roadmap of the last search by a planner; None for one that makes none."""
+    settings = {"gust": GustSettings().roadmap, "follow": FollowSettings().gust.roadmap}.get(planner)
+    if settings is None:
+        return None
+    roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
+    nodes, edges = int(roadmap.counts[NODES]), int(roadmap.counts[EDGES])
+    ends = np.stack([roadmap.edge_to[: 2 * edges : 2], roadmap.edge_to[1 : 2 * edges : 2]], axis=1)
+    state = roadmap.edge_state[:edges]
+    unknown = ends[(state != FREE) & (state != BLOCKED)]
+    return Roads(roadmap.nodes[:nodes].copy(), ends[state == FREE].copy(), unknown.copy())

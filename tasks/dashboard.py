@@ -1,0 +1,50 @@
+"""The dashboard's server: on loopback, over one data folder, until it is interrupted."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from pathlib import Path
+
+from storage.layout import MARK, DataFolder, open_data_folder
+from tasks.settings import UsageError
+
+LOOPBACK = "127.0.0.1"
+
+
+def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
+    """Serve the pages; UsageError for a port that cannot be had or a folder that is no data folder."""
+    folder = _existing(data)
+    if not 0 <= port <= 65535:
+        raise UsageError(f"Port is {port}: give 0 (any that is free) to 65535.")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((LOOPBACK, port))
+        listener.listen()  # from now on a browser waits
+    except OSError as error:
+        raise UsageError(
+            f"Port {port} cannot be used ({error.strerror}): give another --port, or 0."
+        ) from None
+    import uvicorn  # late: with the application a second
+
+    from dashboards.web.app import dashboard_app
+
+    address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
+    config = uvicorn.Config(dashboard_app(folder), log_level="warning", access_log=False, server_header=False)
+    print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
+    if open_browser and sys.stdout.isatty():
+        import webbrowser
+
+        webbrowser.open(address)
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+def _existing(data: Path) -> DataFolder:
+    """A data folder that is there: looking at one makes none."""
+    folder = data.expanduser().absolute()
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is not there; give --data and the folder that holds your runs.")
+    if not (folder / MARK).is_file() and any(folder.iterdir()):
+        raise UsageError(f"{folder} has no {MARK}, so it is no data folder; give one that `run` has made.")
+    return open_data_folder(folder) if (folder / MARK).is_file() else DataFolder(folder)

@@ -1,0 +1,146 @@
+"""Each page answers its question from the rows that are there."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from xml.etree import ElementTree
+
+import httpx
+import pytest
+
+from dashboards.web.attempts import COLUMNS, attempts_of
+from storage.layout import DataFolder
+from storage.results import readable_attempts
+
+ADDRESSES = (
+    "/", "/runs/first", "/runs/first?view=solved", "/runs/first?view=time", "/runs/first/problems",
+    "/runs/first/problems?show=slowest&planner=rrt", "/runs/first/problems?show=hurt",
+    "/runs/first/problems?show=missed", "/runs/first/problems?show=failed",
+    "/runs/first/problem?problem=trap-standard-3-0&by=gust&how=repair+5+exhaustive&with=trap",
+    "/runs/first/problem?problem=trap-standard-3-1&by=gust&how=none&tree=1&roadmap=1",
+    "/runs/first/memory", "/runs/first/memory?memory=trap&problem=trap-standard-3-0",
+    "/runs/first/memory?memory=trap&plan=1", "/runs/first/try", "/runs/first/try?problem=trap-standard-3-0",
+    "/progress", "/compare", "/compare?first=first&other=second",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_every_page_is_whole_and_loads_nothing_from_elsewhere(client: httpx.Client, address: str) -> None:
+    answer = client.get(address)
+    assert answer.status_code == 200, answer.text[-2000:]
+    assert answer.text.rstrip().endswith("</html>")
+    loaded = re.findall(r'(?:src|<link[^>]*href)="([^"]+)"', answer.text)
+    assert loaded
+    assert all(place.startswith("/static/") for place in loaded)
+    assert "script-src 'self'" in answer.headers["content-security-policy"]
+    assert "nan" not in re.findall(r'="([^"]*nan[^"]*)"', answer.text)
+
+
+def test_every_link_of_a_page_leads_to_a_page(client: httpx.Client) -> None:
+    found = {}
+    for address in ADDRESSES:
+        for place in re.findall(r'<a [^>]*href="(/[^"]*)"', client.get(address).text):
+            if "as=" not in place:
+                found.setdefault(re.sub(r"=[^&]*", "=", place), place)  # one of each kind
+    assert len(found) > 20
+    for place in found.values():
+        assert client.get(place.replace("&amp;", "&")).status_code == 200, place
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_every_chart_has_a_title_and_a_note_and_can_be_saved(client: httpx.Client, address: str) -> None:
+    text = client.get(address).text
+    for figure in re.findall(r'<figure class="chart.*?</figure>', text, re.DOTALL):
+        assert re.search(r"<h2>.{10,}</h2>", figure)
+        assert re.search(r'<p class="note">.{20,}</p>', figure, re.DOTALL)
+        for place in re.findall(r'href="(/[^"]*chart=[^"]*)" download', figure):
+            answer = client.get(place.replace("&amp;", "&"))
+            assert answer.status_code == 200
+            assert "attachment" in answer.headers["content-disposition"]
+            if "as=svg" in place:
+                assert ElementTree.fromstring(answer.text).tag == "{http://www.w3.org/2000/svg}svg"
+            else:
+                assert len(list(csv.reader(io.StringIO(answer.text)))) > 1
+
+
+def test_a_filter_shows_what_fits_and_nothing_else(client: httpx.Client, data: DataFolder) -> None:
+    frame, _ = readable_attempts(data.run("first").results, COLUMNS)
+    for planner in ("rrt", "gust"):
+        wanted = int((frame["planner"] == planner).sum())
+        assert (
+            f"{wanted} of {len(frame)} attempts" in client.get(f"/runs/first/problems?planner={planner}").text
+        )
+
+
+def test_what_memory_hurts_is_what_took_longer_than_the_planner_alone(data: DataFolder) -> None:
+    frame, _ = readable_attempts(data.run("first").results, COLUMNS)
+    found = attempts_of(frame, ())
+    alone = {
+        (row["problem_id"], row["planner"]): row["planning_seconds"]
+        for row in frame.to_dict("records")
+        if row["assist"] == "none"
+    }
+    slower = {
+        index
+        for index, row in frame.iterrows()
+        if row["assist"] != "none" and row["planning_seconds"] > alone[row["problem_id"], row["planner"]]
+    }
+    assert set(found.chosen({}, "hurt").index) == slower
+
+
+def test_next_and_previous_walk_through_the_selection(client: httpx.Client) -> None:
+    table = client.get("/runs/first/problems?show=slowest&planner=gust").text
+    places = [each.replace("&amp;", "&") for each in re.findall(r'class="key"><a href="([^"]+)"', table)]
+    here, seen = places[0], []
+    while True:
+        text = client.get(here).text
+        seen.append(re.search(r"<h1>(.*?)</h1>", text)[1])
+        following = re.search(r'<a href="([^"]+)" rel="next"', text)
+        if following is None:
+            break
+        here = following[1].replace("&amp;", "&")
+    assert seen == re.findall(r'class="key"><a href="[^"]+">([^<]+)<', table)
+
+
+def test_a_problem_shows_each_recalled_plan_in_order(client: httpx.Client) -> None:
+    text = client.get(
+        "/runs/first/problem?problem=trap-standard-3-0&by=gust&how=repair+5+exhaustive&with=trap"
+    ).text
+    assert [int(each) for each in re.findall(r'data-order="(\d)"', text)] == list(
+        range(1, text.count("data-only=") + 1)
+    )
+    assert text.count("data-only=") >= 1
+
+
+def test_live_planning_answers_with_and_without_memory(client: httpx.Client) -> None:
+    world = {
+        "start": [0.0, 0.0, 0.785],
+        "goal": [50.0, 50.0],
+        "goal_radius": 2.0,
+        "bounds": [-7.0, -7.0, 57.0, 57.0],
+        "obstacles": [[[20.0, 22.0], [24.0, 22.0], [24.0, 26.0], [20.0, 26.0]]],
+    }
+    answer = client.post(
+        "/runs/first/plan", json={"world": world, "planner": "gust", "assist": "repair", "memory": "trap"}
+    )
+    assert answer.status_code == 200, answer.text
+    alone, with_memory = answer.json()["answers"]
+    assert (alone["assist"], with_memory["assist"]) == ("none", "repair")
+    assert alone["solved"]
+    assert alone["ms"] > 0.0
+    assert len(alone["way"]) > 10
+
+
+def test_a_world_of_ones_own_is_checked(client: httpx.Client) -> None:
+    blocked = {
+        "start": [0.0, 0.0, 0.0],
+        "goal": [50.0, 50.0],
+        "goal_radius": 2.0,
+        "bounds": [-7.0, -7.0, 57.0, 57.0],
+        "obstacles": [[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]],
+    }
+    answer = client.post("/runs/first/check", json=blocked)
+    assert answer.status_code == 400
+    assert "start footprint" in answer.json()["error"]
