@@ -86,7 +86,7 @@ def test_a_run_and_what_it_leaves(place: Path) -> None:
     failing = watch(["benchmark", *TINY, "--seed", "1", "--data", str(data)], place / "failed.log", PLANTED)
     assert SECRET not in failing.output
     unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
-    failed = watch(["train", *TINY, "--epochs", "2", "--data", str(data)], place / "mlflow.log", unreached)
+    failed = watch(["report", *TINY, "--data", str(data)], place / "mlflow.log", unreached)
     assert failed.code == 1
     assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
     assert SECRET not in failed.output
@@ -160,7 +160,10 @@ def assert_nowhere_in(folder: Path) -> None:
     files = [file for file in folder.rglob("*") if file.is_file()]
     assert files
     for file in files:
-        assert SECRET.encode() not in file.read_bytes(), file
+        try:
+            assert SECRET.encode() not in file.read_bytes(), file
+        except FileNotFoundError:  # a database's journal, by now a part of it
+            continue
         if file.suffix == ".parquet":
             table = pq.read_table(file)
             assert SECRET not in repr((table.schema.metadata, table.to_pylist())), file
