@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
 from scipy.stats import fisher_exact
 
@@ -89,5 +90,5 @@ def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Useful
 
 
 def _fewer(now: Usefulness, then: Usefulness) -> float:
-    table = [[each.hits, each.problems - each.hits] for each in (now, then)]
+    table = np.array([[each.hits, each.problems - each.hits] for each in (now, then)])
     return float(fisher_exact(table, alternative="less").pvalue)

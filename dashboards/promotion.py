@@ -152,7 +152,7 @@ def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
     for verdict, said in ((SLOWER, "slower"), (FEWER, "solves fewer")):
         named = columns[columns["verdict"] == verdict]
         if len(named):
-            worst = named.loc[named["reduction"].idxmin()]
+            worst = named.iloc[int(named["reduction"].argmin())]
             more = f" and {len(named) - 1} more" if len(named) > 1 else ""
             found.append(f"{said} with {worst['planner']} {worst['configuration']} on {worst['panel']}{more}")
     mine, theirs = (

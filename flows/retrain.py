@@ -19,7 +19,7 @@ from tasks.schedule import tell_failure
 from tasks.settings import RunSettings
 
 
-@flow(name="retrain", on_failure=[tell_failure])
+@flow(name="retrain", on_failure=[tell_failure])  # type: ignore[list-item]  # meant for methods
 def retrain(
     settings: RunSettings,
     data: str,

@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar, cast
 
 from storage.layout import DataFolder, open_data_folder
 from tasks.settings import RunSettings
@@ -44,4 +44,4 @@ def holding(flow: Flow[Rest, Result]) -> Flow[Rest, Result]:
         with hold(data):
             return flow(settings, data, *rest, **named)
 
-    return wrapped
+    return cast("Flow[Rest, Result]", wrapped)

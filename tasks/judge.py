@@ -25,10 +25,10 @@ from tasks.benchmark import memories_of
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
 from tasks.collect import experiences_key
+from tasks.compile_assists import compile_assists
 from tasks.retraining import champions_of, number_of
 from tasks.settings import Assist, RunSettings
 from tasks.timing import no_garbage_collection
-from tasks.warm_up import compile_assists
 from tasks.worlds import held_back, source_key
 
 CHUNK_PROBLEMS: Final = 100

@@ -66,7 +66,7 @@ def log_training(
         with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
-            asked = parameters_of(settings) | {"class": chunk.class_name}
+            asked: dict[str, Any] = parameters_of(settings) | {"class": chunk.class_name}
             asked |= {"training_seed": settings.seed + chunk.index}
             log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
             log.metrics(run_id, result["epochs"], step="epoch")

@@ -100,17 +100,19 @@ def _server(folders: Sequence[Path | None]) -> str | None:
 
 def _send(url: str, found: Sequence[Drift]) -> None:
     from prefect.artifacts import create_markdown_artifact
-    from prefect.events import Event
+    from prefect.events import Event, Resource
     from prefect.events.clients import PrefectEventsClient
     from prefect.settings import PREFECT_API_URL, temporary_settings
 
     from tasks.artifacts import key_of
 
     def event(name: str, drift: Drift) -> Any:
-        resource = {
-            "prefect.resource.id": f"motion-memory.memory.{drift.memory}",
-            "prefect.resource.name": drift.memory,
-        }
+        resource = Resource(
+            {
+                "prefect.resource.id": f"motion-memory.memory.{drift.memory}",
+                "prefect.resource.name": drift.memory,
+            }
+        )
         return Event(event=name, resource=resource, payload=drift.to_json())
 
     async def send() -> None:

@@ -68,13 +68,13 @@ def comparison(site: Site, asked: Asked) -> Page:
 
 
 def _compared(site: Site, one: RunFolder, two: RunFolder) -> tuple[pd.DataFrame, int]:
-    rows = [
+    first, other = (
         site.attempts(run).rows.astype({"problem_id": object, "assist": object, "recall": object})
         for run in (one, two)
-    ]
-    resamples = RESAMPLES_OF_MANY if sum(map(len, rows)) > MANY_ROWS else RESAMPLES
+    )
+    resamples = RESAMPLES_OF_MANY if len(first) + len(other) > MANY_ROWS else RESAMPLES
     key = ("compare", stamp_of(one.results), stamp_of(two.results))
-    return site.kept(key, lambda: compare_runs(*rows, resamples=resamples)), resamples
+    return site.kept(key, lambda: compare_runs(first, other, resamples=resamples)), resamples
 
 
 def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:

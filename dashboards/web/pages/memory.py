@@ -168,17 +168,19 @@ def _map_chart(
         for (x, y), of in zip(spots.tolist(), placed.plan_index.tolist(), strict=True)
     ]
     centroids = known.centroids
-    sound = np.isfinite(centroids).all(axis=1)
+    sound = np.asarray(np.isfinite(centroids).all(axis=1))
     centres = at(np.where(sound[:, np.newaxis], centroids, 0.0))
     for i in np.flatnonzero(sound[1:]).tolist():
         if i in colours or count <= 150:
-            x, y = centres[i + 1].tolist()
+            x, y = (float(each) for each in centres[i + 1])
             address = link(f"/runs/{run.path.name}/memory", {**base, "plan": i})
             marks.append(Place(x, y, "disc", colours.get(i, "6"), f"plan {i}: centroid", address))
     if sound[0]:
-        marks.append(Place(*centres[0].tolist(), "star", "6", "c_0: problems that no plan solves"))
+        x, y = (float(each) for each in centres[0])
+        marks.append(Place(x, y, "star", "6", "c_0: problems that no plan solves"))
     if embedding is not None:
-        marks.append(Place(*at(embedding[np.newaxis])[0].tolist(), "here", "1", "the problem asked for"))
+        x, y = (float(each) for each in at(embedding[np.newaxis])[0])
+        marks.append(Place(x, y, "here", "1", "the problem asked for"))
     table = pd.DataFrame(spots, columns=["first_axis", "second_axis"]).assign(plan=placed.plan_index)
     note = (
         f"{len(spots):,} hallucinated problems on the two axes along which their embeddings differ most "

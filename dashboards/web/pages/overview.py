@@ -237,7 +237,7 @@ def _best(summary: pd.DataFrame) -> list[dict[str, str]]:
     """Of each panel, the configuration with the lowest mean time."""
     best = []
     for panel, rows in summary.groupby("panel", sort=False):
-        row = rows.loc[rows["mean_ms"].idxmin()]
+        row = rows.iloc[int(rows["mean_ms"].argmin())]
         ends = [100.0 * row.get(f"reduction_{end}", float("nan")) for end in ("low", "high")]
         between = f" [{ends[0]:.0f}, {ends[1]:.0f}]" if ends[0] == ends[0] else ""
         alone = row["configuration"] == BASELINE.label

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from dashboards.web.site import Site
 from dashboards.web.world_picture import found_plan, recalled_plan, roadmap, tree, world
 from planners.search.outcome import Limits
 from planners.world.bodies import footprints
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Floats, Plan, Problem
 from planners.world.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_names
 from storage.layout import RunFolder
 
@@ -119,7 +120,7 @@ def _place(rows: pd.DataFrame, index: Any, likely: int) -> int:
     return int(found[0]) if len(found) else -1
 
 
-def _again(site: Site, run: RunFolder, row: dict[str, Any], how: Any) -> tuple[Again, Problem]:
+def _again(site: Site, run: RunFolder, row: Mapping[Any, Any], how: Any) -> tuple[Again, Problem]:
     drawn = site.problem(run, str(row["problem_class"]), str(row["problem_id"]))
     memory = site.memory(run, row["memory"]) if isinstance(row["memory"], str) else None
     vehicle, seed = site.vehicle(run), int(row["seed"]) if row["seed"] == row["seed"] else 0
@@ -171,11 +172,11 @@ def _world_chart(drawn: Problem, found: Again, vehicle: Vehicle, show_tree: bool
 
 
 def _drive_chart(plan: Plan, vehicle: Vehicle) -> Chart:
-    times = plan.dt * np.arange(len(plan.states))
+    times: Floats = plan.dt * np.arange(len(plan.states), dtype=float)
     names = state_names(vehicle)
     speed = Line("speed", times, plan.states[:, 3], "0")
     turning = plan.states[:, 4]
-    degrees = np.degrees(turning)
+    degrees: Floats = np.degrees(turning)
     title, axis = (
         ("Turn rate", "turn rate, °/s")
         if isinstance(vehicle, DifferentialDrive)
@@ -187,7 +188,7 @@ def _drive_chart(plan: Plan, vehicle: Vehicle) -> Chart:
     ]
     if isinstance(vehicle, CarWithTrailers):
         hitches = [
-            Line(f"hitch {i + 1}", times, np.degrees(plan.states[:, 5 + i]), "025"[i % 3])
+            Line(f"hitch {i + 1}", times, np.asarray(np.degrees(plan.states[:, 5 + i]), float), "025"[i % 3])
             for i in range(len(vehicle.hitch_lengths))
         ]
         panels.append(lines("Hitch angles", hitches, "time, s", "hitch angle, °", height=190.0, name="hitch"))
@@ -212,7 +213,7 @@ def _drive(plan: Plan | None, vehicle: Vehicle) -> dict[str, Any]:
     return {"dt": plan.dt, "bodies": corners.reshape(len(plan.states), -1, 8).tolist()}
 
 
-def _facts(row: dict[str, Any], found: Again) -> list[tuple[str, str]]:
+def _facts(row: Mapping[Any, Any], found: Again) -> list[tuple[str, str]]:
     ended = f"solved, {row['source']}" if row["solved"] else f"not solved: {row['status']}"
     beside = f" ({row['ratio']:.2f} × the planner alone)" if row["ratio"] == row["ratio"] else ""
     memory = row["memory"] if isinstance(row["memory"], str) else "none"
@@ -228,7 +229,7 @@ def _facts(row: dict[str, Any], found: Again) -> list[tuple[str, str]]:
     ]
 
 
-def _note(row: dict[str, Any], found: Again) -> str:
+def _note(row: Mapping[Any, Any], found: Again) -> str:
     """What differs from the row, if anything does."""
     then = row["source"] if row["solved"] else row["status"]
     now = found.attempt.source if found.attempt.solved else found.attempt.status

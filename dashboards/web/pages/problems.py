@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -103,7 +104,7 @@ def fields(attempts: Attempts, asked: Asked) -> list[dict[str, Any]]:
     ]
 
 
-def problem_address(run: str, row: dict[str, Any], values: dict[str, str], place: int) -> str:
+def problem_address(run: str, row: Mapping[Any, Any], values: dict[str, str], place: int) -> str:
     """The page of one attempt, which knows the selection it was found in."""
     of_row = {
         "problem": row["problem_id"], "by": row["planner"], "how": row["configuration"],
@@ -117,7 +118,7 @@ def number(value: float, decimals: int) -> str:
     return NOTHING if value is None or not np.isfinite(value) else f"{value:,.{decimals}f}"
 
 
-def _line(row: dict[str, Any], address: str) -> dict[str, Any]:
+def _line(row: Mapping[Any, Any], address: str) -> dict[str, Any]:
     memory = row["memory"] if isinstance(row["memory"], str) else ""
     ended = row["source"] if row["solved"] else row["status"]
     return {

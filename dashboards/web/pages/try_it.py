@@ -19,7 +19,7 @@ from planners.solve import Attempt, solve
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.bodies import footprints
 from planners.world.classes import CLASSES, problem_class
-from planners.world.problem import Problem, start_state
+from planners.world.problem import Floats, Problem, start_state
 from planners.world.vehicle import Vehicle
 from storage.problems import fields_of, problem_of
 
@@ -117,7 +117,7 @@ def plan_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
             attempt, milliseconds = _median(canonical, planner, way, used, vehicle)
             plan = attempt.plan and from_canonical(attempt.plan, alignment)
             way_m = [] if plan is None else np.round(plan.states[:, :2], 2).tolist()
-            corners = (
+            corners: Floats | list[Any] = (
                 []
                 if plan is None
                 else np.round(footprints(plan.states[:: max(1, len(plan.states) // 14)], vehicle), 2)
