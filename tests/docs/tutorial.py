@@ -26,6 +26,7 @@ _OF_THIS_MACHINE: Final = (
     (re.compile(r"-[0-9a-f]{8}\b"), "-digest"),
     (re.compile(r"^(\s*\d+\s+\d+)\s+\d+(?=\s+\d+\s+\d+ of )", re.MULTILINE), r"\1 rank"),  # by the encoder
     (re.compile(r"─+"), "─"),
+    (re.compile(r"\[ +"), "["),
     (re.compile(r"[^\S\n]+"), " "),
 )
 

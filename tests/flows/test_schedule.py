@@ -29,6 +29,7 @@ ROOT = Path(__file__).parents[2]
 EVERY_SECONDS = 15.0
 PATIENCE_SECONDS = 400.0  # of a busy machine; half a minute each on an idle one
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.timeout(900),
     pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*type hint"),
 ]
