@@ -26,6 +26,7 @@ def test_each_command_of_the_tutorial_prints_what_it_says(tmp_path: Path) -> Non
     [
         ("a 1.5 b", "a   12.25   b", True),
         ("a 15 b", "a 16 b", False),
+        ("40 problems/s: 500", "77 problems/s: 500", True),
         ("a\n…\nc", "a\nb\nb\nc", True),
         ("a\n…\nc", "a\nb\nb", False),
         ("a\n…", "a", True),
