@@ -107,11 +107,11 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
             continue
         wider = bend[first] if last > first else 0.0
         box = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
-        begin = _pose(centres[first], along[first])
+        footprint = fcl.CollisionObject(box, _pose(centres[first], along[first]))
         end = _pose(centres[last], along[last])
         around = _box_around(corners[first : last + 1], centres[last] - centres[first], wider)
         for other in _near(manager, around):
-            if _hits(fcl.CollisionObject(box, begin), end, other):
+            if _hits(footprint, end, other):
                 x, y = centres[first]
                 return [
                     f"Collision: the {name}'s footprint meets an obstacle between states {first} and {last},"

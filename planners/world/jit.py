@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
-from numba.core import types
-from numba.extending import overload
+from numba.core import boxing, cgutils, pythonapi, types
+from numba.extending import NativeValue, overload
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -38,6 +38,32 @@ _R = TypeVar("_R")
 _FLAGS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _LEAN: dict[str, Any] = _FLAGS | {"_nrt": False}
 _INLINED: dict[str, Any] = _LEAN | {"forceinline": True}
+
+
+_unboxers: Any = pythonapi._unboxers
+_cgutils: Any = cgutils
+_native: Any = NativeValue
+_counting_unboxer = _unboxers.functions[types.NumPyRandomGeneratorType]
+
+
+def _borrowing_unboxer(kind: Any, generator: Any, context: Any) -> Any:
+    """How a kernel takes a random generator: without counting references it borrows it for the call.
+
+    Numba's own way takes a reference, which a kernel without counting never gives back: a leak each call.
+    """
+    if context.context.enable_nrt:
+        return _counting_unboxer(kind, generator, context)
+    native = _cgutils.create_struct_proxy(kind)(context.context, context.builder)
+    bits = context.pyapi.object_getattr_string(generator, "bit_generator")
+    unboxed = context.unbox(boxing._bit_gen_type, bits)
+    context.pyapi.decref(bits)
+    native.bit_generator = unboxed.value
+    native.parent = generator
+    native.meminfo = _cgutils.get_null_value(native.meminfo.type)
+    return _native(native._getvalue(), is_error=unboxed.is_error)
+
+
+_unboxers.functions[types.NumPyRandomGeneratorType] = _borrowing_unboxer
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:

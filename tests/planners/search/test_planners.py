@@ -1,3 +1,6 @@
+import gc
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -42,6 +45,16 @@ def test_the_same_seed_gives_the_same_plan_and_counts_whatever_ran_before(name):
         again.expansions,
         again.nodes,
     )
+
+
+@EVERY
+def test_a_planner_keeps_nothing_of_the_generator_that_it_drew_from(name):
+    rng = generator(3)
+    before = sys.getrefcount(rng)
+    for seed in range(3):
+        plan(name, strewn(seed, 40), rng)
+    gc.collect()
+    assert sys.getrefcount(rng) == before
 
 
 @EVERY
