@@ -44,14 +44,14 @@ def publish_judgements(run_name: str, told: Sequence[tuple[str, str, str]]) -> N
 
     try:
         for memory, line, markdown in told:
-            create_markdown_artifact(markdown, key=key_of(f"verdict-{memory}"), description=line)
+            create_markdown_artifact(markdown, key=artifact_key(f"verdict-{memory}"), description=line)
         table = [{"memory": memory, "verdict": line} for memory, line, _ in told]
-        create_table_artifact(table, key=key_of("verdicts"), description=run_name)
+        create_table_artifact(table, key=artifact_key("verdicts"), description=run_name)
     except Exception as error:  # the champions are who they are, whatever is wrong with the server
         _complain("the verdicts", error)
 
 
-def key_of(name: str) -> str:
+def artifact_key(name: str) -> str:
     """A name as the key of an artifact."""
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
 
@@ -62,7 +62,7 @@ def _complain(what: str, error: Exception) -> None:
 
 
 def _key(run: RunFolder, name: str) -> str:
-    return key_of(f"{run.path.name}-{name}")
+    return artifact_key(f"{run.path.name}-{name}")
 
 
 def _address(picture: Path) -> str:

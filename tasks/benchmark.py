@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import gc
 from typing import Any, Final, NamedTuple
 
-from planners.memory.recall import Memory
 from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.problem import Problem
-from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
 from storage.memories import load_memory
 from storage.results import write_attempts
 from storage.shards import shard_is_done
-from tasks.attempts import attempt_row, check_attempt
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of
-from tasks.compile_assists import compile_assists
 from tasks.settings import ABLATION, ABLATION_PLANNER, COMBINED, UNASSISTED, Assist, RunSettings
-from tasks.timing import no_garbage_collection
+from tasks.side_by_side import side_by_side
 from tasks.worlds import source_key, source_of
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
-COLLECTED_EVERY: Final = 10  # problems; collecting garbage takes as long as some ten attempts
 
 
 class Configuration(NamedTuple):
@@ -54,27 +48,24 @@ def memories_of(settings: RunSettings, class_name: str) -> list[str]:
 def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     """Solve a range of unseen problems in every way, check the plans, write the attempts."""
     settings, name = chunk.settings, chunk.class_name
-    source = source_of(chunk.data, settings, name)
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle, run_name = vehicle_named(settings.vehicle), settings.run_name
     places = {memory: chunk.run.memory(memory) for memory in memories_of(settings, name)}
     memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
-    asked = configurations(settings, name)
-    rows: list[dict[str, Any]] = []
-    run_name = settings.run_name
-    compile_assists(vehicle)
-    for asked_first in asked:  # code and caches are warm before the first time counts
-        _attempt(source.problem("test", chunk.first), asked_first, memories, settings)
-    with no_garbage_collection():
-        for index in range(chunk.first, chunk.last):
-            problem = source.problem("test", index)
-            order = generator(settings.seed, "order", problem.id).permutation(len(asked))
-            attempts = {int(i): _attempt(problem, asked[i], memories, settings) for i in order}
-            checked: set[bytes] = set()
-            for i in range(len(asked)):
-                check_attempt(problem, attempts[i], checked, vehicle)
-                rows.append(attempt_row(attempts[i], asked[i].memory, run_name, vehicle))
-            if index % COLLECTED_EVERY == 0:
-                gc.collect()
+
+    def attempt(problem: Problem, asked: Configuration) -> Attempt:
+        memory = memories[asked.memory] if asked.memory else None
+        assist, top_k, strategy = asked.assist
+        return solve(
+            problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle, strategy=strategy
+        )
+
+    rows = side_by_side(
+        chunk,
+        source_of(chunk.data, settings, name),
+        configurations(settings, name),
+        attempt,
+        lambda asked: (asked.memory, run_name),
+    )
     write_attempts(chunk.run.shard("results", name, chunk.index), rows, key=chunk.key)
     return {"attempts": len(rows), "solved": sum(row["solved"] for row in rows)}
 
@@ -108,14 +99,3 @@ def benchmark_chunks(data: str, settings: RunSettings) -> list[Chunk]:
             ],
         )
     ]
-
-
-def _attempt(
-    problem: Problem, asked: Configuration, memories: dict[str, Memory], settings: RunSettings
-) -> Attempt:
-    memory = memories[asked.memory] if asked.memory else None
-    vehicle = vehicle_named(settings.vehicle)
-    assist, top_k, strategy = asked.assist
-    return solve(
-        problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle, strategy=strategy
-    )

@@ -110,12 +110,7 @@ def mark_done(place: Path, key: str) -> None:
 
 def is_marked(place: Path, key: str) -> bool:
     """Whether a folder is there and was made from what ``key`` says."""
-    try:
-        return bool(read_json(_mark(place)) == {"key": key}) and is_there(place)
-    except UnreachableError:
-        raise
-    except StorageError:
-        return False
+    return bool(_read_if_whole(_mark(place)) == {"key": key}) and is_there(place)
 
 
 def _mark(place: Path) -> Path:
@@ -142,13 +137,18 @@ def chunk_task(function: Callable[[AnyPiece], dict[str, Any]]) -> Task[[AnyPiece
 
 def kept_result(chunk: Piece) -> dict[str, Any] | None:
     """What a chunk told when it was done; None where it never was, or what it told is lost."""
+    result: dict[str, Any] | None = _read_if_whole(chunk.result)
+    return result
+
+
+def _read_if_whole(path: Path) -> Any:
+    """The value in a JSON file; None where it is missing or damaged, for then its chunk is done again."""
     try:
-        result: dict[str, Any] = read_json(chunk.result)
+        return read_json(path)
     except UnreachableError:
         raise
     except StorageError:
         return None
-    return result
 
 
 def _kept(function: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:

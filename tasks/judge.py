@@ -5,7 +5,6 @@ Before that, every plan of the challenger is checked once more by the authority.
 
 from __future__ import annotations
 
-import gc
 from typing import Any, Final, NamedTuple
 
 import pandas as pd
@@ -14,21 +13,19 @@ from planners.memory.recall import Memory, default_recall
 from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.authority import faults
 from planners.world.problem import Problem
-from planners.world.randomness import generator
 from planners.world.vehicle import vehicle_named
 from storage.experiences import read_experiences
 from storage.memories import load_memory
 from storage.results import read_attempts, write_attempts
 from storage.shards import shard_is_done
-from tasks.attempts import PlanFaultError, attempt_row, check_attempt
+from tasks.attempts import PlanFaultError
 from tasks.benchmark import memories_of
 from tasks.build_memory import memory_chunks
 from tasks.caching import Chunk, chunk_task, chunks_of, run_folder
 from tasks.collect import experiences_key
-from tasks.compile_assists import compile_assists
 from tasks.retraining import champions_of, number_of
 from tasks.settings import Assist, RunSettings
-from tasks.timing import no_garbage_collection
+from tasks.side_by_side import side_by_side
 from tasks.worlds import held_back, source_key
 
 CHUNK_PROBLEMS: Final = 100
@@ -61,36 +58,24 @@ def ways(settings: RunSettings, class_name: str) -> list[Way]:
 def judge_chunk(chunk: Chunk) -> dict[str, Any]:
     """Attempt a range of held-back problems in every way, check the plans, write the attempts."""
     settings, name = chunk.settings, chunk.class_name
-    source, vehicle = held_back(chunk.data, settings, name), vehicle_named(settings.vehicle)
+    vehicle, challenger = vehicle_named(settings.vehicle), settings.run_name
     asked = ways(settings, name)
     memories: dict[tuple[str, str], Memory] = {}
     for way in asked:
-        place = chunk.run.memory if way.run == settings.run_name else chunk.run.champion
+        place = chunk.run.memory if way.run == challenger else chunk.run.champion
         if way[2:] not in memories:
             memories[way[2:]] = load_memory(place(way.memory), vehicle)
-    rows: list[dict[str, Any]] = []
-    compile_assists(vehicle)
 
     def attempt(problem: Problem, way: Way) -> Attempt:
         assist, top_k, strategy = way.assist
         known = memories[way[2:]]
-        strategy = strategy or default_recall(memories[way.memory, settings.run_name])  # both alike
+        strategy = strategy or default_recall(memories[way.memory, challenger])  # both alike
         return solve(
             problem, way.planner, assist, top_k, known, settings.seed, vehicle=vehicle, strategy=strategy
         )
 
-    for way in asked:  # code and caches are warm before the first time counts
-        attempt(source.problem("test", chunk.first), way)
-    with no_garbage_collection():
-        for index in range(chunk.first, chunk.last):
-            problem = source.problem("test", index)
-            order = generator(settings.seed, "order", problem.id).permutation(len(asked))
-            attempts = {int(i): attempt(problem, asked[i]) for i in order}
-            checked: set[bytes] = set()
-            for i, way in enumerate(asked):
-                check_attempt(problem, attempts[i], checked, vehicle)
-                rows.append(attempt_row(attempts[i], way.memory, way.run, vehicle))
-            gc.collect()
+    held = held_back(chunk.data, settings, name)
+    rows = side_by_side(chunk, held, asked, attempt, lambda way: (way.memory, way.run))
     write_attempts(chunk.run.shard("judged", name, chunk.index), rows, key=chunk.key)
     return {"attempts": len(rows)}
 
@@ -171,12 +156,7 @@ class Judged(NamedTuple):
 def judged(data: str, settings: RunSettings, memory: str) -> Judged:
     """What was attempted with a memory."""
     run = run_folder(data, settings)
-    classes = [name for name in settings.class_names if memory in memories_of(settings, name)]
-    shards = [
-        run.shard("judged", chunk.class_name, chunk.index)
-        for chunk in judge_chunks(data, settings)
-        if chunk.class_name in classes
-    ]
+    shards = [run.shard("judged", chunk.class_name, chunk.index) for chunk in _with(data, settings, memory)]
     rows = pd.concat([read_attempts(shard, ("recalled",)) for shard in shards], ignore_index=True)
     rows = rows[rows["memory"] == memory]
     ours = rows["run_id"] == settings.run_name
@@ -185,8 +165,11 @@ def judged(data: str, settings: RunSettings, memory: str) -> Judged:
 
 def judged_key(data: str, settings: RunSettings, memory: str) -> list[str]:
     """What the attempts with a memory depend on."""
+    return [chunk.key for chunk in _with(data, settings, memory)]
+
+
+def _with(data: str, settings: RunSettings, memory: str) -> list[Chunk]:
+    """The chunks of the classes that a memory is measured on."""
     return [
-        chunk.key
-        for chunk in judge_chunks(data, settings)
-        if memory in memories_of(settings, chunk.class_name)
+        chunk for chunk in judge_chunks(data, settings) if memory in memories_of(settings, chunk.class_name)
     ]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-from tasks.artifacts import key_of
+from tasks.artifacts import artifact_key
 
 EVERY_SECONDS: Final = 10.0  # what is over sooner has none; an update costs a request
 
@@ -30,7 +30,7 @@ def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show
         told, share = time.monotonic(), 100.0 * done / total
         try:
             if made is None:
-                made = artifacts.create_progress_artifact(share, key_of(description), description)
+                made = artifacts.create_progress_artifact(share, artifact_key(description), description)
             else:
                 artifacts.update_progress_artifact(made, share)
         except Exception:  # the work is what counts, and the bar shows it

@@ -15,6 +15,7 @@ from unittest.mock import patch
 
 from storage.layout import DataFolder
 from tasks.model_registry import download, set_mlflow_environment
+from tasks.redaction import redacted
 from tasks.settings import DEFAULT_VEHICLE, RunError
 from tasks.tracking import tracking_uri
 
@@ -151,8 +152,10 @@ class Registry:
         except Exception as error:  # each of MLflow's stores has errors of its own
             reason = " ".join(str(error).split())[:300] or type(error).__name__
             raise RunError(
-                f"MLflow's registry at {self.uri} cannot be used, champions are as they were; give the same "
-                f"command again later: {reason}"
+                redacted(
+                    f"MLflow's registry at {self.uri} cannot be used, champions are as they were; give the "
+                    f"same command again later: {reason}"
+                )
             ) from error
 
 
