@@ -39,9 +39,15 @@ def read_attempts(place: Path, without: Sequence[str] = ()) -> pd.DataFrame:
     Missing texts are None, missing numbers NaN; ``recalled`` holds one int32 array a row, which takes most of
     the time: columns ``without`` which one can do are left out.
     """
-    table = pa.concat_tables(list(_tables(place, without)))
-    frame: pd.DataFrame = table.to_pandas()
+    frame: pd.DataFrame = pa.concat_tables(list(_tables(place, without))).to_pandas()
+    pa.default_memory_pool().release_unused()  # what the files were decoded in: as much again
     return frame
+
+
+def distinct_values(place: Path, name: str) -> list[str]:
+    """The texts in a column of all attempts below a folder."""
+    columns = (read_table(path, ATTEMPTS, [name])[name] for path in tables_below(place, "benchmark"))
+    return sorted({str(each) for column in columns for each in column.unique().drop_null().to_pylist()})
 
 
 def attempt_frames(place: Path, without: Sequence[str] = ()) -> Iterator[pd.DataFrame]:
@@ -51,7 +57,7 @@ def attempt_frames(place: Path, without: Sequence[str] = ()) -> Iterator[pd.Data
 
 def _tables(place: Path, without: Sequence[str]) -> Iterator[pa.Table]:
     for path in tables_below(place, "benchmark"):
-        yield read_table(path, ATTEMPTS).drop_columns(list(without))
+        yield read_table(path, ATTEMPTS, [name for name in columns_of(path) if name not in without])
 
 
 def tables_below(place: Path, stage: str) -> list[Path]:

@@ -77,7 +77,7 @@ def metadata_of(path: Path) -> dict[bytes, bytes]:
 def columns_of(path: Path) -> list[str]:
     """The columns of a Parquet file; a StorageError where it is missing or damaged."""
     try:
-        return list(pq.read_schema(path).names)
+        return list(pq.read_schema(fetch(path)).names)
     except (pa.ArrowException, OSError) as error:
         raise _damaged(path, error) from None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
@@ -38,8 +38,12 @@ def page_of(
     summary: pd.DataFrame,
     retrieval: pd.DataFrame,
     claims: Sequence[Claim],
+    made_by: Mapping[str, Sequence[str]],
 ) -> str:
-    """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from."""
+    """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from.
+
+    ``made_by``: the hosts and the commits that made rows.
+    """
     problems = attempts["problem_id"].nunique()
     return page(
         f"Motion Memory: {settings.run_name}",
@@ -50,7 +54,7 @@ def page_of(
         endings=endings(attempts),
         claims=claims,
         pictures=_pictures(run),
-        made=_made(run, settings, attempts),
+        made=_made(run, settings, made_by),
     )
 
 
@@ -74,10 +78,12 @@ def _words(name: str) -> str:
     return f"{what.capitalize()}: {of}" if of else what.capitalize()
 
 
-def _made(run: RunFolder, settings: RunSettings, attempts: pd.DataFrame) -> dict[str, dict[str, str]]:
+def _made(
+    run: RunFolder, settings: RunSettings, made_by: Mapping[str, Sequence[str]]
+) -> dict[str, dict[str, str]]:
     """Where the rows come from: host and commit of the rows themselves, settings, stages, versions."""
     records = stages_of(run)
-    rows = {name: ", ".join(sorted(set(attempts[name].dropna()))) or "unknown" for name in ("host", "commit")}
+    rows = {name: ", ".join(known) or "unknown" for name, known in made_by.items()}
     measured = next((each for each in reversed(records) if each["stage"] == "benchmark"), None)
     of_machine = {name: str(measured[name]) for name in ("processor", "system")} if measured else {}
     stages = {

@@ -36,7 +36,7 @@ from storage.files import read_text, whole_file
 from storage.layout import RunFolder, open_data_folder
 from storage.mirror import is_there
 from storage.recalls import read_recalls
-from storage.results import read_attempts
+from storage.results import distinct_values, read_attempts
 from tasks.caching import Chunk, run_folder
 from tasks.page import page_of
 from tasks.recalls import recall_chunks
@@ -45,7 +45,10 @@ from tasks.stages import stage_cells, stages_of
 from tasks.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
-NOT_NEEDED: Final = ("recalled",)
+NOT_NEEDED: Final = (
+    "recalled", "run_id", "vehicle", "verified", "seed", "nodes", "expansions", "length_m", "duration_s",
+    "host", "commit",
+)  # fmt: skip
 MEASURED: Final = (
     "preset",
     "classes",
@@ -60,6 +63,9 @@ MEASURED: Final = (
 )
 
 
+_MEASURED_BY: Final = ["problem_class", "planner"]
+
+
 class Report(NamedTuple):
     """What a run found."""
 
@@ -71,7 +77,8 @@ class Report(NamedTuple):
 def report_run(data: str, settings: RunSettings) -> Report:
     """Write tables, charts and the page into the run's folder; a StorageError where the run has no rows."""
     run = run_folder(data, settings)
-    attempts, grown = read_attempts(run.results, NOT_NEEDED), continual_rows(data, settings)
+    attempts = read_attempts(run.results, NOT_NEEDED)
+    grown = continual_rows(data, settings, attempts)
     summary, recalls = summarise(attempts), _recall_rows(data, settings)
     found = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, grown)))
     _write(run.summary("csv"), as_csv(summary))
@@ -90,19 +97,20 @@ def report_run(data: str, settings: RunSettings) -> Report:
         figures["continual-improvement"] = continual_improvement(summarise_continual(grown))
     for name, figure in figures.items():
         save(figure, run.figures, name)
-    html = page_of(run, settings, attempts, summary, found.retrieval, found.claims)
+    made_by = {name: distinct_values(run.results, name) for name in ("host", "commit")}
+    html = page_of(run, settings, attempts, summary, found.retrieval, found.claims, made_by)
     _write(run.report, html)
     return found
 
 
-def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
-    """Attempts of all runs that differ from this one in their number of ``experiences``, a column here.
+def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> pd.DataFrame:
+    """The run's ``attempts``, and those of all runs that differ from it in ``experiences``, a column here.
 
     Which planners, assists and problems they measured may differ too: a planner on a class is here if several
     runs measured it, and so are the attempts with the combined memory. Empty where there is no other number.
     """
     own = run_folder(data, settings)
-    places = {settings.experiences: own.results}
+    places: dict[int, Path] = {}
     for run in open_data_folder(data).runs():
         if run.path == own.path or not (is_there(run.settings) and is_there(run.results)):
             continue
@@ -111,18 +119,21 @@ def continual_rows(data: str, settings: RunSettings) -> pd.DataFrame:
         except ValueError:  # of another version
             continue
         may_differ = {name: getattr(settings, name) for name in (*MEASURED, "experiences")}
-        if replace(asked, **may_differ) == settings:
+        if replace(asked, **may_differ) == settings and asked.experiences != settings.experiences:
             places.setdefault(asked.experiences, run.results)
-    if len(places) < 2:
+    if not places:
         return pd.DataFrame()
-    tables = [
-        read_attempts(place, NOT_NEEDED).assign(experiences=count) for count, place in sorted(places.items())
-    ]
-    rows = pd.concat(tables, ignore_index=True)
+    tables = {count: read_attempts(place, NOT_NEEDED) for count, place in places.items()}
+    others = pd.concat([table[_MEASURED_BY].drop_duplicates() for table in tables.values()])
+    known = pd.MultiIndex.from_frame(others.drop_duplicates())
+    tables[settings.experiences] = attempts[pd.MultiIndex.from_frame(attempts[_MEASURED_BY]).isin(known)]
+    rows = pd.concat(
+        [table.assign(experiences=count) for count, table in sorted(tables.items())], ignore_index=True
+    )
     combined = rows["memory"] == COMBINED
     if rows.loc[combined, "experiences"].nunique() < 2:
         rows = rows[~combined]
-    measured = rows.groupby(["problem_class", "planner"])["experiences"].transform("nunique")
+    measured = rows.groupby(_MEASURED_BY)["experiences"].transform("nunique")
     return rows[measured > 1]
 
 

@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import pandas as pd
 import pytest
 
 from storage.files import write_json
 from storage.layout import open_data_folder
-from storage.results import write_attempts
+from storage.results import read_attempts, write_attempts
 from tasks.caching import keep_settings
 from tasks.continual import runs_of_continual
 from tasks.report import continual_rows
@@ -32,13 +33,18 @@ def measure(data: Path, settings: RunSettings, memories: Sequence[str] = ()) -> 
         write_attempts(run.shard("results", name, 0), rows)
 
 
+def grown(data: Path, settings: RunSettings) -> pd.DataFrame:
+    own = open_data_folder(data).run(settings.run_name)
+    return continual_rows(str(data), settings, read_attempts(own.results))
+
+
 def test_growing_experience_is_that_of_the_planners_and_classes_that_several_runs_measured(
     tmp_path: Path,
 ) -> None:
     for fewer in runs_of_continual(SETTINGS):
         measure(tmp_path, fewer)
     measure(tmp_path, SETTINGS, [COMBINED])
-    rows = continual_rows(str(tmp_path), SETTINGS)
+    rows = grown(tmp_path, SETTINGS)
     assert rows["experiences"].tolist() == [20, 40, 60, 80, 100]
     assert set(rows["planner"]) == {"gust"}
     assert set(rows["memory"]) == {"curves"}
@@ -48,7 +54,7 @@ def test_growing_experience_of_all_that_a_run_measures(tmp_path: Path) -> None:
     settings = replace(SETTINGS, continual="all")
     for each in [*runs_of_continual(settings), settings]:
         measure(tmp_path, each)
-    rows = continual_rows(str(tmp_path), settings)
+    rows = grown(tmp_path, settings)
     assert (rows.groupby(["problem_class", "planner"])["experiences"].nunique() == 5).all()
     assert len(rows) == 5 * 9
 
@@ -61,4 +67,4 @@ def test_runs_that_differ_in_more_are_not_compared(tmp_path: Path, other: dict[s
     old = open_data_folder(tmp_path).run("laptop-of-another-version")
     write_json(old.settings, {"preset": "laptop", "gone": 1})
     write_attempts(old.shard("results", "curves", 0), [ATTEMPT])
-    assert continual_rows(str(tmp_path), SETTINGS).empty
+    assert grown(tmp_path, SETTINGS).empty
