@@ -56,6 +56,21 @@ class Drift:
         rates = {"hit_rate": self.now.hit_rate, "benchmark_hit_rate": self.then.hit_rate}
         return asdict(self) | rates | {"has_fallen": self.has_fallen}
 
+    def to_row(self) -> dict[str, Any]:
+        """The row of the table of what memories answered (``storage.schemas.WATCHED``), but for its time."""
+        return {
+            "memory": self.memory,
+            "configuration": self.configuration,
+            "problems": self.now.problems,
+            "hits": self.now.hits,
+            "mean_ms": self.now.mean_ms,
+            "benchmark_problems": self.then.problems,
+            "benchmark_hits": self.then.hits,
+            "benchmark_mean_ms": self.then.mean_ms,
+            "p_value": self.p_value,
+            "has_fallen": self.has_fallen,
+        }
+
     def __str__(self) -> str:
         verdict = "fallen" if self.has_fallen else "as it was"
         return (

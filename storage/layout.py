@@ -158,6 +158,11 @@ class DataFolder:
         """The folder of what was learned on the job for a vehicle (``learned.py``)."""
         return self.path / "learned" / checked_name(vehicle)
 
+    @property
+    def watched(self) -> Path:
+        """The folder of what memories answered at work (``watched.py``)."""
+        return self.path / "watched"
+
     def run(self, name: str) -> RunFolder:
         """The folder of a run; a StorageError for a name that is no plain word."""
         return RunFolder(self.path / "runs" / checked_name(name))

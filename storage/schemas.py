@@ -120,6 +120,24 @@ ATTEMPTS: Final = _schema(
 )
 
 
+WATCHED: Final = _schema(
+    "watched/1",
+    [
+        ("at", pa.timestamp("ms", tz="UTC")),
+        ("memory", pa.string()),  # a registered version, or a run's
+        ("configuration", pa.string()),  # planner and configuration
+        ("problems", pa.int64()),  # that were asked
+        ("hits", pa.int64()),  # answered by a recalled plan
+        ("mean_ms", pa.float64()),  # planning time
+        ("benchmark_problems", pa.int64()),  # the same of the benchmark that the memory was judged by
+        ("benchmark_hits", pa.int64()),
+        ("benchmark_mean_ms", pa.float64()),
+        ("p_value", pa.float64()),  # that hits are so few by chance
+        ("has_fallen", pa.bool_()),
+    ],
+)
+
+
 def recalls(plans: int) -> pa.Schema:
     """What a memory of ``plans`` plans says to a problem, beside the truth."""
     return _schema(

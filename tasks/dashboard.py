@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
+from dashboards.web.notices import NoticeError
+from dashboards.web.pages.retrainings import Retrained, Retrainings
 from storage.layout import MARK, DataFolder, open_data_folder
-from tasks.settings import UsageError
+from tasks.registry import Registry, Version
+from tasks.settings import RunError, UsageError
 
 LOOPBACK = "127.0.0.1"
 
@@ -31,13 +39,57 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     from dashboards.web.app import dashboard_app
 
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
-    config = uvicorn.Config(dashboard_app(folder), log_level="warning", access_log=False, server_header=False)
+    retrainings = partial(_retrainings, Registry(folder))
+    threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
+    config = uvicorn.Config(
+        dashboard_app(folder, retrainings), log_level="warning", access_log=False, server_header=False
+    )
     print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
     if open_browser and sys.stdout.isatty():
         import webbrowser
 
         webbrowser.open(address)
     uvicorn.Server(config).run(sockets=[listener])
+
+
+def _retrainings(registry: Registry) -> Sequence[Retrained]:
+    """Every version of a memory, in order; a NoticeError where the registry does not answer."""
+    try:
+        found = []
+        for name in registry.names():
+            champion = registry.aliased(name)
+            found += [_retrained(each, champion) for each in registry.versions(name)]
+        return found
+    except RunError as error:
+        raise NoticeError(str(error)) from None
+
+
+def _retrained(version: Version, champion: Version | None) -> Retrained:
+    def figure(name: str) -> float:
+        try:
+            return float(version.tag(name))
+        except ValueError:
+            return math.nan
+
+    return Retrained(
+        memory=version.name,
+        number=version.number,
+        retraining=version.retraining,
+        run=version.tag("run"),
+        verdict=version.tag("verdict"),
+        against=version.tag("against"),
+        reduction=figure("reduction"),
+        low=figure("low"),
+        high=figure("high"),
+        why=version.tag("why"),
+        is_champion=champion is not None and champion.number == version.number,
+    )
+
+
+def _read_ahead(retrainings: Retrainings) -> None:
+    """Load MLflow, some seconds, before a page asks it."""
+    with suppress(NoticeError):
+        retrainings()
 
 
 def _existing(data: Path) -> DataFolder:

@@ -16,8 +16,9 @@ from typing import Any, Final, NamedTuple
 
 from dashboards.drift import Drift, Usefulness, drifts, usefulness
 from storage.errors import StorageError
-from storage.layout import DataFolder, RunFolder
+from storage.layout import MARK, DataFolder, RunFolder
 from storage.results import read_attempts
+from storage.watched import add_watched
 from tasks.local_server import running_server, set_environment
 from tasks.registry import CHAMPION, Registry
 from tasks.settings import RunError, default_data
@@ -32,6 +33,7 @@ class Watched(NamedTuple):
 
     name: str  # with its version, where it has one
     benchmark: Mapping[str, Usefulness]
+    home: Path  # the data folder that it is of
 
 
 def watched(memory: str | None) -> Watched | None:
@@ -49,7 +51,8 @@ def watched(memory: str | None) -> Watched | None:
 
 
 def _registered(name: str, alias: str | None, number: str | None) -> Watched | None:
-    registry = Registry(DataFolder(default_data().absolute()))
+    home = default_data().absolute()
+    registry = Registry(DataFolder(home))
     if number is None:
         version = registry.aliased(name, alias or CHAMPION)
     else:
@@ -57,7 +60,9 @@ def _registered(name: str, alias: str | None, number: str | None) -> Watched | N
     if version is None or not version.tag("benchmark"):
         return None
     known = json.loads(version.tag("benchmark"))
-    return Watched(f"{name}/{version.number}", {key: Usefulness(**value) for key, value in known.items()})
+    return Watched(
+        f"{name}/{version.number}", {key: Usefulness(**value) for key, value in known.items()}, home
+    )
 
 
 def _of_run(folder: Path) -> Watched | None:
@@ -67,13 +72,17 @@ def _of_run(folder: Path) -> Watched | None:
     if place.parent.name != "memories" or not results.is_dir():
         return None
     rows = read_attempts(results, ("recalled",))
-    return Watched(f"{place.parent.parent.name}/{place.name}", usefulness(rows[rows["memory"] == place.name]))
+    run, of_memory = place.parent.parent, rows[rows["memory"] == place.name]
+    return Watched(f"{run.name}/{place.name}", usefulness(of_memory), run.parent.parent)
 
 
 def watch(known: Watched | None, now: Mapping[str, Usefulness], data: Path | None) -> list[str]:
-    """Compare with the benchmark and tell Prefect, if there is one to tell; the lines to print."""
-    found = [] if known is None else drifts(known.name, now, known.benchmark)
+    """Compare with the benchmark, keep it, and tell Prefect, if there is one to tell; the lines to print."""
+    if known is None:
+        return []
+    found = drifts(known.name, now, known.benchmark)
     lines = [str(each) for each in found]
+    lines += _keep(known.home, found)
     fallen = [each for each in found if each.has_fallen]
     place = _server([data, default_data()]) if found else None
     if place is None:
@@ -84,6 +93,17 @@ def watch(known: Watched | None, now: Mapping[str, Usefulness], data: Path | Non
         reason = (str(error) or type(error).__name__).splitlines()[0]
         return [*lines, f"Prefect at {place} was not told: {reason}"]
     return lines + [f"event {DRIFT} sent to {place}"] * bool(fallen)
+
+
+def _keep(home: Path, found: Sequence[Drift]) -> list[str]:
+    """Write down what was seen in the memory's data folder, for the dashboard; a line where that fails."""
+    if not found or not (home / MARK).is_file():
+        return []
+    try:
+        add_watched(DataFolder(home).watched, [each.to_row() for each in found])
+    except StorageError as error:  # as with telling: solving is done
+        return [f"not kept: {error}"]
+    return []
 
 
 def _server(folders: Sequence[Path | None]) -> str | None:
@@ -104,7 +124,7 @@ def _send(url: str, found: Sequence[Drift]) -> None:
     from prefect.events.clients import PrefectEventsClient
     from prefect.settings import PREFECT_API_URL, temporary_settings
 
-    from tasks.artifacts import key_of
+    from tasks.artifacts import artifact_key
 
     def event(name: str, drift: Drift) -> Any:
         resource = Resource(
@@ -125,4 +145,6 @@ def _send(url: str, found: Sequence[Drift]) -> None:
     with temporary_settings({PREFECT_API_URL: url}):
         asyncio.run(send())
         told = "".join(f"- {each}\n" for each in found)
-        create_markdown_artifact(told, key=key_of(f"watch-{found[0].memory}"), description="Hits and times")
+        create_markdown_artifact(
+            told, key=artifact_key(f"watch-{found[0].memory}"), description="Hits and times"
+        )

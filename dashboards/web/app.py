@@ -30,6 +30,7 @@ from dashboards.web.pages.overview import overview
 from dashboards.web.pages.problem import problem
 from dashboards.web.pages.problems import problems
 from dashboards.web.pages.progress import progress
+from dashboards.web.pages.retrainings import Retrainings
 from dashboards.web.pages.runs import runs
 from dashboards.web.pages.try_it import check_world, plan_world, try_it
 from dashboards.web.site import Site
@@ -56,9 +57,9 @@ _KINDS: Final = {".css": "text/css", ".js": "text/javascript", ".svg": "image/sv
 _FILE_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 
-def dashboard_app(data: DataFolder) -> Starlette:
-    """The application over a data folder; it writes nothing."""
-    site = Site(data)
+def dashboard_app(data: DataFolder, retrainings: Retrainings = tuple) -> Starlette:
+    """The application over a data folder, and what the registry knows of it; it writes nothing."""
+    site = Site(data, retrainings)
     routes = [Route(path, _page_endpoint(site, page)) for path, page in PAGES.items()]
     routes += [
         Route(path, _answer_endpoint(site, answer), methods=["POST"]) for path, answer in ANSWERS.items()

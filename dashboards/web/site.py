@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import pandas as pd
 
@@ -27,6 +27,9 @@ from storage.layout import NAME, DataFolder, RunFolder, open_run
 from storage.memories import load_memory
 from storage.results import readable_attempts
 
+if TYPE_CHECKING:
+    from dashboards.web.pages.retrainings import Retrained, Retrainings
+
 Stamp = tuple[tuple[str, int, int], ...]
 Value = TypeVar("Value")
 
@@ -37,9 +40,10 @@ _DRAWN: Final = re.compile(r"(.+)-(easy|standard|hard)-(\d{1,12})-(\d{1,9})")
 class Site:
     """One data folder. Planning uses buffers that a process has once, so it takes turns (``planning``)."""
 
-    def __init__(self, data: DataFolder) -> None:
-        """Nothing is read yet."""
+    def __init__(self, data: DataFolder, retrainings: Retrainings) -> None:
+        """Nothing is read yet. ``retrainings``: what the registry knows; NoticeError: it cannot tell."""
         self.data = data
+        self._retrainings = retrainings
         self._kept: OrderedDict[Hashable, Any] = OrderedDict()
         self._lock = threading.Lock()
         self._turn = threading.Lock()
@@ -72,6 +76,13 @@ class Site:
         """The runs that are there and can be named, the newest first."""
         found = [run for run in self.data.runs() if NAME.fullmatch(run.path.name) and run.settings.is_file()]
         return sorted(found, key=lambda run: run.settings.stat().st_mtime, reverse=True)
+
+    def retrained(self) -> tuple[Sequence[Retrained], list[str]]:
+        """All versions of memories in the registry, or why they cannot be had."""
+        try:
+            return self._retrainings(), []
+        except NoticeError as error:
+            return [], [str(error)]
 
     def run(self, name: str) -> RunFolder:
         """A run by its name; a MissingError where there is none."""

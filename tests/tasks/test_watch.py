@@ -11,13 +11,14 @@ import pytest
 
 from dashboards.drift import Drift, Usefulness
 from storage.layout import open_data_folder
+from storage.watched import read_watched
 from tasks import watch as task
 from tasks.registry import Version
 from tasks.watch import DRIFT, SOLVED, Watched, watch, watched
 
 NAME = "gust open 5 exhaustive"
 THEN = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
-KNOWN = Watched("motion-memory-trap/2", {NAME: THEN})
+KNOWN = Watched("motion-memory-trap/2", {NAME: THEN}, Path("nowhere"))
 FALLEN = replace(THEN, problems=200, hits=90)
 
 
@@ -67,6 +68,23 @@ def test_with_nobody_to_tell_it_is_said(monkeypatch: pytest.MonkeyPatch, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_was_seen_is_kept_in_the_data_folder_of_the_memory(sent: Sent, tmp_path: Path) -> None:
+    data = open_data_folder(tmp_path / "data")
+    known = KNOWN._replace(home=data.path)
+    watch(known, {NAME: FALLEN}, None)
+    watch(known, {NAME: THEN}, None)
+    watch(known, {"rrt open 5 exhaustive": THEN}, None)  # of which its benchmark says nothing
+    (data.watched / "20000101T000000-0.parquet").write_bytes(b"no table")
+    seen, (fault,) = read_watched(data.watched)
+    assert "no whole Parquet file" in fault
+    assert seen["at"].is_monotonic_increasing
+    assert sorted(zip(seen["problems"], seen["hits"], seen["has_fallen"], strict=True)) == [
+        (200, 90, True),
+        (500, 400, False),
+    ]
+    assert set(seen["benchmark_hits"]) == {400}
+
+
 def test_who_cannot_be_told_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(*_: object) -> None:
         raise OSError("connection refused")
@@ -79,13 +97,15 @@ def test_who_cannot_be_told_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> N
 def test_the_benchmark_of_a_registered_version_is_in_its_tags(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setenv("MOTION_MEMORY_DATA", str(open_data_folder(tmp_path / "data").path))
+    data = open_data_folder(tmp_path / "data")
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(data.path))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     version = Version("motion-memory-trap", 2, {"benchmark": json.dumps({NAME: asdict(THEN)})})
     monkeypatch.setattr(task.Registry, "aliased", lambda *_: version)
     monkeypatch.setattr(task.Registry, "versions", lambda *_: [version])
-    assert watched("models:/motion-memory-trap@champion") == KNOWN
-    assert watched("models:/motion-memory-trap/2") == KNOWN
+    known = KNOWN._replace(home=data.path)
+    assert watched("models:/motion-memory-trap@champion") == known
+    assert watched("models:/motion-memory-trap/2") == known
     assert watched("models:/motion-memory-trap/1") is None
     assert watched("models:/motion-memory-trap/latest") is None
     assert watched(str(tmp_path / "memories" / "trap")) is None

@@ -1,4 +1,4 @@
-"""Progress: more experience, more runs: is planning getting faster, and recall better; what was learned."""
+"""Progress: more experience, more runs, retrainings: is planning getting faster, and does it stay so?"""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ from dashboards.web.charts import Chart, Line, Panel, lines
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
 from dashboards.web.pages.overview import PLANNING_TIME, panel_title, summary_of
+from dashboards.web.pages.retrainings import retrained_charts, retrained_rows, watched_charts, watched_rows
 from dashboards.web.site import Site, stamp_of
 from storage.errors import StorageError
 from storage.layout import RunFolder
 from storage.recalls import read_recalls
+from storage.watched import read_watched
 
 MOST_RUNS: Final = 30  # that are read for this page, the newest
 _MAY_DIFFER: Final = {
@@ -42,8 +44,11 @@ class Made(NamedTuple):
 def progress(site: Site, asked: Asked) -> Page:
     """All runs that were measured, by time and by experience."""
     configuration = asked.text("configuration")
-    run = asked.one_of("run", [each.path.name for each in site.runs()], "")
+    known = [each.path.name for each in site.runs()]
+    run = asked.one_of("run", known, "")
     found, left_out = _made(site)
+    retrained, unreached = site.retrained()
+    seen, damaged = read_watched(site.data.watched)
     labels = list(
         dict.fromkeys(label for each in found for label in each.summary["configuration"] if label != "none")
     )
@@ -51,10 +56,11 @@ def progress(site: Site, asked: Asked) -> Page:
     charts = []
     if found and chosen:
         charts = [*_continual(found, chosen), *_recall(site, found), *_over_time(found, chosen)]
+    of_champions = [*retrained_charts(retrained, set(known)), *watched_charts(seen)]
     values = {
         "path": asked.path,
         "run": run,
-        "left_out": left_out,
+        "left_out": [*left_out, *unreached, *damaged],
         "count": len(found),
         "learned": list(_learned(site)),
         "menu": {
@@ -65,8 +71,12 @@ def progress(site: Site, asked: Asked) -> Page:
         },
         "rows": [_row(each) for each in reversed(found)],
         "continual": any(chart.name == "continual" for chart in charts),
+        "retrained": retrained_rows(retrained, set(known)),
+        "watched": watched_rows(seen),
+        "of_runs": charts,
+        "of_champions": of_champions,
     }
-    return Page("progress.html.jinja", "Progress", "Progress", run, values, charts)
+    return Page("progress.html.jinja", "Progress", "Progress", run, values, [*charts, *of_champions])
 
 
 def _default(labels: list[str]) -> str:

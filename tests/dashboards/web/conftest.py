@@ -9,7 +9,7 @@ import pytest
 
 from storage.layout import DataFolder
 from tests.dashboards.web.server import served
-from tests.dashboards.web.small_data import small_data
+from tests.dashboards.web.small_data import RETRAINED, small_data
 
 ClientOf = Callable[[DataFolder], httpx.Client]
 
@@ -31,8 +31,9 @@ def client_of() -> Iterator[ClientOf]:
 
 
 @pytest.fixture(scope="session")
-def client(client_of: ClientOf, data: DataFolder) -> httpx.Client:
-    return client_of(data)
+def client(data: DataFolder) -> Iterator[httpx.Client]:
+    with served(data, lambda: RETRAINED) as address, httpx.Client(base_url=address, timeout=60.0) as client:
+        yield client
 
 
 @pytest.fixture

@@ -10,13 +10,14 @@ from contextlib import contextmanager
 import uvicorn
 
 from dashboards.web.app import dashboard_app
+from dashboards.web.pages.retrainings import Retrainings
 from storage.layout import DataFolder
 
 
 @contextmanager
-def served(data: DataFolder) -> Iterator[str]:
+def served(data: DataFolder, retrainings: Retrainings = tuple) -> Iterator[str]:
     """The dashboard over a data folder on a free port; its address."""
-    server = uvicorn.Server(uvicorn.Config(dashboard_app(data), port=0, log_level="warning"))
+    server = uvicorn.Server(uvicorn.Config(dashboard_app(data, retrainings), port=0, log_level="warning"))
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     while not server.started:

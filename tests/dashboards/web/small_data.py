@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from dashboards.drift import Usefulness, drifts
 from dashboards.statistics import summarise
 from dashboards.tables import as_csv
+from dashboards.web.pages.retrainings import Retrained
 from planners.memory.labels import Flags, free_plans
 from planners.memory.recall import Memory
 from planners.solve import solve
@@ -25,10 +28,17 @@ from storage.layout import DataFolder, RunFolder, open_data_folder
 from storage.memories import save_memory
 from storage.recalls import write_recalls
 from storage.results import write_attempts
+from storage.watched import add_watched
 from tests.planners.memories import memory_of
 
 CLASS = "trap"
 PROBLEMS = 6
+RETRAINED = (
+    Retrained("motion-memory-trap", 1, 0, "first", "rolled back", "", nan, nan, nan, "", False),
+    Retrained("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "faster: 20 %", True),
+    Retrained("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not faster", False),
+)
+SEEN = Usefulness(problems=200, hits=160, mean_ms=1.5, median_ms=0.5)
 WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "centroid"))
 
 
@@ -47,6 +57,10 @@ def small_data(folder: Path, runs: Sequence[str] = ("first", "second")) -> DataF
         run.summary("csv").write_text(as_csv(summarise(pd.DataFrame(rows), resamples=50)), "utf-8")
         _write_recalls(run, memory, unseen)
         _write_hallucinated(run, memory, [drawn.draw(4, index) for index in range(30)])
+    for hits in (160, 150, 90):
+        now = replace(SEEN, hits=hits)
+        seen = drifts("motion-memory-trap/2", {"gust closed 5": now}, {"gust closed 5": SEEN})
+        add_watched(data.watched, [each.to_row() for each in seen])
     return data
 
 

@@ -24,6 +24,7 @@ from tests.dashboards.web.browser import (
     shown_at,
 )
 from tests.dashboards.web.server import served
+from tests.dashboards.web.small_data import RETRAINED
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
 
@@ -37,7 +38,7 @@ PAGES = (
 
 @pytest.fixture(scope="module")
 def address(data: DataFolder) -> Iterator[str]:
-    with served(data) as address:
+    with served(data, lambda: RETRAINED) as address:
         yield address
 
 

@@ -11,8 +11,11 @@ import httpx
 import pytest
 
 from dashboards.web.attempts import COLUMNS, attempts_of
+from dashboards.web.notices import NoticeError
+from dashboards.web.pages.retrainings import Retrained
 from storage.layout import DataFolder
 from storage.results import readable_attempts
+from tests.dashboards.web.server import served
 
 ADDRESSES = (
     "/", "/runs/first", "/runs/first?view=solved", "/runs/first?view=time", "/runs/first/problems",
@@ -144,3 +147,24 @@ def test_a_world_of_ones_own_is_checked(client: httpx.Client) -> None:
     answer = client.post("/runs/first/check", json=blocked)
     assert answer.status_code == 400
     assert "start footprint" in answer.json()["error"]
+
+
+def test_progress_tells_what_became_of_challengers_and_when_hits_have_fallen(client: httpx.Client) -> None:
+    text = client.get("/progress").text
+    assert re.search(r"version 2 is promoted, against version 1: faster: 20 %", text)
+    assert re.search(r"promoted, <b>champion now</b>.*version 1.*faster: 20 %.*/runs/second", text)
+    assert "/runs/gone" not in text
+    assert text.count("<td>fallen</td>") == 1
+    for name, rows in (("retrainings", 3), ("drift", 3)):
+        table = client.get(f"/progress?as=csv&chart={name}").text
+        assert len([line for line in table.splitlines() if line and not line.startswith("#")]) == rows + 1
+
+
+def test_a_registry_that_cannot_tell_is_said_and_the_rest_is_shown(data: DataFolder) -> None:
+    def unreached() -> list[Retrained]:
+        raise NoticeError("The registry does not answer.")
+
+    with served(data, unreached) as address:
+        text = httpx.get(f"{address}/progress", timeout=60.0).text
+    assert '<p class="warning">The registry does not answer.</p>' in text
+    assert "Run after run" in text
