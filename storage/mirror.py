@@ -157,6 +157,22 @@ def fetch_folder(path: Path) -> Path:
     return path
 
 
+def folders_here(place: str, name: str) -> Path:
+    """The path of a place after fetching, where it is in object storage, what was published as folders there.
+
+    That is all in its folder ``name``, or else the place itself. StorageError: there is neither.
+    """
+    if not is_remote(place):
+        return Path(place)
+    folder = local_place(place)
+    inside = files_in(folder / name, f"*{FOLDER}")
+    for packed in inside:
+        fetch_folder(packed.with_suffix(""))
+    if not inside and not fetch_folder(folder).exists():
+        raise StorageError(f"{place} holds nothing that could be fetched; check the name.")
+    return folder
+
+
 def note_of(path: Path) -> str | None:
     """What the content of an object was made from, as its writer noted; None where a path stands for none."""
     place = object_of(path)

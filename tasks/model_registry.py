@@ -18,6 +18,7 @@ from planners.memory.recall import Memory
 from planners.world.vehicle import Vehicle
 from storage.layout import DataFolder
 from storage.memories import load_memory
+from storage.mirror import folders_here
 from tasks.closed import auth_environment
 from tasks.local_server import ENVIRONMENT
 from tasks.redaction import redacted
@@ -51,7 +52,7 @@ def memory_folder(place: str | None) -> Iterator[Path | None]:
     RunError: MLflow does not answer, or holds no such model.
     """
     if place is None or not is_model_uri(place):
-        yield place if place is None else Path(place)
+        yield place if place is None else folders_here(place, "memories")
         return
     with TemporaryDirectory(prefix="motion-memory-") as scratch:
         yield download(place, scratch, _tracking_uri(place))
@@ -73,7 +74,9 @@ def load_from(place: str, vehicle: Vehicle) -> Memory:
 
     RunError: MLflow does not answer, or holds no such model. StorageError: there is no good archive.
     """
-    return _registered(place, vehicle) if is_model_uri(place) else load_memory(Path(place), vehicle)
+    if is_model_uri(place):
+        return _registered(place, vehicle)
+    return load_memory(folders_here(place, "memories"), vehicle)
 
 
 def _registered(uri: str, vehicle: Vehicle) -> Memory:

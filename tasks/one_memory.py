@@ -17,7 +17,8 @@ def one_memory(place: str) -> Iterator[Path]:
     Of a run it is the combined memory, or the only one. RunError: there are several, or MLflow has none.
     """
     with memory_folder(place) as folder:
-        yield _archive(Path(place) if folder is None else folder)
+        assert folder is not None  # there is a place
+        yield _archive(folder)
 
 
 def _archive(folder: Path) -> Path:

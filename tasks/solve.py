@@ -17,6 +17,7 @@ from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicle import VEHICLES, vehicle_named
 from storage.files import whole_file
+from storage.mirror import folders_here
 from storage.plans import PlanRecord, write_plan
 from storage.problems import read_problems
 from tasks.attempts import check_attempt
@@ -63,7 +64,10 @@ class Assistant:
         improve_seconds: float = 0.0,
         recall: str | None = None,
     ) -> None:
-        """UsageError with one line for an unknown name, a top k below 1, a missing memory."""
+        """UsageError with one line for an unknown name, a top k below 1, a missing memory.
+
+        StorageError: the memory lies in object storage, and cannot be fetched.
+        """
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
         check_known("vehicle", [vehicle], VEHICLES)
@@ -78,7 +82,7 @@ class Assistant:
             raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
         self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
         self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
-        self._place = None if assist in WITHOUT_MEMORY or memory is None else str(memory)
+        self._place = None if assist in WITHOUT_MEMORY or memory is None else _place_of(str(memory))
         self._memories: dict[str, Memory] = {}
         self.recall = recall
 
@@ -205,6 +209,11 @@ def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: 
         assistant.vehicle,
         problem.scale,
     )
+
+
+def _place_of(memory: str) -> str:
+    """A model's name in MLflow, or the folder of a memory or a run, fetched if it is elsewhere."""
+    return memory if is_model_uri(memory) else str(folders_here(memory, "memories"))
 
 
 def _folder_of(class_name: str, place: Path) -> str:

@@ -22,6 +22,7 @@ from storage.layout import MARK, open_data_folder, open_run
 from storage.mirror import (
     fetch,
     files_in,
+    folders_here,
     is_there,
     local_place,
     looking_once,
@@ -243,3 +244,21 @@ def test_a_folder_of_somebody_else_and_one_of_another_version_are_refused(storag
         open_data_folder(DATA)
     with pytest.raises(StorageError, match=r"cannot be (read|listed).*Check bucket"):
         open_data_folder("s3://nowhere/data")
+
+
+def test_a_memory_is_fetched_by_its_own_name_or_by_its_runs(storage: Any, tmp_path: Path) -> None:
+    with machine(tmp_path / "there"):
+        run = open_data_folder(DATA).run("first")
+        for name in ("curves", "trap"):
+            write_archive(run.memory(name), "memory", CAR, {}, {"a.bin": name.encode()})
+    with machine(tmp_path / "here"):
+        folder = folders_here(f"{DATA}/runs/first", "memories")
+        for name in ("curves", "trap"):
+            assert (folder / "memories" / name / "a.bin").read_bytes() == name.encode()
+    with machine(tmp_path / "elsewhere"):
+        folder = folders_here(f"{DATA}/runs/first/memories/trap", "memories")
+        assert (folder / "a.bin").read_bytes() == b"trap"
+        assert not (folder.parent / "curves").exists()
+        with pytest.raises(StorageError, match="s3://bucket/team/data/runs/second holds nothing"):
+            folders_here(f"{DATA}/runs/second", "memories")
+    assert folders_here(str(tmp_path), "memories") == tmp_path
