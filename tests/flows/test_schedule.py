@@ -31,7 +31,9 @@ PATIENCE_SECONDS = 400.0  # of a busy machine; half a minute each on an idle one
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(900),
-    pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*type hint"),
+    pytest.mark.filterwarnings(  # of MLflow's libraries among themselves
+        "ignore::DeprecationWarning", "ignore::FutureWarning", "ignore:.*type hint", "ignore:Unnamed CHECK"
+    ),
 ]
 
 
@@ -85,7 +87,7 @@ def test_a_schedule_retrains_on_what_was_learned_in_between(
 
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(data))
     then = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
-    known = Watched(f"{name}/2", {"gust open 5 exhaustive": then})
+    known = Watched(f"{name}/2", {"gust open 5 exhaustive": then}, data)
     now = {"gust open 5 exhaustive": replace(then, problems=200, hits=80)}
     assert any(DRIFT in line for line in watch(known, now, data))
     _wait(lambda: _automated(data), process, log)
