@@ -113,9 +113,11 @@ def _grid(
 
 
 def _style(configuration: Configuration) -> dict[str, Any]:
-    """Dashed where the encoder recalled alone, dotted without memory."""
+    """Dashed where the encoder recalled alone, dotted without memory; blind ways are told apart by dots."""
     if configuration.assist == "fresh":
         return {"color": INK, "linestyle": ":", "linewidth": 1.5}  # yellow lines are too pale
-    dashes = (0, (5, 1.5)) if configuration.recall == "centroid" else "-"
+    dashes: Any = (0, (5, 1.5)) if configuration.recall == "centroid" else "-"
+    if configuration.recall == "random":
+        dashes = "-." if configuration.assist == "random-repair" else "-" if configuration.top_k > 1 else ":"
     width = 2.2 if configuration == BASELINE else 1.5
     return {"color": colour_of(configuration), "linestyle": dashes, "linewidth": width}

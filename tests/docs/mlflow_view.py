@@ -20,7 +20,13 @@ from tasks.tracking import EXPERIMENT
 from tests.cluster.machines import answers, free_port
 from tests.dashboards.web.browser import browser, shown_at
 
-SCREEN = (1280, 2400)
+SCREEN = (1280, 1160)
+ONLY_DIFFERENCES = """
+for (const close of document.querySelectorAll("button[aria-label='Close']")) close.click();
+for (const only of document.querySelectorAll("button[role=switch]")) only.click();
+for (const title of document.querySelectorAll("[role=button], button"))
+  if (["Visualizations", "Run details"].includes(title.textContent.trim())) title.click();
+"""
 
 
 def main(data: str, run: str, other: str, picture: str) -> None:
@@ -44,6 +50,8 @@ def main(data: str, run: str, other: str, picture: str) -> None:
             WebDriverWait(driver, 60).until(
                 lambda page: "fresh_oracle" in page.find_element(By.TAG_NAME, "body").text
             )
+            driver.execute_script(ONLY_DIFFERENCES)
+            time.sleep(1.0)
             driver.save_screenshot(picture)
     finally:
         server.terminate()
