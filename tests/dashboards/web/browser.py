@@ -37,12 +37,13 @@ def browser() -> Iterator[WebDriver]:
 
 
 def shown_at(driver: WebDriver, size: tuple[int, int], dark: bool = False) -> None:
-    """A screen of that size, light or dark."""
+    """A screen of that size, light or dark; colours change at once."""
     width, height = size
     screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
-    scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+    wishes = {"prefers-color-scheme": "dark" if dark else "light", "prefers-reduced-motion": "reduce"}
+    features = [{"name": name, "value": value} for name, value in wishes.items()]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
 
 def complaints(driver: WebDriver) -> list[str]:
