@@ -56,7 +56,8 @@ def progress(site: Site, asked: Asked) -> Page:
     charts = []
     if found and chosen:
         charts = [*_continual(found, chosen), *_recall(site, found), *_over_time(found, chosen)]
-    of_champions = [*retrained_charts(retrained, set(known)), *watched_charts(seen)]
+    of_retrainings = list(retrained_charts(retrained, set(known)))
+    of_watching = list(watched_charts(seen))
     values = {
         "path": asked.path,
         "run": run,
@@ -74,9 +75,11 @@ def progress(site: Site, asked: Asked) -> Page:
         "retrained": retrained_rows(retrained, set(known)),
         "watched": watched_rows(seen),
         "of_runs": charts,
-        "of_champions": of_champions,
+        "of_retrainings": of_retrainings,
+        "of_watching": of_watching,
     }
-    return Page("progress.html.jinja", "Progress", "Progress", run, values, [*charts, *of_champions])
+    shown = [*charts, *of_retrainings, *of_watching]
+    return Page("progress.html.jinja", "Progress", "Progress", run, values, shown)
 
 
 def _default(labels: list[str]) -> str:
