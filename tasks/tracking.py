@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
+from storage.files import whole_file
 from storage.layout import DataFolder
 from storage.mirror import fetch, fetch_folder, files_in, uri_of
 from tasks.redaction import redacted
@@ -46,13 +47,24 @@ def tracking_uri(data: DataFolder) -> str:
     return given or f"sqlite:///{data.mlflow_database}"
 
 
+def _make_database(path: Path, artifacts: str) -> None:
+    """Make MLflow's database with all its tables: it stands no kill while it makes them, one by one."""
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    for left in path.parent.glob(f".{path.name}.*"):
+        left.unlink()
+    with whole_file(path) as temporary:
+        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
+        store.engine.dispose()
+
+
 class Tracker:
     """The runs of one data folder in MLflow."""
 
     def __init__(self, data: DataFolder) -> None:
         """Begin to connect; whatever is asked first waits for it."""
         self.uri = tracking_uri(data)
-        self._artifacts = None if os.environ.get("MLFLOW_TRACKING_URI") else data.mlflow_artifacts.as_uri()
+        self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
         self._failure: Exception | None = None
         self._thread = threading.Thread(target=self._connect, name="mlflow", daemon=True)
         self._thread.start()
@@ -61,10 +73,15 @@ class Tracker:
         try:
             from mlflow import MlflowClient
 
+            artifacts = None
+            if self._own is not None:
+                artifacts = self._own.mlflow_artifacts.as_uri()
+                if not self._own.mlflow_database.exists():
+                    _make_database(self._own.mlflow_database, artifacts)
             client = MlflowClient(self.uri)
             found = client.get_experiment_by_name(EXPERIMENT)
             self._experiment = (
-                found.experiment_id if found else client.create_experiment(EXPERIMENT, self._artifacts)
+                found.experiment_id if found else client.create_experiment(EXPERIMENT, artifacts)
             )
             self._connected = client
         except Exception as error:  # shown by whoever asks first, in one line
