@@ -14,8 +14,8 @@ run: $(READY)  ## the main job: every stage on the three classes, under 10 minut
 smoke: $(READY)  ## the same, tiny: about a minute
 	$(BIN)/motion-memory run --preset smoke
 
-test: $(READY)  ## the test suite, in parallel
-	$(BIN)/pytest -n 2 --dist worksteal -q
+test: $(READY)  ## the test suite, in parallel: three processes for two cores, as many tests wait
+	$(BIN)/pytest -n 3 --dist worksteal -q
 
 test-slow: $(READY)  ## the tests that take minutes
 	$(BIN)/pytest -m slow -q --timeout 3600
