@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import socket
 import sys
 import threading
@@ -18,6 +19,7 @@ from tasks.registry import Registry, Version
 from tasks.settings import RunError, UsageError
 
 LOOPBACK = "127.0.0.1"
+HURRIED = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
 
 
 def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
@@ -39,6 +41,8 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     from dashboards.web.app import dashboard_app
 
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
+    for name, value in HURRIED.items():
+        os.environ.setdefault(name, value)
     retrainings = partial(_retrainings, Registry(folder))
     threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
     config = uvicorn.Config(
