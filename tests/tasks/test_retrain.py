@@ -12,7 +12,7 @@ import pytest
 
 from storage.experiences import read_experiences
 from storage.layout import open_data_folder
-from tasks import build_memory, hallucinate, logbook, report
+from tasks import build_memory, hallucinate, judge, logbook, report
 from tasks import retrain as task
 from tasks.caching import run_folder
 from tasks.dry_run import dry_run
@@ -20,7 +20,7 @@ from tasks.judge import judged
 from tasks.registry import AWAITING, FIRST, PROMOTED, REFUSED, ROLLED_BACK
 from tasks.settings import RunSettings
 from tasks.worlds import held_back, source_of
-from tests.tasks.retrained import CLASS, SETTINGS
+from tests.tasks.retrained import CLASS, SETTINGS, timed_by_work
 from tests.tasks.retraining_story import Story
 
 pytestmark = [
@@ -49,6 +49,7 @@ def story(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Iterator[
         if not seen.exists():
             patch.setattr(task, "publish_judgements", lambda *_: None)  # no Prefect to tell
             patch.setattr(hallucinate, "CHUNK_PROBLEMS", 80)  # two plans a chunk
+            patch.setattr(judge, "solve", timed_by_work)
             patch.setattr(build_memory, "_draw", lambda *_: None)  # seconds of pictures
             patch.setattr(report, "save", lambda *_: None)
             told.tell(patch)
