@@ -83,7 +83,7 @@ def span(values: Iterable[float], least: float | None = None, margin: float = 0.
     """Ends of an axis for values, a little beyond them; from ``least`` on if given."""
     finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
     low, high = min(finite), max(finite)
-    room = margin * (high - low) or 0.5 * abs(high) or 0.5
+    room = margin * (high - low) if high > low else 0.5 * abs(high) or 0.5
     return (low - room if least is None else least), high + room
 
 

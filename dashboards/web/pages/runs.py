@@ -37,11 +37,13 @@ def _row(site: Site, run: RunFolder) -> dict[str, Any]:
         "problems": settings.get("test_problems"),
         "vehicle": settings.get("vehicle", "car"),
         "stages": ", ".join(stages) or "none yet",
-        "state": _state(run),
+        "state": _state(run, stages),
     }
 
 
-def _state(run: RunFolder) -> str:
+def _state(run: RunFolder, stages: list[str]) -> str:
     if run.summary("csv").is_file():
         return "reported"
+    if "benchmark" in stages:
+        return "benchmarked"
     return "benchmark begun" if any(run.results.rglob("*.parquet")) else "not benchmarked yet"
