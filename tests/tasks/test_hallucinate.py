@@ -49,6 +49,7 @@ def _shards(data: Path) -> list[Path]:
     return run_folder(str(data), SETTINGS).shards("hallucinated", "trap")
 
 
+@pytest.mark.slow  # a small run with one worker and with two says the same of every table
 def test_one_process_and_two_write_the_same_bytes(data: Path) -> None:
     chunks = hallucination_chunks(str(data), SETTINGS)
     assert len(chunks) == 3
