@@ -116,32 +116,36 @@ def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
 
 
 def _hitches(states: Floats, controls: Floats, vehicle: CarWithTrailers) -> Floats:
-    """Hitch angles ``[T - 1, n]`` after each step: the only variables that feed back on themselves."""
+    """Hitch angles ``[T - 1, n]`` after each step: the only variables that feed back on themselves.
 
-    def slopes(speed: float, steering: float, hitches: list[float]) -> list[float]:
-        turn = speed * math.tan(steering) / vehicle.wheelbase
-        found = []
-        for hitch, length in zip(hitches, vehicle.hitch_lengths, strict=True):
-            trailing = speed * math.sin(hitch) / length
-            found.append(turn - trailing)
-            turn, speed = trailing, speed * math.cos(hitch)
-        return found
-
-    def moved(hitches: list[float], time: float, rates: list[float]) -> list[float]:
-        return [hitch + time * rate for hitch, rate in zip(hitches, rates, strict=True)]
-
+    How fast the car drives and turns at the beginning, middle and end of each step is computed beforehand.
+    """
     h = vehicle.dt
+    times = h * np.array([[0.0], [0.5], [1.0]])
+    speeds = states[:-1, 3] + times * controls[:, 0]
+    turns = speeds * np.tan(states[:-1, 4] + times * controls[:, 1]) / vehicle.wheelbase
+    lengths = vehicle.hitch_lengths
+
+    def slopes(motion: list[float], hitches: list[float]) -> list[float]:
+        speed, turn = motion
+        rates = []
+        for hitch, length in zip(hitches, lengths, strict=True):
+            trailing = speed * math.sin(hitch) / length
+            rates.append(turn - trailing)
+            turn, speed = trailing, speed * math.cos(hitch)
+        return rates
+
     hitches: list[float] = states[0, 5:].tolist()
     after = []
-    for (v, psi), (a, omega) in zip(states[:-1, 3:5].tolist(), controls.tolist(), strict=True):
-        k1 = slopes(v, psi, hitches)
-        k2 = slopes(v + 0.5 * h * a, psi + 0.5 * h * omega, moved(hitches, 0.5 * h, k1))
-        k3 = slopes(v + 0.5 * h * a, psi + 0.5 * h * omega, moved(hitches, 0.5 * h, k2))
-        k4 = slopes(v + h * a, psi + h * omega, moved(hitches, h, k3))
-        for rates, weight in ((k1, 1.0), (k2, 2.0), (k3, 2.0), (k4, 1.0)):
-            hitches = moved(hitches, h / 6.0 * weight, rates)
+    for begin, middle, end in zip(*np.stack((speeds, turns), axis=2).tolist(), strict=True):
+        k1 = slopes(begin, hitches)
+        k2 = slopes(middle, [b + 0.5 * h * k for b, k in zip(hitches, k1, strict=True)])
+        k3 = slopes(middle, [b + 0.5 * h * k for b, k in zip(hitches, k2, strict=True)])
+        k4 = slopes(end, [b + h * k for b, k in zip(hitches, k3, strict=True)])
+        every = zip(hitches, k1, k2, k3, k4, strict=True)
+        hitches = [b + h / 6.0 * (p + 2.0 * (q + r) + s) for b, p, q, r, s in every]
         after.append(hitches)
-    return np.array(after).reshape(len(after), len(vehicle.hitch_lengths))
+    return np.array(after).reshape(len(after), len(lengths))
 
 
 def bodies_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Body]:
