@@ -11,7 +11,7 @@ from rich import box
 from rich.console import Group
 from rich.table import Table
 
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 NOTHING: Final = "–"
 NAMES: Final = {  # headings of columns to the left

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.benchmark import benchmark_chunks, benchmark_problems, is_benchmarked
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.settings import RunSettings
-from tasks.stages import timed
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.benchmark import benchmark_chunks, benchmark_problems, is_benchmarked
 
 
 @flow(name="benchmark", task_runner=task_runner())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.build_memory import build_one_memory, is_built, memory_chunks
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.logbook import log_memories
-from tasks.recalls import is_recalled, recall_chunks, recall_problems
-from tasks.report import report_retrieval, show_retrieval
-from tasks.settings import RunSettings
-from tasks.stages import timed
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.report import report_retrieval, show_retrieval
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.build_memory import build_one_memory, is_built, memory_chunks
+from tasks.stages.measure_recall import is_recalled, recall_chunks, recall_problems
+from tasks.tracking.logbook import log_memories
 
 
 @flow(name="build-memory", task_runner=task_runner())

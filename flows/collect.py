@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.caching import Chunk, keep_settings
-from tasks.collect import chunks_wanted, collect_problems, is_collected
-from tasks.curate import (
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.fan_out.stage import Chunk, keep_settings
+from tasks.inputs.problem_sources import read_worlds, tell_skipped, world_chunks, worlds_are_read
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.collect import chunks_wanted, collect_problems, is_collected
+from tasks.stages.curate import (
     curate_candidates,
     curation_chunks,
     improve_kept,
@@ -15,11 +20,6 @@ from tasks.curate import (
     is_improved,
     keep_experiences,
 )
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.settings import RunSettings
-from tasks.stages import timed
-from tasks.worlds import read_worlds, tell_skipped, world_chunks, worlds_are_read
 
 
 @flow(name="collect", task_runner=task_runner())

@@ -9,10 +9,10 @@ from flows.build_memory import build_memory
 from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.train import train
-from tasks.continual import runs_of_continual
-from tasks.hold import holding
-from tasks.logbook import run_logged
-from tasks.settings import RunSettings
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.fewer_experiences import runs_of_continual
+from tasks.tracking.logbook import run_logged
 
 
 @flow(name="continual")

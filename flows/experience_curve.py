@@ -8,11 +8,11 @@ from flows.build_memory import build_memory
 from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.train import train
-from tasks.engine import cluster
-from tasks.experience_curve import report_curve, runs_of_curve
-from tasks.hold import holding
-from tasks.logbook import run_logged
-from tasks.settings import RunSettings
+from tasks.fan_out.fan_out import cluster
+from tasks.reports.experience_curve import report_curve, runs_of_curve
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.tracking.logbook import run_logged
 
 
 @flow(name="experience-curve")

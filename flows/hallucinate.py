@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.engine import fan_out, task_runner
-from tasks.hallucinate import (
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.hallucinate import (
     hallucinate_problems,
     hallucination_chunks,
     is_hallucinated,
@@ -13,10 +16,7 @@ from tasks.hallucinate import (
     relabel_problems,
     tell_taken,
 )
-from tasks.hold import holding
-from tasks.learn_hallucination import is_learned, learn_hallucination, learning_chunks
-from tasks.settings import RunSettings
-from tasks.stages import timed
+from tasks.stages.learn_hallucination import is_learned, learn_hallucination, learning_chunks
 
 
 @flow(name="hallucinate", task_runner=task_runner())

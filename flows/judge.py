@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.judge import check_plans, is_judged, judge_chunks, judge_problems, plan_chunks
-from tasks.settings import RunSettings
-from tasks.stages import timed
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.judge import check_plans, is_judged, judge_chunks, judge_problems, plan_chunks
 
 
 @flow(name="judge", task_runner=task_runner())

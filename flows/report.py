@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.artifacts import publish
-from tasks.caching import run_folder
-from tasks.draw import draw_figures, figure_chunks, is_drawn
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.logbook import log_report
-from tasks.report import report_run, show
-from tasks.settings import RunSettings
-from tasks.stages import timed
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.fan_out.stage import run_folder
+from tasks.reports.report import report_run, show
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.draw_examples import draw_figures, figure_chunks, is_drawn
+from tasks.tracking.artifacts import publish
+from tasks.tracking.logbook import log_report
 
 
 @flow(name="report", task_runner=task_runner())

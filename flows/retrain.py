@@ -9,14 +9,14 @@ from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.judge import judge
 from flows.train import train
-from tasks.engine import cluster
-from tasks.hold import hold
-from tasks.logbook import run_logged
-from tasks.news import rounds
-from tasks.registry import Registry
-from tasks.retrain import conclude
-from tasks.schedule import tell_failure
-from tasks.settings import RunSettings
+from tasks.champions.conclude import conclude
+from tasks.champions.new_experience import rounds
+from tasks.champions.retraining_schedule import tell_failure
+from tasks.fan_out.fan_out import cluster
+from tasks.registry.champion_registry import Registry
+from tasks.session.hold import hold
+from tasks.settings.run_settings import RunSettings
+from tasks.tracking.logbook import run_logged
 
 
 @flow(name="retrain", on_failure=[tell_failure])  # type: ignore[list-item]  # meant for methods

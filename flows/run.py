@@ -11,10 +11,10 @@ from flows.continual import continual
 from flows.hallucinate import hallucinate
 from flows.report import report
 from flows.train import train
-from tasks.engine import cluster
-from tasks.hold import holding
-from tasks.logbook import run_logged
-from tasks.settings import RunSettings
+from tasks.fan_out.fan_out import cluster
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.tracking.logbook import run_logged
 
 
 @flow(name="run")

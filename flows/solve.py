@@ -6,9 +6,9 @@ from typing import Any
 
 from prefect import flow
 
-from tasks.caching import chunk_task
-from tasks.engine import fan_out, task_runner
-from tasks.parts import Asked, is_solved, parts_of, solve_part
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.fan_out.stage import chunk_task
+from tasks.requests.problem_parts import Asked, is_solved, parts_of, solve_part
 
 
 @flow(name="solve", task_runner=task_runner(), persist_result=False)

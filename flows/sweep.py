@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.logbook import log_sweep
-from tasks.report import show_sweep
-from tasks.settings import RunSettings
-from tasks.sweep import is_swept, sweep_chunks, sweep_variant
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.report import show_sweep
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.sweep import is_swept, sweep_chunks, sweep_variant
+from tasks.tracking.logbook import log_sweep
 
 
 @flow(name="sweep", task_runner=task_runner())

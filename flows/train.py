@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.engine import fan_out, task_runner
-from tasks.hold import holding
-from tasks.logbook import log_training
-from tasks.settings import RunSettings
-from tasks.stages import timed
-from tasks.train import class_epochs, class_epochs_done, is_trained, train_chunks, train_encoder
+from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.reports.stage_times import timed
+from tasks.session.hold import holding
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.train import class_epochs, class_epochs_done, is_trained, train_chunks, train_encoder
+from tasks.tracking.logbook import log_training
 
 
 @flow(name="train", task_runner=task_runner())

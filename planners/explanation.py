@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.labels import START_TOLERANCE
-from planners.memory.masks import MOST_CELLS, rank_by_cells
-from planners.memory.nearly_free import least_blocked
+from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
+from planners.memory.plans.nearly_free import least_blocked
+from planners.memory.plans.sweeps import START_TOLERANCE
 from planners.memory.recall import Memory
 from planners.search.repair import Flags, blocked_states
 from planners.solve import Attempt, turned
 from planners.world.problem import Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
 
 

@@ -12,18 +12,18 @@ from time import perf_counter
 
 import numpy as np
 
-from planners.memory.labels import START_TOLERANCE
-from planners.memory.nearly_free import least_blocked
+from planners.memory.plans.nearly_free import least_blocked
+from planners.memory.plans.sweeps import START_TOLERANCE
 from planners.memory.recall import Memory, Recalled, default_recall, recall, scale_fault
 from planners.search.anytime import improve
-from planners.search.grid_path import grid_path
-from planners.search.guidance import guidance
+from planners.search.guides.grid_path import grid_path
+from planners.search.guides.guidance import guidance
 from planners.search.outcome import Guide, Limits, Outcome, Status
 from planners.search.registry import PLANNERS, plan
 from planners.search.repair import Flags, blocked_states, free_prefix, repair
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, Vehicle, name_of
+from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
 
 ASSISTS = ("none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair")

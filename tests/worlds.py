@@ -6,15 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planners.world.problem import (
-    BOUNDS,
-    CANONICAL_GOAL,
-    CANONICAL_START,
-    GOAL_RADIUS,
-    Floats,
-    Problem,
-    obstacles_of,
-)
+from planners.world.arrays import Floats
+from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Problem, obstacles_of
 
 SHARED = Path(__file__).parents[2] / "shared" / "worlds"  # real worlds, where they lie beside the repository
 

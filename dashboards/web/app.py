@@ -19,23 +19,23 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from dashboards.web.asked import Asked, link
 from dashboards.web.chart_files import csv_file, svg_file
 from dashboards.web.guard import Guard
 from dashboards.web.notices import MissingError, NoticeError, WrongQuestionError
 from dashboards.web.page import Page, PageOf
-from dashboards.web.pages.comparison import comparison
-from dashboards.web.pages.memory import memory
-from dashboards.web.pages.overview import overview
-from dashboards.web.pages.problem import problem
-from dashboards.web.pages.problems import problems
-from dashboards.web.pages.progress import progress
-from dashboards.web.pages.retrainings import Retrainings
-from dashboards.web.pages.runs import runs
-from dashboards.web.pages.try_it import check_world, plan_world, try_it
+from dashboards.web.pages.comparison_page import comparison
+from dashboards.web.pages.memory_page import memory
+from dashboards.web.pages.overview_page import overview
+from dashboards.web.pages.problem_page import problem
+from dashboards.web.pages.problems_page import problems
+from dashboards.web.pages.progress_page import progress
+from dashboards.web.pages.runs_page import runs
+from dashboards.web.pages.try_it_page import check_world, plan_world, try_it
+from dashboards.web.query import Asked, link
+from dashboards.web.retrained import Retrainings
 from dashboards.web.site import Site
 from storage.errors import StorageError
-from storage.layout import DataFolder
+from storage.places.data_folder import DataFolder
 
 LARGEST_BODY_BYTES: Final = 1 << 20
 PAGES: Final[dict[str, PageOf]] = {

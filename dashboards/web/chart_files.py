@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 from typing import Final
 
-from dashboards.tables import as_csv
+from dashboards.report.tables import as_csv
 from dashboards.web.charts import Chart, Panel
 from dashboards.web.svg import element, text
 

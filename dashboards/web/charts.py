@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from dashboards.web.svg import Scale, element, linked, points, short, span, text, told
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 WIDTH: Final = 360.0  # pixels of a panel: fits a phone
 _ROW: Final = 21.0  # pixels a category

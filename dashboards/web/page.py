@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from dashboards.web.charts import Chart
 
 if TYPE_CHECKING:
-    from dashboards.web.asked import Asked
+    from dashboards.web.query import Asked
     from dashboards.web.site import Site
 
 

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import pandas as pd
 
-from dashboards.web.attempts import COLUMNS, Attempts, attempts_of
+from dashboards.web.attempt_rows import COLUMNS, Attempts, attempts_of
 from dashboards.web.notices import MissingError, NoticeError
 from planners.memory.recall import Memory
-from planners.world.classes import CLASSES, problem_class
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
-from planners.world.vehicle import Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from storage.archives.memories import load_memory
 from storage.errors import StorageError
-from storage.files import read_json, read_text
-from storage.imported import read_imported
-from storage.layout import NAME, DataFolder, RunFolder, open_run
-from storage.memories import load_memory
-from storage.results import readable_attempts
+from storage.places.data_folder import NAME, DataFolder, RunFolder, open_run
+from storage.places.files import read_json, read_text
+from storage.tables.attempts import readable_attempts
+from storage.tables.imported_problems import read_imported
 
 if TYPE_CHECKING:
-    from dashboards.web.pages.retrainings import Retrained, Retrainings
+    from dashboards.web.retrained import Retrained, Retrainings
 
 Stamp = tuple[tuple[str, int, int], ...]
 Value = TypeVar("Value")

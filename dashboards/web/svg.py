@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import escape
 
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 
 def element(name: str, /, *content: str, **attributes: object) -> str:

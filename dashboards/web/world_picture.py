@@ -8,13 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from dashboards.pictures import footprint_spacing_m
+from dashboards.figures.pictures import footprint_spacing_m
 from dashboards.web.svg import element, points, told
 from planners.search.repair import Flags
 from planners.search.traces import Roads, Trace
-from planners.world.bodies import footprints
-from planners.world.problem import Floats, Plan, Problem, start_state
-from planners.world.vehicle import Vehicle
+from planners.world.arrays import Floats
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.bodies import footprints
+from planners.world.vehicles.vehicle import Vehicle
 
 _MARGIN_M: Final = 1.0
 _MOST_EDGES: Final = 20_000  # of a tree or a roadmap: more is a blot

@@ -13,12 +13,13 @@ from planners.maps.global_path import GlobalPaths, local_goal
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Blocks, Part, blocks_of, lie_in
 from planners.maps.surroundings import WINDOW, Surroundings
-from planners.search.grid_path import grid_path
-from planners.world.faults import problem_fault
-from planners.world.occupancy import drawing_of
-from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Floats, Problem
+from planners.search.guides.grid_path import grid_path
+from planners.world.arrays import Floats
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Problem
+from planners.world.problem_faults import problem_fault
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 LONGEST_WAY: Final = (
     1.5  # of the distance to the goal: farther round, a global planner sets another local goal

@@ -11,7 +11,8 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from planners.maps.occupancy_map import OccupancyMap
-from planners.world.problem import CANONICAL_DISTANCE, Floats, Integers
+from planners.world.arrays import Floats, Integers
+from planners.world.problem import CANONICAL_DISTANCE
 
 _STEPS: Final = ((0, 1), (1, 0), (1, 1), (1, -1))  # row, column; the other four are these backwards
 

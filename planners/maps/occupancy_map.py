@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 Cells = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

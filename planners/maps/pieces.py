@@ -7,7 +7,7 @@ import shapely
 
 from planners.maps.occupancy_map import Cells, OccupancyMap
 from planners.maps.rectangles import rectangles_of
-from planners.world.polygons import joined_triangles
+from planners.world.geometry.polygons import joined_triangles
 
 Shapes = np.ndarray[tuple[int, ...], np.dtype[np.object_]]
 

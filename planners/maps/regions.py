@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 
 from planners.maps.occupancy_map import Cells
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 Part = Literal["train", "test"]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.encoder.training import TrainedEncoder
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.recall import Memory
-from planners.memory.training import TrainedEncoder
 from planners.world.problem import Plan
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 
 def build_memory(

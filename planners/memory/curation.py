@@ -14,14 +14,14 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.experience import Experience
 from planners.memory.labelling import label_problems
-from planners.memory.labels import Flags, sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import Flags, sweep_plans
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.occupancy import ALL_CELLS, Bits
 from planners.world.jit import jit
-from planners.world.occupancy import ALL_CELLS, Bits
-from planners.world.problem import Floats, Integers
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 PROBLEMS: Final = 1_000  # of the candidates, the first, to cover; 500 chose nearly as well (docs/method.md)
 AGAIN: Final = 0.35  # what a problem counts once more each time it is covered; 0.1 to 0.5 chose as well

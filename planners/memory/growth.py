@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.encoder import Floats32
-from planners.memory.inverted_lists import FROM_PLANS, list_readout
-from planners.memory.labels import Flags, free_plans, sweep_plans
-from planners.memory.masks import masks_of
-from planners.memory.readout import NO_PLAN_ODDS, nearest_readout
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import Flags, free_plans, sweep_plans
+from planners.memory.ranking.inverted_lists import FROM_PLANS, list_readout
+from planners.memory.ranking.readout import NO_PLAN_ODDS, nearest_readout
 from planners.memory.recall import Memory
-from planners.world.collision import scene_of
+from planners.world.arrays import Floats, Floats32
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import occupancy_of
 from planners.world.jit import lean
-from planners.world.occupancy import occupancy_of
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.problem import Plan, Problem
 
 RIDGE = 1e-3  # of the mean variance of an embedding's numbers; measured: between 1e-4 and 1e-1 all is alike
 

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.labels import Flags, PlanSweeps, free_plans
-from planners.world.collision import build_scene
+from planners.memory.plans.sweeps import Flags, PlanSweeps, free_plans
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.collision import build_scene
+from planners.world.geometry.occupancy import GRID, Grid, draw_occupancy
 from planners.world.jit import jit
-from planners.world.occupancy import GRID, Grid, draw_occupancy
-from planners.world.problem import Floats, Integers, Problem
+from planners.world.problem import Problem
 
 
 class Labelled(NamedTuple):

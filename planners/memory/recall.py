@@ -21,16 +21,17 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.checking import first_free
-from planners.memory.encoder import Encoder, Floats32, Weights, to_onnx
-from planners.memory.forward import Forward, forward_of
-from planners.memory.inverted_lists import InvertedLists, best_listed
-from planners.memory.labels import START_TOLERANCE, PlanSweeps, first_answer
-from planners.memory.masks import rank_by_cells
-from planners.memory.scores import best_plans
-from planners.world.occupancy import Bits, Grid, bits_of
-from planners.world.problem import Integers, Plan
-from planners.world.vehicle import Vehicle
+from planners.memory.encoder.encoder import Encoder, Weights, to_onnx
+from planners.memory.encoder.forward_pass import Forward, forward_of
+from planners.memory.plans.cell_masks import rank_by_cells
+from planners.memory.plans.first_free import first_free
+from planners.memory.plans.sweeps import START_TOLERANCE, PlanSweeps, first_answer
+from planners.memory.ranking.inverted_lists import InvertedLists, best_listed
+from planners.memory.ranking.scores import best_plans
+from planners.world.arrays import Floats32, Integers
+from planners.world.geometry.occupancy import Bits, Grid, bits_of
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
 RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")

@@ -14,10 +14,11 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from planners.world.bodies import footprints
+from planners.world.arrays import Floats
 from planners.world.jit import jit
-from planners.world.problem import Floats, Problem
-from planners.world.vehicle import Vehicle
+from planners.world.problem import Problem
+from planners.world.vehicles.bodies import footprints
+from planners.world.vehicles.vehicle import Vehicle
 
 CELL_M = 0.25  # half a thin wall: the error of the spline stays below what discs add to a footprint
 PADDING_M = 2.0  # beyond the bounds, where a trajectory may be while it is not yet feasible

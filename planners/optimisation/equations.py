@@ -1,6 +1,6 @@
 """The vehicles once more, as CasADi expressions: their step, their limits, and discs that cover them.
 
-A step is the classical Runge-Kutta step of ``planners.world.dynamics``, with a length that may vary.
+A step is the classical Runge-Kutta step of ``planners.world.vehicles.dynamics``, with a length that may vary.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from planners.world.problem import Floats
-from planners.world.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_size
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_size
 
 SMOOTH = 0.01  # m/s, rad: how far from 0 an absolute value is rounded off, always upwards
 SHY_OF_JACK_KNIFE = 1e-3  # rad: the limit itself may be passed by the solver's tolerance

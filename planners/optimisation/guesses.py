@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.world.collision import Scene, count_free_prefix
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.jit import jit
-from planners.world.problem import Floats, Plan, Problem, start_state
-from planners.world.vehicle import CAR, Vehicle, state_size
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 
 def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:

@@ -19,11 +19,11 @@ from planners.optimisation.clearance_field import CELL_M, clearance_field
 from planners.optimisation.equations import bounds_of
 from planners.optimisation.guesses import begun_at, resampled
 from planners.optimisation.transcription import Objective, Solution, transcribe
-from planners.world.authority import faults
-from planners.world.collision import count_free_prefix, scene_of
-from planners.world.dynamics import simulate
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem, start_state
-from planners.world.vehicle import CAR, Vehicle, state_names, state_size
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_names, state_size
 
 FEWEST_STEPS = 4
 

@@ -19,8 +19,9 @@ import numpy as np
 
 from planners.optimisation.clearance_field import ClearanceField
 from planners.optimisation.equations import bounds_of, discs_of, step_of
-from planners.world.problem import Floats, Plan, Problem, start_state
-from planners.world.vehicle import Vehicle, state_size
+from planners.world.arrays import Floats
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.vehicle import Vehicle, state_size
 
 GOAL_SHY_M = 1e-3  # inside the goal disc: states simulated again are some 1e-7 m off
 H_UNIT_S = 0.1  # the unknown step length is near 1, like the others

@@ -11,10 +11,10 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.collision import Scene, count_free_prefix
-from planners.world.dynamics import control_limits, simulate
-from planners.world.problem import Floats
-from planners.world.vehicle import DifferentialDrive, Vehicle
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.vehicles.dynamics import control_limits, simulate
+from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
 
 FACING: Final = 1e-4  # radians: facing a goal 70 m away to a hundredth of a metre
 MOST_ARCS: Final = 7  # of a zigzag

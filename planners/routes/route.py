@@ -21,18 +21,18 @@ from planners.maps.surroundings import surroundings_of
 from planners.routes.manoeuvres import bearing, braking, is_free_drive, rolling, turn_towards
 from planners.routes.way_ahead import LocalGoal, Place, WayAhead
 from planners.solve import Attempt
-from planners.world.collision import box_is_free, count_free_prefix, scene_of
-from planners.world.dynamics import simulate
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import box_is_free, count_free_prefix, scene_of
 from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
     GOAL_RADIUS,
-    Floats,
     Plan,
     Problem,
     start_state,
 )
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 CANONICAL_TRIED: Final = 4  # local goals at the canonical distance, from one place
 STOPS_TRIED: Final = 2  # places to brake at, of one plan

@@ -10,7 +10,8 @@ from scipy import ndimage
 
 from planners.maps.cutting import LONGEST_WAY
 from planners.maps.global_path import GlobalPaths
-from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Floats
+from planners.world.arrays import Floats
+from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS
 
 HEADINGS: Final = 120  # directions looked at from a place
 APART: Final = math.radians(15.0)  # between the local goals that are tried from one place

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
 
-from planners.search.guidance import guidance
+from planners.search.guides.guidance import guidance
 from planners.search.outcome import Limits
 from planners.search.registry import plan
-from planners.world.collision import Scene, scene_of
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 FIRST_EXPANSIONS = 250  # of the first search; a few times what a planner mostly needs for a plan
 GROWTH = 1.5  # a search in vain may mean that it was too short: the next is this much longer

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.search.attempt import attempt
+from planners.search.guides.sampling import in_disc
 from planners.search.gust import (
     SAMPLE,
     Groups,
@@ -22,21 +22,22 @@ from planners.search.gust import (
     keep,
     larger,
 )
-from planners.search.neighbours import Indices
 from planners.search.outcome import Guide, Limits, Outcome
-from planners.search.roadmap import (
+from planners.search.rrt import along_guide, towards_anywhere
+from planners.search.search_loop import attempt
+from planners.search.structures.neighbours import Indices
+from planners.search.structures.roadmap import (
     Roadmap,
     RoadmapSettings,
     allocate_roadmap,
     resample_way,
 )
-from planners.search.rrt import along_guide, towards_anywhere
-from planners.search.sampling import in_disc
-from planners.search.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
-from planners.world.collision import Scene, scene_of
+from planners.search.structures.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.jit import lean
-from planners.world.problem import Floats, Plan, Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 LONGEST_LEAD = 256  # waypoints
 # places in Lead.marks

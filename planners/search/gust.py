@@ -8,22 +8,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.search.attempt import attempt
-from planners.search.neighbours import Indices, nearest_for
+from planners.search.guides.sampling import in_bounds, in_disc
 from planners.search.outcome import Guide, Limits, Outcome
-from planners.search.roadmap import (
+from planners.search.rrt import along_guide, towards_anywhere
+from planners.search.search_loop import attempt
+from planners.search.structures.neighbours import Indices, nearest_for
+from planners.search.structures.roadmap import (
     CHECKS as ROADMAP_CHECKS,
 )
-from planners.search.roadmap import (
+from planners.search.structures.roadmap import (
     Roadmap,
     RoadmapSettings,
     allocate_roadmap,
     build_roadmap,
     resample_way,
 )
-from planners.search.rrt import along_guide, towards_anywhere
-from planners.search.sampling import in_bounds, in_disc
-from planners.search.tree import (
+from planners.search.structures.tree import (
     CHECKS,
     EXPANSIONS,
     EXTENSION,
@@ -33,11 +33,12 @@ from planners.search.tree import (
     Tree,
     extend,
 )
-from planners.world.collision import Scene, scene_of
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.jit import inlined, lean
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.problem import Plan, Problem
 from planners.world.trigonometry import length
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
 

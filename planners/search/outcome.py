@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.problem import Floats, Integers, Plan
+from planners.world.arrays import Floats, Integers
+from planners.world.problem import Plan
 
 
 class Status(StrEnum):

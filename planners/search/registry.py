@@ -11,9 +11,9 @@ from planners.search.follow import FollowSettings, follow
 from planners.search.gust import GustSettings, gust
 from planners.search.outcome import Guide, Limits, Outcome
 from planners.search.rrt import RrtSettings, rrt
-from planners.world.collision import Scene
+from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 Planner = Callable[..., Outcome]
 

@@ -13,18 +13,19 @@ from time import perf_counter
 
 import numpy as np
 
-from planners.search.grid_path import grid_path
-from planners.search.guidance import guidance
+from planners.search.guides.grid_path import grid_path
+from planners.search.guides.guidance import guidance
 from planners.search.outcome import Limits, Outcome, Status
 from planners.search.registry import plan
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
-from planners.world.collision import Scene, state_is_free
-from planners.world.dynamics import load
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.geometry.occupancy import Bits
 from planners.world.jit import lean
-from planners.world.occupancy import Bits
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.problem import Plan, Problem
 from planners.world.trigonometry import length
-from planners.world.vehicle import CAR, Vehicle, state_size
+from planners.world.vehicles.dynamics import load
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

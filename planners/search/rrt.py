@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.search.attempt import attempt
-from planners.search.neighbours import nearest
+from planners.search.guides.sampling import guided
 from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
-from planners.search.sampling import guided
-from planners.search.tree import (
+from planners.search.search_loop import attempt
+from planners.search.structures.neighbours import nearest
+from planners.search.structures.tree import (
     EXPANSIONS,
     EXTENSION,
     GOAL_VERTEX,
@@ -21,10 +21,11 @@ from planners.search.tree import (
     Tree,
     extend,
 )
-from planners.world.collision import Scene, scene_of
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.jit import lean
-from planners.world.problem import Floats, Plan, Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 
 class RrtSettings(NamedTuple):

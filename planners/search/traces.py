@@ -8,12 +8,12 @@ import numpy as np
 
 from planners.search.follow import FollowSettings
 from planners.search.gust import GustSettings
-from planners.search.neighbours import Indices
 from planners.search.outcome import Limits
-from planners.search.roadmap import BLOCKED, EDGES, FREE, NODES, allocate_roadmap
-from planners.search.tree import SIZE, allocate_tree
-from planners.world.problem import Floats
-from planners.world.vehicle import Vehicle, state_size
+from planners.search.structures.neighbours import Indices
+from planners.search.structures.roadmap import BLOCKED, EDGES, FREE, NODES, allocate_roadmap
+from planners.search.structures.tree import SIZE, allocate_tree
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import Vehicle, state_size
 
 
 class Trace(NamedTuple):

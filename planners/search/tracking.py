@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planners.search.tree import EXTENSION, Extension, pid
-from planners.world.collision import Scene, state_is_free
-from planners.world.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.search.structures.tree import EXTENSION, Extension, pid
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import lean
-from planners.world.problem import Floats
 from planners.world.trigonometry import length
-from planners.world.vehicle import Vehicle
+from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.vehicle import Vehicle
 
 ARRIVED, BLOCKED, LOST = range(3)
 

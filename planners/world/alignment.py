@@ -9,14 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.problem import (
-    CANONICAL_DISTANCE,
-    CANONICAL_START,
-    Floats,
-    Plan,
-    Problem,
-    obstacles_of,
-)
+from planners.world.arrays import Floats
+from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Plan, Problem, obstacles_of
 
 SAME_ANGLE = 1e-9  # radians: less turn than this moves nothing by as much as a float32's last digit
 SLIVER = 1e-4  # metres: thinner than this a triangle is left out, float32 would turn it inside out

@@ -8,10 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.vehicle import CAR, Vehicle, state_size
-
-Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-Integers = np.ndarray[tuple[int, ...], np.dtype[np.int32]]
+from planners.world.arrays import Floats, Integers
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 CANONICAL_START = (0.0, 0.0, math.pi / 4)  # metres, metres, radians: facing the goal
 CANONICAL_GOAL = (50.0, 50.0)  # metres
@@ -97,8 +95,6 @@ __all__ = [
     "CANONICAL_START",
     "CAR",
     "GOAL_RADIUS",
-    "Floats",
-    "Integers",
     "Obstacles",
     "Plan",
     "Problem",

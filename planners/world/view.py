@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from time import perf_counter
 
-from planners.world.collision import Scene, scene_of
-from planners.world.occupancy import Bits, Drawing, drawing_of
+from planners.world.geometry.collision import Scene, scene_of
+from planners.world.geometry.occupancy import Bits, Drawing, drawing_of
 from planners.world.problem import Problem
 
 

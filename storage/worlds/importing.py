@@ -10,11 +10,11 @@ from typing import Final, Literal
 from planners.maps.cutting import Cut, cut_problems, cut_scenarios
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.world.faults import problem_fault
 from planners.world.problem import Problem
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.problem_faults import problem_fault
+from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError, sentence
-from storage.problems import problems_or_faults
+from storage.exchange.problems import problems_or_faults
 from storage.worlds.moving_ai import map_of_scenarios, read_map, read_scenarios
 from storage.worlds.numpy_grids import grid_worlds, read_grid
 from storage.worlds.pictures import picture_world

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 
 from planners.maps.occupancy_map import OccupancyMap
-from planners.world.problem import Floats
-from storage.files import read_text
+from planners.world.arrays import Floats
+from storage.places.files import read_text
 from storage.worlds.limits import LARGEST_FILE, check_resolution, check_size
 
 CELL_M: Final = 1.0

@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.polygons import PolygonError, convex_pieces
+from planners.world.geometry.polygons import PolygonError, convex_pieces
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Problem, obstacles_of
-from storage.files import read_text
+from storage.places.files import read_text
 
 LARGEST_FILE: Final = 10_000_000  # bytes
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 import yaml
 
 from planners.maps.occupancy_map import Cells, OccupancyMap
-from storage.files import read_text
+from storage.places.files import read_text
 from storage.worlds.limits import check_resolution
 from storage.worlds.picture_files import Picture, read_picture
 

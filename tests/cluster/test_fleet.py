@@ -14,8 +14,8 @@ import distributed
 import psycopg2
 import pytest
 
-from storage.layout import DataFolder, RunFolder, open_data_folder
-from storage.mirror import fetch, files_in
+from storage.places.data_folder import DataFolder, RunFolder, open_data_folder
+from storage.places.mirror import fetch, files_in
 from tests.cluster.machines import ROOT, Fleet, fleet, wait_for
 from tests.flows.same_rows import assert_same_rows
 
@@ -43,7 +43,7 @@ def _local_run(folder: Path) -> subprocess.Popen[bytes]:
         for name, value in os.environ.items()
         if not name.startswith(("PREFECT_", "MLFLOW_", "MOTION_MEMORY_", "DASK_"))
     }
-    command = [sys.executable, "-m", "flows.cli", *RUN, "--data", str(folder), "--workers", "2"]
+    command = [sys.executable, "-m", "flows.cli.main", *RUN, "--data", str(folder), "--workers", "2"]
     with (folder.parent / "local.log").open("wb") as log:
         return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
 
@@ -68,7 +68,7 @@ def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of
     import boto3
 
     boto3.client("s3").create_bucket(Bucket=machines.bucket)
-    command = [sys.executable, "-m", "flows.cli", *RUN, "--scheduler", machines.scheduler_address]
+    command = [sys.executable, "-m", "flows.cli.main", *RUN, "--scheduler", machines.scheduler_address]
     running = machines.start("command", *command).running
     try:
         run = _disturb(machines, running)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from storage.configurations import BASELINE, Configuration
+from storage.tables.configurations import BASELINE, Configuration
 
 STANDARD = [
     BASELINE,

@@ -13,10 +13,10 @@ from mlflow import MlflowClient
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from storage.layout import DataFolder
-from tasks.local_server import set_environment
-from tasks.logbook import tracker
-from tasks.tracking import EXPERIMENT
+from storage.places.data_folder import DataFolder
+from tasks.servers.prefect_server import set_environment
+from tasks.tracking.logbook import tracker
+from tasks.tracking.mlflow_runs import EXPERIMENT
 from tests.cluster.machines import answers, free_port
 from tests.dashboards.web.browser import browser, shown_at
 

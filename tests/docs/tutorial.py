@@ -56,7 +56,7 @@ def begin(folder: Path) -> None:
 
 def do(step: Step, folder: Path) -> str:
     """What the commands print; CalledProcessError where one fails."""
-    script = f'set -e\nmotion-memory() {{ "{sys.executable}" -m flows.cli "$@"; }}\n{step.commands}'
+    script = f'set -e\nmotion-memory() {{ "{sys.executable}" -m flows.cli.main "$@"; }}\n{step.commands}'
     environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "110"}
     done = subprocess.run(
         ["bash", "-c", script], cwd=folder, env=environment, capture_output=True, text=True, check=False

@@ -6,8 +6,8 @@ import signal
 import sys
 from pathlib import Path
 
-from tasks.schedule import serve
-from tasks.settings import RunSettings
+from tasks.champions.retraining_schedule import serve
+from tasks.settings.run_settings import RunSettings
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -6,8 +6,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from tasks.local_server import local_server
-from tasks.settings import for_preset
+from tasks.servers.prefect_server import local_server
+from tasks.settings.run_settings import for_preset
 
 SETTINGS = replace(
     for_preset("smoke", classes=["random", "trap"], seed=3, learning={"seeds": 2}),
@@ -22,7 +22,7 @@ def main(first: Path, second: Path) -> None:
     """Run in two folders; the first twice."""
     with local_server(first) as server:
         from flows.run import run
-        from tasks.engine import cluster
+        from tasks.fan_out.fan_out import cluster
 
         with cluster(2):
             if server is not None:
@@ -35,6 +35,6 @@ def main(first: Path, second: Path) -> None:
 
 
 if __name__ == "__main__":
-    from storage.layout import open_data_folder
+    from storage.places.data_folder import open_data_folder
 
     main(*(open_data_folder(place).path for place in sys.argv[1:3]))

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from storage.layout import DataFolder, RunFolder
+from storage.places.data_folder import DataFolder, RunFolder
 from tests.flows.same_rows import assert_same_rows
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
 
 
 def _start(data: Path, workers: int) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "flows.cli", "run", "--preset", "smoke", "--data", str(data)]
+    command = [sys.executable, "-m", "flows.cli.main", "run", "--preset", "smoke", "--data", str(data)]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
     with (data.parent / f"{data.name}.log").open("ab") as log:
         return subprocess.Popen(

@@ -16,11 +16,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from storage.layout import DataFolder, RunFolder
-from storage.memories import load_memory
-from storage.recalls import read_recalls
-from tasks.settings import ABLATION, ASSISTS
-from tasks.stages import stages_of
+from storage.archives.memories import load_memory
+from storage.places.data_folder import DataFolder, RunFolder
+from storage.tables.recalls import read_recalls
+from tasks.reports.stage_times import stages_of
+from tasks.settings.run_settings import ABLATION, ASSISTS
 from tests.flows.same_rows import assert_same_rows, rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -194,7 +194,7 @@ def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
     folder = tmp_path / "copy"
     shutil.copytree(runs[1].path.parents[1], folder)
     (run,) = DataFolder(folder).runs()
-    asked = [sys.executable, "-m", "flows.cli", "verify", str(folder), "--sample", "1", "--workers", "1"]
+    asked = [sys.executable, "-m", "flows.cli.main", "verify", str(folder), "--sample", "1", "--workers", "1"]
     done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
     assert (done.returncode, done.stderr) == (0, "")
     assert "612 attempts made again" in done.stdout

@@ -18,13 +18,13 @@ from typing import Any
 import psutil
 import pytest
 
-from dashboards.drift import Usefulness
-from storage.layout import DataFolder
-from tasks.local_server import running_server
-from tasks.registry import FIRST, PROMOTED, Registry, registered_name
-from tasks.settings import UsageError
-from tasks.watch import DRIFT, Watched, watch
-from tests.tasks.retrained import CLASS, SETTINGS, learn
+from dashboards.verdicts.drift import Usefulness
+from storage.places.data_folder import DataFolder
+from tasks.champions.drift_watch import DRIFT, Watched, watch
+from tasks.registry.champion_registry import FIRST, PROMOTED, Registry, registered_name
+from tasks.servers.prefect_server import running_server
+from tasks.settings.run_settings import UsageError
+from tests.tasks.champions.retrained import CLASS, SETTINGS, learn
 
 ROOT = Path(__file__).parents[2]
 EVERY_SECONDS = 15.0
@@ -131,7 +131,7 @@ def _automated(data: Path) -> int:
 def test_a_schedule_that_cannot_be_is_refused_before_anything_starts(
     every: float | None, cron: str | None, told: str, tmp_path: Path
 ) -> None:
-    from tasks.schedule import serve
+    from tasks.champions.retraining_schedule import serve
 
     with pytest.raises(UsageError, match=told):
         serve(SETTINGS, tmp_path / "data", every, cron, False, 1)

@@ -40,7 +40,7 @@ def watch(
     log: Path,
     environment: dict[str, str] | None = None,
     until: Callable[[str], bool] = lambda _: False,
-    script: str = "from flows.cli import main; main()",
+    script: str = "from flows.cli.main import main; main()",
 ) -> Watched:
     """Run a command; SIGTERM once its output is what ``until`` waits for."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
@@ -80,7 +80,7 @@ def _ports(command: psutil.Process) -> set[Port]:
             connections = process.net_connections("inet")
         except psutil.Error:  # it has ended
             continue
-        name = "command" if process == command else "server" if "local_server.py" in line else "child"
+        name = "command" if process == command else "server" if "prefect_server.py" in line else "child"
         found |= {
             Port(name, connection.laddr.ip)
             for connection in connections

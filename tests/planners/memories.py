@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from planners.memory.encoder import Architecture, initial_weights
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.recall import Memory
 from planners.solve import solve
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.arrays import Floats
+from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle
 
 
 def memory_of(

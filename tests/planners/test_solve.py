@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.labels import free_plans
+from planners.memory.plans.sweeps import free_plans
 from planners.memory.recall import RECALLS
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.solve import ASSISTS, improved, solve, turned
-from planners.world.authority import faults
-from planners.world.collision import scene_of
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR_1_TRAILER
+from planners.world.vehicles.vehicle import CAR_1_TRAILER
 from tests.planners.memories import memory_of_plans
 from tests.worlds import box, problem_of, strewn, walled_goal
 

@@ -15,13 +15,13 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from dashboards.charts import anytime_curves
+from dashboards.figures.training_figures import anytime_curves
 from planners.memory.recall import default_recall, recall
 from planners.search.anytime import Improved, improve
 from planners.search.registry import PLANNERS
-from planners.world.classes import CLASSES, problem_class
-from planners.world.collision import scene_of
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.view import View
 from tests.speed.assists import MEASURING, memory_of
 

@@ -21,23 +21,24 @@ from rich.progress import track
 from rich.table import Table
 
 from planners.memory.build_memory import build_memory
-from planners.memory.experience import Experience
+from planners.memory.encoder.training import TrainingSettings, train
 from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
-from planners.memory.labels import free_plans, sweep_plans
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import free_plans, sweep_plans
 from planners.memory.recall import Memory
-from planners.memory.training import TrainingSettings, train
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
-from planners.world.classes import CLASSES, ProblemClass, problem_class
-from planners.world.collision import scene_of
-from planners.world.problem import Floats, Problem
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, ProblemClass, problem_class
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Problem
 from planners.world.randomness import generator
-from storage.configurations import Configuration
+from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
-from storage.memories import load_memory, save_memory
-from tasks.keys import key_of
+from storage.tables.configurations import Configuration
+from tasks.fan_out.keys import key_of
 
 KEPT = Path("build") / "speed"  # not the data folder: a run wants that empty or its own
 COLLECTING = 79  # seed of the stored experiences

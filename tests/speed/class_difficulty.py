@@ -16,11 +16,11 @@ import numpy as np
 
 from planners.search.outcome import Outcome, Status
 from planners.search.registry import PLANNERS, plan
-from planners.world.classes import CLASSES, DIFFICULTIES, problem_class
-from planners.world.collision import count_free_prefix, scene_of
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
+from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR
 
 STORED = 100  # plans that the oracle may choose from
 STORED_BY = "follow"  # the planner that made them

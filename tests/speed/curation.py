@@ -24,14 +24,15 @@ from rich.table import Table
 from scipy.stats import binomtest
 
 from planners.memory.curation import coverage, curate
-from planners.memory.experience import Experience
 from planners.memory.labelling import label_problems
-from planners.memory.labels import Flags, sweep_plans
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import Flags, sweep_plans
 from planners.search.outcome import Limits
 from planners.search.registry import plan
 from planners.world.alignment import to_canonical
-from planners.world.classes import CLASSES, problem_class
-from planners.world.problem import Floats, Problem
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.problem import Problem
 from planners.world.randomness import generator
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at

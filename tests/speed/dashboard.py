@@ -18,9 +18,9 @@ import psutil
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from storage.layout import open_data_folder
-from storage.schemas import ATTEMPTS
-from storage.shards import read_table, write_table
+from storage.places.data_folder import open_data_folder
+from storage.tables.schemas import ATTEMPTS
+from storage.tables.shards import read_table, write_table
 
 ROWS = 450_000
 SHARD = 15_000
@@ -70,7 +70,7 @@ def main(source: str) -> None:
         began = time.perf_counter()
         asked = ["dashboard", "--data", str(data), "--port", "0", "--no-browser"]
         server = subprocess.Popen(
-            [sys.executable, "-m", "flows.cli", *asked], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-m", "flows.cli.main", *asked], stdout=subprocess.PIPE, text=True
         )
         try:
             assert server.stdout is not None

@@ -32,14 +32,14 @@ from rich.progress import track
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from planners.memory.labels import Flags, free_plans
+from planners.memory.plans.sweeps import Flags, free_plans
 from planners.memory.recall import RECALLS, Memory, default_recall, recall
-from planners.world.classes import problem_class
-from planners.world.collision import scene_of
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.view import View
-from storage.memories import load_memory, save_memory
+from storage.archives.memories import load_memory, save_memory
 from tests.speed.assists import KEPT, MEASURING
 from tests.speed.many_plans import collected_memory, collected_plans, place_of, synthetic_memory
 from tests.speed.rankers import CANDIDATES, rankers
@@ -129,7 +129,7 @@ def add_rankings(rows: Table, memory: Memory, problems: list[Problem], free: Fla
 
 LOADING = """
 import sys, time, pathlib
-from storage.memories import load_memory
+from storage.archives.memories import load_memory
 place = pathlib.Path(sys.argv[1])
 def status(name):
     lines = open("/proc/self/status").read().splitlines()

@@ -24,25 +24,25 @@ from matplotlib.collections import PolyCollection
 from rich.console import Console
 from rich.table import Table
 
-from dashboards.pictures import draw_plan, draw_problem
-from dashboards.style import INK, PURPLE, new_figure
-from planners.memory.experience import Experience
+from dashboards.figures.pictures import draw_plan, draw_problem
+from dashboards.figures.style import INK, PURPLE, new_figure
 from planners.memory.hallucination.mixture import METHODS, hallucinate, method_named
 from planners.memory.hallucination.no_plan import no_plan
-from planners.memory.labels import sweep_plans
-from planners.world.classes import CLASSES, problem_class
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import sweep_plans
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem, obstacles_of
 from planners.world.randomness import generator
-from storage.experiences import read_experiences
-from storage.files import whole_file
-from storage.hallucinators import load_hallucinator
-from tasks.caching import run_folder
-from tasks.hallucinate import (
+from storage.archives.hallucinators import load_hallucinator
+from storage.places.files import whole_file
+from storage.tables.experiences import read_experiences
+from tasks.fan_out.stage import run_folder
+from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.stages.hallucinate import (
     hallucinate_chunk,
     hallucination_chunks,
 )
-from tasks.learn_hallucination import learn_chunk, learning_chunks
-from tasks.settings import RunSettings, for_preset
+from tasks.stages.learn_hallucination import learn_chunk, learning_chunks
 from tests.tasks.collected import collect
 
 SEED = 81

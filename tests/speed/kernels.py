@@ -14,17 +14,17 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from planners.search.neighbours import nearest
 from planners.search.outcome import Limits
 from planners.search.registry import plan
-from planners.search.tree import SIZE, Tree, allocate_tree
-from planners.world.classes import CLASSES, problem_class
-from planners.world.collision import Scene, scene_of, state_is_free
-from planners.world.dynamics import load, step
+from planners.search.structures.neighbours import nearest
+from planners.search.structures.tree import SIZE, Tree, allocate_tree
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import Scene, scene_of, state_is_free
 from planners.world.jit import lean
-from planners.world.problem import Floats
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, Vehicle, state_size
+from planners.world.vehicles.dynamics import load, step
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from tests.speed.statistics import with_interval
 
 SEED = 77

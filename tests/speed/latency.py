@@ -19,11 +19,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from planners.memory.labels import free_plans
+from planners.memory.plans.sweeps import free_plans
 from planners.memory.recall import RECALLS, Memory, recall
 from planners.solve import solve
-from planners.world.classes import CLASSES, problem_class
-from planners.world.collision import scene_of
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.view import View

@@ -10,18 +10,18 @@ import numpy as np
 from rich.progress import track
 
 from planners.memory.growth import grow
-from planners.memory.inverted_lists import list_readout
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.memory.plans.sweeps import sweep_plans
+from planners.memory.ranking.inverted_lists import list_readout
 from planners.memory.recall import Memory
-from planners.memory.stored_plans import StoredPlans, store_plans
 from planners.solve import solve
-from planners.world.classes import ProblemClass
+from planners.world.classes.problem_classes import ProblemClass
 from planners.world.problem import Plan
-from planners.world.vehicle import CAR, state_size
+from planners.world.vehicles.vehicle import CAR, state_size
+from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
-from storage.memories import load_memory, save_memory
-from tasks.keys import key_of
+from tasks.fan_out.keys import key_of
 from tests.speed.assists import COLLECTING, memory_of
 
 TAUGHT = 1_000  # plans that the encoder is trained on

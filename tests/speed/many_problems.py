@@ -20,12 +20,12 @@ import psutil
 from rich.console import Console
 from rich.progress import track
 
-from planners.world.classes import problem_class
-from storage.files import remove_folder, whole_file
-from storage.memories import save_memory
-from storage.problem_files import raw_problems
-from storage.problems import fields_of
-from storage.results import attempt_columns
+from planners.world.classes.problem_classes import problem_class
+from storage.archives.memories import save_memory
+from storage.exchange.problem_files import raw_problems
+from storage.exchange.problems import fields_of
+from storage.places.files import remove_folder, whole_file
+from storage.tables.attempts import attempt_columns
 from tests.speed.assists import memory_of
 
 SEED = 84
@@ -59,7 +59,7 @@ def main() -> None:
     out = asked.folder / "rows.parquet"
     out.unlink(missing_ok=True)
     remove_folder(out.with_name(f"{out.name}.parts"))
-    command = [sys.executable, "-m", "flows.cli", "solve", str(problems), "--planner", "gust"]
+    command = [sys.executable, "-m", "flows.cli.main", "solve", str(problems), "--planner", "gust"]
     command += ["--assist", "open", "--memory", str(memory), "--out", str(out)]
     command += ["--workers", str(asked.workers)]
     finished: dict[Path, int] = {}

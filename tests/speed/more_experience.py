@@ -19,18 +19,19 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from dashboards.intervals import RESAMPLES, bootstrap, interval
+from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
 from planners.memory.recall import Memory
 from planners.solve import Attempt, solve
-from planners.world.classes import problem_class
-from planners.world.problem import Floats, Problem
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import problem_class
+from planners.world.problem import Problem
 from planners.world.randomness import generator
-from storage.files import read_text
-from storage.layout import open_data_folder
-from storage.memories import load_memory
-from tasks.compile_assists import compile_assists
-from tasks.settings import COMBINED, RunSettings
-from tasks.timing import no_garbage_collection
+from storage.archives.memories import load_memory
+from storage.places.data_folder import open_data_folder
+from storage.places.files import read_text
+from tasks.attempts.compile_assists import compile_assists
+from tasks.attempts.timing import no_garbage_collection
+from tasks.settings.run_settings import COMBINED, RunSettings
 
 SEED = 86
 ASSISTS = (("closed", "centroid"), ("repair", "exhaustive"))

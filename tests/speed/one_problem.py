@@ -22,13 +22,13 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from storage.memories import save_memory
-from storage.problems import write_problems
-from storage.results import read_attempts
-from tasks.benchmark import benchmark_chunk
-from tasks.caching import Chunk
-from tasks.settings import for_preset
-from tasks.worlds import source_of
+from storage.archives.memories import save_memory
+from storage.exchange.problems import write_problems
+from storage.tables.attempts import read_attempts
+from tasks.fan_out.stage import Chunk
+from tasks.inputs.problem_sources import source_of
+from tasks.settings.run_settings import for_preset
+from tasks.stages.benchmark import benchmark_chunk
 from tests.speed.assists import memory_of
 
 SEED = 83
@@ -92,7 +92,7 @@ def _planned(problem: Path, assist: str, folder: Path) -> tuple[float, float]:
     command = [
         sys.executable,
         "-m",
-        "flows.cli",
+        "flows.cli.main",
         "plan",
         str(problem),
         "--planner",

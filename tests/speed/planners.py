@@ -21,8 +21,8 @@ from planners.search.follow import FollowSettings, follow
 from planners.search.gust import GustSettings, gust
 from planners.search.outcome import Outcome, Status
 from planners.search.registry import PLANNERS
-from planners.search.roadmap import RoadmapSettings
-from planners.world.classes import CLASSES, problem_class
+from planners.search.structures.roadmap import RoadmapSettings
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from tests.speed.statistics import with_interval

@@ -15,8 +15,8 @@ from typing import Final, NamedTuple
 
 import pyarrow.parquet as pq
 
-from storage.layout import RunFolder
-from tasks.stages import stages_of
+from storage.places.data_folder import RunFolder
+from tasks.reports.stage_times import stages_of
 
 SIZES: Final = (10**6, 10**8, 10**10)
 TASK_SECONDS: Final = 0.07  # of one task on Dask under Prefect

@@ -30,10 +30,10 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from planners.world.classes import problem_class
-from storage.memories import save_memory
-from storage.problems import fields_of
-from tasks.robot import load_planner
+from planners.world.classes.problem_classes import problem_class
+from storage.archives.memories import save_memory
+from storage.exchange.problems import fields_of
+from tasks.requests.robot import load_planner
 from tests.speed.assists import memory_of
 from tests.tasks.served import JSON, malformed, request
 
@@ -91,7 +91,7 @@ def _report(console: Console, memory: Path, class_name: str, workers: int, nonse
 
 @contextmanager
 def _served(memory: Path, workers: int) -> Iterator[tuple[str, psutil.Popen]]:
-    command = [sys.executable, "-m", "flows.cli", "serve-memory", str(memory), "--port", "0"]
+    command = [sys.executable, "-m", "flows.cli.main", "serve-memory", str(memory), "--port", "0"]
     running = psutil.Popen([*command, "--workers", str(workers)], stdout=subprocess.PIPE, text=True)
     try:
         for line in running.stdout:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 
 RESAMPLES = 2000
 SEED = 0

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from planners.world.authority import faults
-from planners.world.classes import problem_class
-from planners.world.collision import count_free_prefix, scene_of
-from planners.world.dynamics import simulate
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import start_state
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR
 from tests.speed.peers.answer import MissingError
 from tests.speed.peers.native import Native
 from tests.speed.peers.settings import KPIECE1, RRT

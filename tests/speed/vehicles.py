@@ -15,15 +15,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from dashboards.pictures import Example, gallery
+from dashboards.figures.pictures import Example, gallery
 from planners.search.outcome import Outcome
 from planners.search.registry import PLANNERS, plan
-from planners.world.authority import faults
-from planners.world.classes import CLASSES, problem_class
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, VEHICLES, Vehicle
-from storage.files import whole_file
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+from storage.places.files import whole_file
 from tests.speed.planners import SEED, measure
 from tests.speed.statistics import with_interval
 

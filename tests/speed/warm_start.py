@@ -25,11 +25,12 @@ from planners.optimisation.clearance_field import least_clearance
 from planners.optimisation.guesses import count_blocked, least_blocked, straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, improve, optimise
 from planners.search.registry import plan
-from planners.world.classes import CLASSES, problem_class
-from planners.world.collision import scene_of
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR
 
 SEED = 78  # of the problems; stored plans are of the seed after it
 COUNT = 20  # problems a class

@@ -10,7 +10,8 @@ from unittest.mock import patch
 
 import pytest
 
-from storage import layout, objects
+from storage.places import data_folder as layout
+from storage.places import objects
 
 BUCKET: Final = "bucket"
 DATA: Final = f"s3://{BUCKET}/team/data"

@@ -8,22 +8,22 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from planners.memory.encoder import Architecture, initial_weights
-from planners.memory.experience import Experience
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.recall import Memory
+from planners.world.arrays import Floats
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
-    Floats,
     Plan,
     Problem,
     obstacles_of,
 )
-from planners.world.vehicle import CAR, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 quick = settings(deadline=None, max_examples=40)  # the first example compiles or makes folders
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from tasks.caching import Chunk, keep_settings
-from tasks.collect import chunks_wanted, collect_chunk
-from tasks.curate import curate_chunk, curation_chunks, keep_experiences
-from tasks.settings import RunSettings
+from tasks.fan_out.stage import Chunk, keep_settings
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.collect import chunks_wanted, collect_chunk
+from tasks.stages.curate import curate_chunk, curation_chunks, keep_experiences
 
 
 def collect(data: str, settings: RunSettings) -> None:

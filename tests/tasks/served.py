@@ -9,13 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from planners.memory.labels import sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import sweep_plans
 from planners.solve import solve
-from planners.world.classes import problem_class
+from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
-from storage.memories import save_memory
-from storage.problems import fields_of
+from storage.archives.memories import save_memory
+from storage.exchange.problems import fields_of
 from tests.storage.samples import a_memory
 
 SEED: Final = 901

@@ -7,12 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.experience import Experience
 from planners.memory.hallucination.method import DrawObstacles, Sampler
-from planners.world.bodies import box_corners
+from planners.memory.plans.experience import Experience
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.occupancy import CELL, GRID, Grid, draw_occupancy
 from planners.world.jit import jit
-from planners.world.occupancy import CELL, GRID, Grid, draw_occupancy
-from planners.world.problem import BOUNDS, Floats, Integers, Obstacles
+from planners.world.problem import BOUNDS, Obstacles
+from planners.world.vehicles.bodies import box_corners
 
 SEAM_M: Final = 1e-3  # between two filled rectangles: a cell that they only touch is not filled
 DISC_SIDES: Final = 16

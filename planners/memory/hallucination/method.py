@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from planners.memory.experience import Experience
+from planners.memory.plans.experience import Experience
 from planners.world.problem import Obstacles
 
 DrawObstacles = Callable[[np.random.Generator], Obstacles]  # a fresh set of obstacles of the class

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.memory.experience import Experience
 from planners.memory.hallucination.method import DrawObstacles, Sampler
 from planners.memory.hallucination.placing import (
     clear_of,
@@ -27,9 +26,11 @@ from planners.memory.hallucination.shortcut import (
     shortest_way,
     ways_left,
 )
+from planners.memory.plans.experience import Experience
+from planners.world.arrays import Floats
+from planners.world.classes.shapes import add_regular, finished, new_canvas
 from planners.world.jit import jit
-from planners.world.problem import Floats, Obstacles
-from planners.world.shapes import add_regular, finished, new_canvas
+from planners.world.problem import Obstacles
 
 Range = tuple[float, float]  # drawn evenly from it, anew for each set
 

@@ -7,15 +7,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.encoder import Weights
-from planners.memory.experience import Experience
-from planners.memory.hallucination.learned import Learned
+from planners.memory.encoder.encoder import Weights
+from planners.memory.hallucination.learned_obstacles import Learned
 from planners.memory.hallucination.maximal import Maximal
 from planners.memory.hallucination.method import DrawObstacles, Method
 from planners.memory.hallucination.minimal import Minimal
 from planners.memory.hallucination.rearrange import Rearrange
-from planners.memory.labels import plan_is_free
-from planners.world.collision import scene_of
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import plan_is_free
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 
 METHODS: Final = ("rearrange", "maximal", "minimal", "learned")

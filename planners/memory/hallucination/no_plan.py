@@ -14,18 +14,11 @@ from planners.memory.hallucination.placing import (
     obstacle_meets,
     take_obstacle,
 )
-from planners.memory.labels import Flags, PlanSweeps, free_plans, sweep_is_free
-from planners.world.collision import build_scene
+from planners.memory.plans.sweeps import Flags, PlanSweeps, free_plans, sweep_is_free
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import build_scene
 from planners.world.jit import jit
-from planners.world.problem import (
-    BOUNDS,
-    CANONICAL_GOAL,
-    CANONICAL_START,
-    GOAL_RADIUS,
-    Floats,
-    Obstacles,
-    Problem,
-)
+from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
 
 DRAWS: Final = 1000  # a class whose obstacles miss a plan this often can never block it
 

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.experience import Experience
-from planners.world.collision import box_meets_piece, make_edges, piece_extent
+from planners.memory.plans.experience import Experience
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import box_meets_piece, make_edges, piece_extent
 from planners.world.jit import jit
-from planners.world.problem import Floats, Obstacles
+from planners.world.problem import Obstacles
 from planners.world.trigonometry import length
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.memory.experience import Experience
 from planners.memory.hallucination.method import DrawObstacles, Sampler
 from planners.memory.hallucination.placing import (
     Corridor,
@@ -19,6 +18,7 @@ from planners.memory.hallucination.placing import (
     obstacles_near,
     take_obstacle,
 )
+from planners.memory.plans.experience import Experience
 from planners.world.jit import jit
 from planners.world.problem import Obstacles
 

@@ -13,9 +13,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planners.world.arrays import Floats
+from planners.world.classes.shapes import distance_to_piece
 from planners.world.jit import inlined, jit
-from planners.world.problem import BOUNDS, Floats, Obstacles
-from planners.world.shapes import distance_to_piece
+from planners.world.problem import BOUNDS, Obstacles
 
 Lattice = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 Closed = Lattice  # [SIDE * SIDE] bit k of a point: closed by obstacle k

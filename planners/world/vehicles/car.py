@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from planners.world.arrays import Floats
 from planners.world.jit import implements, inlined
-from planners.world.problem import Floats
 from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
-from planners.world.vehicle import Car, CarWithTrailers
 from planners.world.vehicles.interface import (
     Box,
     State,
@@ -19,6 +18,7 @@ from planners.world.vehicles.interface import (
     swept_bodies,
     turn_error,
 )
+from planners.world.vehicles.vehicle import Car, CarWithTrailers
 
 CarLike = Car | CarWithTrailers
 

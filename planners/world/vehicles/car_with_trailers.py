@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 
+from planners.world.arrays import Floats
 from planners.world.jit import implements, inlined
-from planners.world.problem import Floats
 from planners.world.trigonometry import sincos
-from planners.world.vehicle import CarWithTrailers
 from planners.world.vehicles.car import drive, most_motion, turn_rates
 from planners.world.vehicles.interface import (
     Box,
@@ -24,6 +23,7 @@ from planners.world.vehicles.interface import (
     step,
     swept_bodies,
 )
+from planners.world.vehicles.vehicle import CarWithTrailers
 
 
 @implements(load, CarWithTrailers)

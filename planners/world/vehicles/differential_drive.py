@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from planners.world.arrays import Floats
 from planners.world.jit import implements
-from planners.world.problem import Floats
 from planners.world.trigonometry import angle_to, wrapped
-from planners.world.vehicle import DifferentialDrive
 from planners.world.vehicles.car import drive
 from planners.world.vehicles.interface import (
     Box,
@@ -20,6 +19,7 @@ from planners.world.vehicles.interface import (
     swept_bodies,
     turn_error,
 )
+from planners.world.vehicles.vehicle import DifferentialDrive
 
 LOOK_AHEAD_S = 0.5  # the turn under way counts for this long: damps the controller as steering does a car's
 

@@ -6,10 +6,10 @@ are constant during a step. A new vehicle is settings in ``vehicle``, a file her
 
 from __future__ import annotations
 
+from planners.world.arrays import Floats
 from planners.world.jit import by_vehicle, inlined
-from planners.world.problem import Floats
 from planners.world.trigonometry import length, sincos
-from planners.world.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 
 State = tuple[float, ...]
 Box = tuple[float, float, float, float, float, float]  # centre x, y, cos, sin, half length, half width

@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from storage.layout import DataFolder
+from storage.places.data_folder import DataFolder
 from tests.dashboards.web.server import served
 from tests.dashboards.web.small_data import RETRAINED, small_data
 

@@ -10,8 +10,8 @@ import pandas as pd
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from storage.layout import DataFolder
-from storage.results import read_attempts
+from storage.places.data_folder import DataFolder
+from storage.tables.attempts import read_attempts
 from tests.dashboards.web.browser import DESKTOP, PHONE, browser, complaints, findings, shown_at
 from tests.dashboards.web.server import served
 

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 import uvicorn
 
 from dashboards.web.app import dashboard_app
-from dashboards.web.pages.retrainings import Retrainings
-from storage.layout import DataFolder
+from dashboards.web.retrained import Retrainings
+from storage.places.data_folder import DataFolder
 
 
 @contextmanager

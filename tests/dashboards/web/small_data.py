@@ -12,23 +12,23 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from dashboards.drift import Usefulness, drifts
-from dashboards.statistics import summarise
-from dashboards.tables import as_csv
-from dashboards.web.pages.retrainings import Retrained
-from planners.memory.labels import Flags, free_plans
+from dashboards.report.tables import as_csv
+from dashboards.statistics.panels import summarise
+from dashboards.verdicts.drift import Usefulness, drifts
+from dashboards.web.retrained import Retrained
+from planners.memory.plans.sweeps import Flags, free_plans
 from planners.memory.recall import Memory
 from planners.solve import solve
-from planners.world.classes import problem_class
-from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of, pack
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import occupancy_of, pack
 from planners.world.problem import Problem
-from storage.hallucinated import write_hallucinated
-from storage.layout import DataFolder, RunFolder, open_data_folder
-from storage.memories import save_memory
-from storage.recalls import write_recalls
-from storage.results import write_attempts
-from storage.watched import add_watched
+from storage.archives.memories import save_memory
+from storage.places.data_folder import DataFolder, RunFolder, open_data_folder
+from storage.tables.attempts import write_attempts
+from storage.tables.hallucinated import write_hallucinated
+from storage.tables.recalls import write_recalls
+from storage.tables.watched import add_watched
 from tests.planners.memories import memory_of
 
 CLASS = "trap"

@@ -12,7 +12,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webdriver import WebDriver
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
-from storage.layout import DataFolder
+from storage.places.data_folder import DataFolder
 from tests.dashboards.web.browser import (
     CHROMIUM,
     DESKTOP,

@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import httpx
 import pytest
 
-from dashboards.web.attempts import COLUMNS, attempts_of
+from dashboards.web.attempt_rows import COLUMNS, attempts_of
 from dashboards.web.notices import NoticeError
-from dashboards.web.pages.retrainings import Retrained
-from storage.layout import DataFolder
-from storage.results import readable_attempts
+from dashboards.web.retrained import Retrained
+from storage.places.data_folder import DataFolder
+from storage.tables.attempts import readable_attempts
 from tests.dashboards.web.server import served
 
 ADDRESSES = (

@@ -9,7 +9,7 @@ import httpx
 import numpy as np
 import pytest
 
-from storage.layout import DataFolder, open_data_folder
+from storage.places.data_folder import DataFolder, open_data_folder
 from tests.dashboards.web.conftest import ClientOf
 from tests.dashboards.web.small_data import write_settings
 

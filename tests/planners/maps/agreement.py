@@ -9,9 +9,10 @@ import numpy as np
 import shapely
 
 from planners.maps.occupancy_map import Cells
-from planners.world.collision import Scene, box_is_free, scene_of
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, box_is_free, scene_of
 from planners.world.jit import jit
-from planners.world.problem import Floats, Problem
+from planners.world.problem import Problem
 
 HALF_LENGTH, HALF_WIDTH = 1.0, 0.45  # metres: about the car
 EDGE_M = 1e-3  # how far an outline may be moved by rounding

@@ -13,9 +13,9 @@ from planners.maps.global_path import GlobalPaths, local_goal
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Part, blocks_of
 from planners.maps.surroundings import surroundings_of
-from planners.world.faults import problem_fault
 from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, Problem
-from planners.world.vehicle import CAR, CAR_2_TRAILERS
+from planners.world.problem_faults import problem_fault
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS
 from tests.planners.maps.samples import town
 
 TOWN = town()

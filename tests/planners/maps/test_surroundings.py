@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.pieces import pieces_of
 from planners.maps.surroundings import surroundings_of
-from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, Floats
+from planners.world.arrays import Floats
+from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START
 from tests.planners.maps.agreement import cells_shape, disagreements
 from tests.planners.maps.samples import town
 

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from planners.memory.experience import Experience
-from planners.memory.labels import free_plans, sweep_plans
-from planners.world.collision import scene_of
-from planners.world.dynamics import simulate
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import free_plans, sweep_plans
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_START,
@@ -22,6 +21,7 @@ from planners.world.problem import (
     obstacles_of,
 )
 from planners.world.randomness import generator
+from planners.world.vehicles.dynamics import simulate
 from tests.worlds import box
 
 

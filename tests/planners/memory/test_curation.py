@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.curation import AGAIN, ALIKE, choose, coverage, curate, similarity
-from planners.memory.experience import Experience
-from planners.memory.labels import free_plans, sweep_plans
-from planners.memory.masks import masks_of
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import free_plans, sweep_plans
 from planners.solve import solve
-from planners.world.classes import problem_class
-from planners.world.collision import scene_of
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
 
 SEEDS = st.integers(0, 2**32 - 1)

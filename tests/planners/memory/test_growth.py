@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from planners.memory.build_memory import build_memory
-from planners.memory.encoder import Architecture, initial_weights
+from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.memory.growth import RIDGE, grow, mean_embeddings, moments_of, ridge_readout, scatter
-from planners.memory.labels import free_plans
-from planners.memory.masks import masks_of
-from planners.memory.training import TrainedEncoder, TrainingSettings
-from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import free_plans
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import occupancy_of
 from planners.world.randomness import generator
 from tests.planners.memory.conftest import boxes, problem_around
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.memory.labelling import label_problems
-from planners.memory.labels import free_plans, sweep_plans
-from planners.world.collision import scene_of
-from planners.world.occupancy import occupancy_of, pack
+from planners.memory.plans.sweeps import free_plans, sweep_plans
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import occupancy_of, pack
 from planners.world.randomness import generator
 
 

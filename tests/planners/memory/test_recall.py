@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
 from planners.memory.build_memory import build_memory
-from planners.memory.encoder import Architecture, Encoder, initial_weights, to_onnx
-from planners.memory.labels import free_plans
-from planners.memory.readout import centroids_of, label_readout, nearest_readout
+from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
+from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
+from planners.memory.plans.sweeps import free_plans
+from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
+from planners.memory.ranking.scores import best_plans
 from planners.memory.recall import (
     MOST_EXHAUSTIVE,
     RECALLS,
@@ -21,10 +23,8 @@ from planners.memory.recall import (
     rank,
     recall,
 )
-from planners.memory.scores import best_plans
-from planners.memory.training import TrainedEncoder, TrainingSettings
-from planners.world.collision import scene_of
-from planners.world.occupancy import bits_of, occupancy_of
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import bits_of, occupancy_of
 from planners.world.randomness import generator
 from planners.world.view import View
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.optimisation.clearance_field import clearance_field, least_clearance, signed_distances
-from planners.world.classes import CLASSES, problem_class
-from planners.world.problem import BOUNDS, Floats, Obstacles, Problem
-from planners.world.vehicle import CAR
+from planners.world.arrays import Floats
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.problem import BOUNDS, Obstacles, Problem
+from planners.world.vehicles.vehicle import CAR
 from tests.planners.world.strategies import clutter, problem_with, seeds
 from tests.worlds import box, problem_of
 

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.optimisation.equations import bounds_of, discs_of, step_of
-from planners.world.bodies import body_count, swept_boxes
-from planners.world.dynamics import simulate
-from planners.world.problem import Floats
-from planners.world.vehicle import VEHICLES, Vehicle
+from planners.world.arrays import Floats
+from planners.world.vehicles.bodies import body_count, swept_boxes
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from tests.planners.world.strategies import box_corners
 
 names = st.sampled_from(list(VEHICLES))

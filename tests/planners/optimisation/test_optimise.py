@@ -13,11 +13,11 @@ from planners.optimisation.guesses import count_blocked, least_blocked, resample
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, Status, improve, optimise
 from planners.optimisation.transcription import Objective
 from planners.search.registry import plan
-from planners.world.authority import faults
-from planners.world.collision import count_free_prefix, scene_of
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
+from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
 from tests.worlds import box, problem_of, strewn
 
 NEAR = (12.0, 12.0)  # a goal so near that an optimisation takes a fraction of a second

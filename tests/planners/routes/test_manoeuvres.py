@@ -8,11 +8,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planners.routes.manoeuvres import FACING, bearing, braking, is_free_drive, rolling, turn_towards
-from planners.world.authority_equations import limits_of
-from planners.world.collision import scene_of
-from planners.world.dynamics import simulate
-from planners.world.problem import Floats, start_state
-from planners.world.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
+from planners.world.arrays import Floats
+from planners.world.authority.authority_equations import limits_of
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import start_state
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
 from tests.worlds import box, problem_of
 
 OPEN = scene_of(problem_of([]))

@@ -18,9 +18,9 @@ from planners.memory.recall import Memory
 from planners.routes.route import Route, Router, Stuck
 from planners.routes.way_ahead import WayAhead
 from planners.solve import Attempt, solve
-from planners.world.authority import faults
+from planners.world.authority.authority import faults
 from planners.world.problem import GOAL_RADIUS, Problem
-from planners.world.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
 from tests.planners.maps.samples import town
 from tests.planners.memories import memory_of
 

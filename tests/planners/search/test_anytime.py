@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from planners.search.anytime import improve
 from planners.search.registry import PLANNERS, plan
-from planners.world.authority import faults
+from planners.world.authority.authority import faults
 from planners.world.randomness import generator
 from tests.worlds import problem_of, strewn, walled_goal
 

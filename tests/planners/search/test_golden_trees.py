@@ -10,9 +10,9 @@ import pytest
 
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.search.tree import SIZE, allocate_tree
+from planners.search.structures.tree import SIZE, allocate_tree
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, state_size
+from planners.world.vehicles.vehicle import CAR, state_size
 from tests.worlds import box, problem_of
 
 FOLDER = Path(__file__).parent / "golden"

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from planners.search.outcome import Guide, Limits, Status
 from planners.search.registry import PLANNERS, plan
-from planners.search.tree import SIZE, allocate_tree
-from planners.world.authority import faults
+from planners.search.structures.tree import SIZE, allocate_tree
+from planners.world.authority.authority import faults
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, state_size
+from planners.world.vehicles.vehicle import CAR, state_size
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 EVERY = pytest.mark.parametrize("name", PLANNERS)

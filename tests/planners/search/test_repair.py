@@ -9,12 +9,12 @@ from planners.search.outcome import Status
 from planners.search.registry import PLANNERS, plan
 from planners.search.repair import blocked_states, free_prefix, repair
 from planners.search.tracking import ARRIVED, BLOCKED, TRACKING, track
-from planners.world.authority import faults
-from planners.world.collision import count_free_prefix, scene_of
-from planners.world.occupancy import drawing_of
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import start_state
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, VEHICLES
+from planners.world.vehicles.vehicle import CAR, VEHICLES
 from tests.worlds import box, problem_of, strewn
 
 EVERY = pytest.mark.parametrize("name", PLANNERS)

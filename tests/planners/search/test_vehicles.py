@@ -6,10 +6,10 @@ import pytest
 
 from planners.search.outcome import Status
 from planners.search.registry import PLANNERS, plan
-from planners.world.authority import faults
-from planners.world.classes import CLASSES, problem_class
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.randomness import generator
-from planners.world.vehicle import CAR, VEHICLES, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle, state_size
 from tests.worlds import problem_of, walled_goal
 
 BEST = "follow"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from planners.world import collision, dynamics
+from planners.world.geometry import collision
 from planners.world.jit import jit
+from planners.world.vehicles import dynamics
 
 
 @jit

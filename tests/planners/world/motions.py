@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from planners.world.problem import Floats
-from planners.world.vehicle import CarWithTrailers, DifferentialDrive, Vehicle
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle
 
 
 def exact_motion(state: Floats, controls: Floats, times: Floats, vehicle: Vehicle) -> Floats:

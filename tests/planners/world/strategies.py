@@ -8,12 +8,12 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from planners.world.arrays import Floats
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
-    Floats,
     Obstacles,
     Problem,
     obstacles_of,

@@ -9,13 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.world.alignment import Alignment, from_canonical, scaled, to_canonical
-from planners.world.authority import faults
-from planners.world.classes import problem_class
-from planners.world.collision import box_is_free, scene_of
-from planners.world.problem import CANONICAL_DISTANCE, Floats, Plan, Problem, obstacles_of
-from planners.world.vehicle import CAR
+from planners.world.arrays import Floats
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import box_is_free, scene_of
+from planners.world.problem import CANONICAL_DISTANCE, Plan, Problem, obstacles_of
+from planners.world.vehicles.vehicle import CAR
+from tests.planners.world.authority.test_authority import good_plan
 from tests.planners.world.strategies import angles, seeds
-from tests.planners.world.test_authority import good_plan
 
 places = st.floats(-500.0, 500.0)
 

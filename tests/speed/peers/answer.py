@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.dynamics import admissible, load, simulate, step
+from planners.world.arrays import Floats
 from planners.world.jit import jit
-from planners.world.problem import Floats, Plan, Problem, start_state
-from planners.world.vehicle import Vehicle
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.dynamics import admissible, load, simulate, step
+from planners.world.vehicles.vehicle import Vehicle
 
 
 class MissingError(Exception):

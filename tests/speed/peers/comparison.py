@@ -15,9 +15,10 @@ from rich.table import Table
 
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.world.authority import faults
-from planners.world.classes import CLASSES, problem_class
-from planners.world.problem import Floats, Problem
+from planners.world.arrays import Floats
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.problem import Problem
 from planners.world.randomness import generator
 from tests.speed.peers.answer import Answer, MissingError
 from tests.speed.peers.native import Native

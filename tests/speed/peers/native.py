@@ -12,8 +12,9 @@ from typing import Self
 
 import numpy as np
 
-from planners.world.problem import Floats, Problem
-from planners.world.vehicle import CAR, Car
+from planners.world.arrays import Floats
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR, Car
 from tests.speed.peers.answer import Answer, MissingError, replay
 from tests.speed.peers.settings import Kpiece1, Rrt
 

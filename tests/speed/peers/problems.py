@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from planners.world.classes import CLASSES, problem_class
+from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Part, source_at

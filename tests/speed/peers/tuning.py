@@ -9,7 +9,8 @@ from typing import Any, Final, NamedTuple, TypeVar
 import numpy as np
 from rich.console import Console
 
-from planners.world.problem import Floats, Problem
+from planners.world.arrays import Floats
+from planners.world.problem import Problem
 from tests.speed.peers.answer import Answer
 from tests.speed.peers.native import Native
 from tests.speed.peers.problems import WORLDS, problem_sets

@@ -9,11 +9,11 @@ from typing import Any
 
 from ompl import base, control, util
 
-from planners.world.collision import Scene, scene_of, state_is_free
-from planners.world.dynamics import State, admissible, step
+from planners.world.geometry.collision import Scene, scene_of, state_is_free
 from planners.world.jit import lean
 from planners.world.problem import Problem, start_state
-from planners.world.vehicle import CAR, Car, Vehicle
+from planners.world.vehicles.dynamics import State, admissible, step
+from planners.world.vehicles.vehicle import CAR, Car, Vehicle
 from tests.speed.peers.answer import Answer, replay
 from tests.speed.peers.settings import Kpiece1, Rrt
 

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from storage.errors import StorageError
-from storage.problems import write_problems
+from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
 from tests.storage.samples import box, problem_with

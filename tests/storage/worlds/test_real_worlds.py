@@ -13,7 +13,7 @@ from PIL import Image
 
 from planners.maps.cutting import Cut
 from planners.maps.occupancy_map import OccupancyMap
-from planners.world.problem import Floats
+from planners.world.arrays import Floats
 from storage.worlds.importing import ImportSettings, import_part, load_map
 from storage.worlds.pictures import CORNER_M, PIXEL_M
 from storage.worlds.sources import Part, source_at

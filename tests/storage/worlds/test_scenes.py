@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.world.problem import BOUNDS
-from storage.problems import write_problems
+from storage.exchange.problems import write_problems
 from storage.worlds.importing import Imported, ImportSettings, import_part
 from storage.worlds.pictures import PIXELS
 from storage.worlds.sources import source_at

@@ -1,0 +1,1 @@
+"""Rows and problems in, Matplotlib figures out."""

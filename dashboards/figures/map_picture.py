@@ -1,0 +1,130 @@
+"""A map as a picture: what is occupied, the blocks of each part, and problems cut from it where they lie."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+from matplotlib.transforms import Affine2D
+
+from dashboards.figures.pictures import draw_problem
+from dashboards.figures.style import BLUE, INK, NOTE_SIZE, ORANGE, new_figure
+from planners.maps.cutting import Cut
+from planners.maps.occupancy_map import OccupancyMap
+from planners.maps.regions import Blocks, blocks_of
+from planners.maps.surroundings import WINDOW
+from planners.world.arrays import Floats
+from planners.world.problem import BOUNDS, CANONICAL_START, Problem
+from planners.world.vehicles.vehicle import CAR, Vehicle
+
+COLOURS: Final = {"train": BLUE, "test": ORANGE}
+SHOWN_WINDOWS: Final = 4  # of each part; more hide the map
+OCCUPIED: Final = "#6B7280"
+
+
+def map_picture(
+    world: OccupancyMap, cuts: Mapping[str, Sequence[Cut]], scale: float, vehicle: Vehicle = CAR
+) -> Figure:
+    """The map in its own frame with its blocks and the poses cut by part, beside a window of each part."""
+    parts = [part for part in cuts if cuts[part]]
+    figure = new_figure(7.4 + 3.0 * bool(parts), 7.2, f"Problems cut from {world.name}")
+    grid = figure.add_gridspec(
+        max(len(parts), 1), 2 if parts else 1, width_ratios=[7.0, 3.0] if parts else None
+    )
+    axes = figure.add_subplot(grid[:, 0])
+    draw_map(axes, world)
+    _draw_blocks(axes, world, blocks_of(world.size, scale * WINDOW))
+    for row, part in enumerate(parts):
+        _draw_cuts(axes, [cut.pose for cut in cuts[part]], scale, COLOURS[part])
+        beside = figure.add_subplot(grid[row, 1])
+        shown = max((cut.problem for cut in cuts[part][:SHOWN_WINDOWS]), key=_pieces)
+        draw_problem(beside, shown, vehicle)
+        beside.set_title(shown.id, fontsize=9, color=COLOURS[part], pad=4)
+    handles: list[Line2D | Patch] = [
+        Patch(facecolor=OCCUPIED, label="occupied"),
+        *(Patch(facecolor=COLOURS[part], alpha=0.15, label=f"blocks of {part}") for part in COLOURS),
+        *(
+            Line2D([], [], color=COLOURS[part], label=f"{len(cuts[part]):,} starts of {part}, some windows")
+            for part in parts
+        ),
+    ]
+    figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
+    return figure
+
+
+def _pieces(problem: Problem) -> int:
+    return len(problem.obstacles.piece_starts)
+
+
+def draw_map(axes: Axes, world: OccupancyMap, colour: str = OCCUPIED) -> None:
+    """What is occupied, in the map's frame, on axes in metres."""
+    width, height = world.size
+    picture = np.ma.masked_equal(world.occupied, False)
+    axes.imshow(
+        picture,
+        origin="lower",
+        extent=(0.0, width, 0.0, height),
+        cmap=ListedColormap([colour]),
+        interpolation="nearest",
+        transform=_frame(world) + axes.transData,
+        zorder=1,
+    )
+    outline = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
+    axes.set_xlim(outline[:, 0].min(), outline[:, 0].max())
+    axes.set_ylim(outline[:, 1].min(), outline[:, 1].max())
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=8, colors=INK)
+    axes.set_xlabel("x, m", fontsize=9)
+    axes.set_ylabel("y, m", fontsize=9)
+
+
+def _frame(world: OccupancyMap) -> Affine2D:
+    """From grid coordinates to the map's frame."""
+    left, bottom, turn = world.origin
+    return Affine2D().rotate(turn).translate(left, bottom)
+
+
+def _draw_blocks(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
+    place = _frame(world) + axes.transData
+    for column in range(blocks.columns):
+        for row in range(blocks.rows):
+            corner = np.array([column * blocks.width, row * blocks.height])
+            square = corner + np.array(
+                [[0, 0], [blocks.width, 0], [blocks.width, blocks.height], [0, blocks.height]]
+            )
+            colour = COLOURS["test" if (column + row) % 2 else "train"]
+            axes.add_patch(Polygon(square, facecolor=colour, alpha=0.12, transform=place, zorder=0))
+
+
+def _draw_cuts(axes: Axes, poses: Sequence[tuple[float, float, float]], scale: float, colour: str) -> None:
+    """Every start as a short line along its heading; of some the window and the way ahead."""
+    places = np.array(poses)
+    ahead = np.column_stack((np.cos(places[:, 2]), np.sin(places[:, 2])))
+    ticks = np.stack([places[:, :2], places[:, :2] + 3.0 * scale * ahead], axis=1)
+    axes.add_collection(LineCollection(list(ticks), colors=colour, linewidths=0.9, alpha=0.8, zorder=3))
+    windows = [_window(pose, scale) for pose in poses[:SHOWN_WINDOWS]]
+    axes.add_collection(PolyCollection(windows, facecolor="none", edgecolor=colour, linewidth=1.4, zorder=4))
+    for x, y, heading in poses[:SHOWN_WINDOWS]:
+        reach = 50.0 * math.sqrt(2.0) * scale
+        tip = (x + reach * math.cos(heading), y + reach * math.sin(heading))
+        axes.annotate(
+            "", tip, (x, y), arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.2}, zorder=5
+        )
+
+
+def _window(pose: tuple[float, float, float], scale: float) -> Floats:
+    x, y, heading = pose
+    turn = heading - CANONICAL_START[2]
+    low, high = BOUNDS[0], BOUNDS[2]
+    corners = np.array([[low, low], [high, low], [high, high], [low, high]])
+    cos, sin = scale * math.cos(turn), scale * math.sin(turn)
+    window: Floats = corners @ np.array([[cos, sin], [-sin, cos]]) + (x, y)
+    return window

@@ -1,0 +1,109 @@
+"""A route as a picture: the map, the shortest way, and the legs in the colours of where they came from."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from dashboards.figures.map_picture import draw_map
+from dashboards.figures.style import BLUE, GREEN, INK, NOTE_SIZE, ORANGE, VERMILLION, new_figure
+from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.route import Route
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import CAR, Vehicle
+
+COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
+_OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere: the legs are what is to be seen
+_WIDTH: Final = 7.4  # inches
+_TALLEST: Final = 9.0
+
+
+def route_picture(
+    world: OccupancyMap,
+    route: Route,
+    goals: list[tuple[float, float]],
+    scale: float,
+    caption: str,
+    vehicle: Vehicle = CAR,
+) -> Figure:
+    """The map in its own frame with a route of canonical lengths; ``goals`` and ``world`` are in metres."""
+    width, height = _extent(world)
+    figure = new_figure(_WIDTH, min(_WIDTH * height / width, _TALLEST) + 0.9, f"Route over {world.name}")
+    axes = figure.add_subplot()
+    draw_map(axes, world, _OCCUPIED)
+    axes.set_title(caption, fontsize=9, color=INK, loc="left", pad=6)
+    for path in route.paths:
+        axes.plot(*_placed(world, scale * path).T, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=3)
+    sources = []
+    for leg in route.legs:
+        states = leg.states(vehicle)
+        places = _placed(world, scale * states[:, :2])
+        last = leg.turning + leg.driving
+        for drawn, colour, linewidth, zorder in (
+            (places[: leg.turning + 1], INK, 1.6, 6),
+            (places[leg.turning : last + 1], COLOURS[leg.source], 2.6, 5),
+            (places[last:], INK, 1.6, 6),
+        ):
+            axes.plot(*drawn.T, color="white", linewidth=linewidth + 1.6, zorder=4)
+            axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
+        axes.plot(*places[-1], marker="o", color="white", markeredgecolor=INK, markersize=4.5, zorder=7)
+        sources.append(leg.source)
+    several = len(goals) > 1
+    for number, goal in enumerate(goals, start=1):
+        axes.plot(
+            *goal,
+            marker="o" if several else "*",
+            color=GREEN,
+            markeredgecolor=INK,
+            markersize=13 if several else 15,
+            zorder=10,
+            clip_on=False,
+        )
+        if several:
+            axes.annotate(f"{number}", goal, ha="center", va="center_baseline", color="white", zorder=11,
+                          fontsize=9, fontweight="bold", annotation_clip=False)  # fmt: skip
+    x, y, heading = world.pose(
+        scale * route.problem.start[0], scale * route.problem.start[1], route.problem.start[2]
+    )
+    axes.plot(x, y, marker=(3, 0, math.degrees(heading) - 90.0), color=INK, markersize=12, zorder=9)
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=INK, marker=(3, 0, -90), linestyle="none", markersize=9, label="start"),
+        Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
+               markersize=10, label="goals in order" if several else "goal"),
+        Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
+               label="brakes, stops, turns"),
+        *(
+            Line2D([], [], color=colour, linewidth=2.6, label=_legend_of(source, sources.count(source)))
+            for source, colour in COLOURS.items()
+            if source in sources
+        ),
+        Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
+        Patch(facecolor=_OCCUPIED, label="occupied"),
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower left", ncols=4, frameon=False, fontsize=NOTE_SIZE + 0.5)
+    return figure
+
+
+def _legend_of(source: str, legs: int) -> str:
+    return f"{source}, {legs} leg" + "s" * (legs > 1)
+
+
+def _extent(world: OccupancyMap) -> tuple[float, float]:
+    """Width and height of the map in its own frame, metres."""
+    width, height = world.size
+    corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
+    across, up = np.ptp(corners, axis=0)
+    return float(across), float(up)
+
+
+def _placed(world: OccupancyMap, points: Floats) -> Floats:
+    """Grid metres ``[n, 2]`` in the map's frame."""
+    left, bottom, turn = world.origin
+    cos, sin = math.cos(turn), math.sin(turn)
+    placed: Floats = points @ np.array([[cos, sin], [-sin, cos]]) + (left, bottom)
+    return placed

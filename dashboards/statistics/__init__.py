@@ -1,0 +1,1 @@
+"""From attempt rows to means, intervals, tests and rates."""

@@ -1,0 +1,1 @@
+"""What the figures decide: claims, comparisons of runs, promotion, drift."""

@@ -1,0 +1,154 @@
+"""The measured figures that the paper's claims are held against, each with its 95 % interval."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest, norm
+
+from dashboards.statistics.intervals import CONFIDENCE, RESAMPLES
+from dashboards.statistics.panels import compare
+from storage.tables.configurations import BASELINE, Configuration, configured
+
+CLOSED_1, CLOSED_5 = Configuration("closed", "centroid", 1), Configuration("closed", "centroid", 5)
+OPEN_1, OPEN_5 = Configuration("open", "centroid", 1), Configuration("open", "centroid", 5)
+RANDOM_1, RANDOM_5 = Configuration("random-open", "random", 1), Configuration("random-open", "random", 5)
+WITH_MEMORY: Final = (CLOSED_1, CLOSED_5, OPEN_1, OPEN_5)
+
+_Pair = tuple[Configuration, Configuration]  # before, after
+_Key = tuple[str, str, Configuration, Configuration]  # panel, planner, before, after
+_PAIRS: Final[tuple[_Pair, ...]] = (
+    *((BASELINE, each) for each in (*WITH_MEMORY, RANDOM_1, RANDOM_5)),
+    (CLOSED_1, CLOSED_5), (CLOSED_5, OPEN_1), (OPEN_1, OPEN_5), (CLOSED_1, OPEN_1), (CLOSED_5, OPEN_5),
+)  # fmt: skip
+_TAIL: Final = 0.5 * (1.0 - CONFIDENCE)
+_OVERHEAD: Final = ("occupancy_seconds", "encode_seconds", "recall_seconds", "check_seconds")
+
+
+class Figure(NamedTuple):
+    """A share or a reduction, the ends of its 95 % interval, and what it is of."""
+
+    what: str
+    value: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        """Like ``gust on trap, open 5: 53.5 % [46.5, 59.7]``."""
+        return f"{self.what}: {100 * self.value:.1f} % [{100 * self.low:.1f}, {100 * self.high:.1f}]"
+
+    def above(self, line: float = 0.0) -> bool | None:
+        """Whether it exceeds ``line``; None where its interval reaches over it."""
+        return True if self.low > line else False if self.high < line else None
+
+    def below(self, line: float = 0.0) -> bool | None:
+        """Whether it is less than ``line``; None where its interval reaches over it."""
+        return None if (above := self.above(line)) is None else not above
+
+    def reaches(self, line: float = 0.0) -> bool:
+        """Whether it exceeds ``line`` or cannot be told from it."""
+        return self.high >= line
+
+    def widened(self, figures: int) -> Figure:
+        """The same with an interval for so many figures at once (Bonferroni, as of a normal law)."""
+        factor = float(norm.isf(_TAIL / max(figures, 1)) / norm.isf(_TAIL))
+        return self._replace(
+            low=self.value - factor * (self.value - self.low),
+            high=self.value + factor * (self.high - self.value),
+        )
+
+    def exceeds(self, other: Figure) -> bool | None:
+        """Whether it is more than another one of other problems; None where the intervals overlap."""
+        return True if self.low > other.high else False if self.high < other.low else None
+
+
+class Evidence:
+    """What a run measured, to be asked by name; what was not measured is None."""
+
+    def __init__(
+        self,
+        attempts: pd.DataFrame,
+        recalls: pd.DataFrame,
+        continual: pd.DataFrame | None = None,
+        resamples: int = RESAMPLES,
+    ) -> None:
+        """Of attempt rows, recall rows, and attempt rows of more runs with a column ``experiences``."""
+        self._faster = _reductions(attempts, "planning_seconds", resamples)
+        parts = [name for name in _OVERHEAD if name in attempts]
+        overhead = attempts.assign(overhead=attempts[parts].sum(axis=1))
+        self._cheaper = _reductions(overhead, "overhead", resamples)
+        grown = () if continual is None or continual.empty else continual.groupby("experiences")
+        self._grown = {
+            int(str(count)): _reductions(rows, "planning_seconds", resamples) for count, rows in grown
+        }
+        self._recalls = recalls
+
+    def reduction(
+        self, panel: str, planner: str, after: Configuration, before: Configuration = BASELINE
+    ) -> Figure | None:
+        """How much less mean planning time a planner needs, one configuration against another."""
+        return self._faster.get((panel, planner, before, after))
+
+    def best(self, panels: Sequence[str], planners: Sequence[str]) -> Figure | None:
+        """The largest reduction of closed or open box, its interval widened for having been chosen."""
+        asked = product(panels, planners, WITH_MEMORY)
+        found = [each for panel, planner, how in asked if (each := self.reduction(panel, planner, how))]
+        best = max(found, key=lambda each: each.value, default=None)
+        return best and best.widened(len(found))
+
+    def recall_costs_more(self, panel: str, planner: str) -> Figure | None:
+        """How much more five plans cost to recall and check than one does, as a share of the first."""
+        found = self._cheaper.get((panel, planner, CLOSED_1, CLOSED_5))
+        return found and Figure(found.what, -found.value, -found.high, -found.low)
+
+    def grown(self, experiences: int, after: Configuration) -> Figure | None:
+        """The reduction for GUST on curves with so many experiences."""
+        found = self._grown.get(experiences, {}).get(("curves", "gust", BASELINE, after))
+        return found and found._replace(what=f"{experiences} experiences, {after.label}")
+
+    def origin_hits(self, class_name: str, memory: str, first: int) -> Figure | None:
+        """Share of held-out problems of which the plan they were made for is among the first recalled.
+
+        The mean over training seeds; the interval (Wilson) is that of so many problems.
+        """
+        rows = self._recalls
+        rows = rows[(rows["class"] == class_name) & (rows["memory"] == memory)]
+        rows = rows[(rows["protocol"] == "held-out") & (rows["recall"] == "centroid")]
+        rows = rows[rows["made_for"] >= 0]
+        if rows.empty:
+            return None
+        hits = [own in order[:first] for own, order in zip(rows["made_for"], rows["order"], strict=True)]
+        share, problems = float(np.mean(hits)), rows["problem_id"].nunique()
+        ends = binomtest(round(share * problems), problems).proportion_ci(method="wilson")
+        what = "first" if first == 1 else f"among the first {first}"
+        return Figure(what, share, float(ends.low), float(ends.high))
+
+
+def _reductions(attempts: pd.DataFrame, column: str, resamples: int) -> dict[_Key, Figure]:
+    """Every comparison of ``_PAIRS`` by panel and planner.
+
+    Where the rows hold no recall by centroid, another that ranks plans stands for it.
+    """
+    known = [each for each in configured(attempts)[1].values() if each.recall != "exhaustive"]
+
+    def measured(wanted: Configuration) -> Configuration:
+        like = (each for each in known if (each.assist, each.top_k) == (wanted.assist, wanted.top_k))
+        return next(like, wanted)
+
+    pairs = {(measured(before), measured(after)): (before, after) for before, after in _PAIRS}
+    meant = {(before.label, after.label): pair for (before, after), pair in pairs.items()}
+    return {
+        (row["panel"], row["planner"], *meant[row["before"], row["after"]]): Figure(
+            f"{row['planner']} on {row['panel']}, {row['after']}{_against(row['before'])}",
+            *(float(row[name]) for name in ("reduction", "reduction_low", "reduction_high")),
+        )
+        for _, row in compare(attempts, list(pairs), column, resamples=resamples).iterrows()
+    }
+
+
+def _against(before: str) -> str:
+    return "" if before == BASELINE.label else f" against {before}"

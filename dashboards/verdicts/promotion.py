@@ -1,0 +1,191 @@
+"""The rule by which a challenger takes a champion's place, and how the judgement is written.
+
+Both attempt the same held-back problems, next to each other, with every planner and every configuration that
+uses a memory. The challenger is promoted if
+
+1. it is faster: a column is a planner and configuration on a class; the mean over all columns of the
+   reduction of mean planning time has a 95 % interval (paired bootstrap over problems) that lies above 0;
+2. it is slower nowhere: no column has an interval below 0, widened for their number (Bonferroni);
+3. it solves no fewer problems: not in all columns together, and in no column significantly fewer (exact sign
+   test, corrected by Holm, 5 %).
+
+Failures count with the time they took. What is not shown is not believed: where an interval reaches 0, the
+champion stays.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import pandas as pd
+from rich.console import Group
+
+from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables
+from dashboards.statistics.intervals import CONFIDENCE, bootstrap
+from dashboards.statistics.panels import Panel, panels
+from dashboards.statistics.sign_tests import holm, signs
+from planners.world.arrays import Floats
+
+RESAMPLES: Final = 10_000  # the end of an interval widened for 20 columns stands on 12 of them
+HEADINGS: Final = (
+    "planner", "configuration", "champion ms", "challenger ms", "less time % [95 %]", "champion solved %",
+    "solved %", "champion hits %", "hits %", "verdict",
+)  # fmt: skip
+FASTER: Final = "faster"
+SLOWER: Final = "slower"
+FEWER: Final = "fewer solved"
+OPEN: Final = "open"
+
+
+class Judgement(NamedTuple):
+    """What became of a challenger, and by what figures."""
+
+    promoted: bool
+    why: str  # in one line
+    problems: int
+    reduction: float  # mean over columns, a fraction
+    low: float  # ends of its 95 % interval
+    high: float
+    columns: pd.DataFrame  # a row a class, planner and configuration, as ``HEADINGS`` and with its problems
+
+
+def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Judgement:
+    """Apply the rule to the attempts of both sides, each with one memory.
+
+    ValueError: they are not of the same problems in the same configurations, or there are none.
+    """
+    sides = [list(panels(rows.assign(memory="own"))) for rows in (champion, challenger)]
+    if not sides[0] or _attempted(champion) != _attempted(challenger):
+        raise ValueError("champion and challenger have not attempted the same problems in the same ways")
+    reductions, tables = [], []
+    for number, (before, after) in enumerate(zip(*sides, strict=True)):
+        resampled = bootstrap(after.milliseconds(), before.milliseconds(), seed + number, RESAMPLES)
+        reductions.append(resampled.reductions)
+        tables.append(_compared(before, after))
+    columns = pd.concat(tables, ignore_index=True)
+    drawn = np.concatenate(reductions, axis=1)
+    low, high = _ends(drawn, CONFIDENCE)
+    _, widened = _ends(drawn, 1.0 - (1.0 - CONFIDENCE) / drawn.shape[1])
+    columns = columns.assign(low=low, high=high, p_value=holm(columns["p_value"].to_numpy(float)))
+    fewer = (columns["p_value"] < 1.0 - CONFIDENCE) & (columns["solved"] < columns["champion_solved"])
+    verdicts = np.select([fewer, widened < 0.0, low > 0.0], [FEWER, SLOWER, FASTER], OPEN)
+    columns = columns.assign(verdict=verdicts)
+    whole = _ends(drawn.mean(1, keepdims=True), CONFIDENCE)
+    ends = float(whole[0][0]), float(whole[1][0])
+    against = _against(columns, ends)
+    return Judgement(
+        promoted=not against,
+        why="; ".join(against) or _told("faster", columns, ends),
+        problems=int(challenger["problem_id"].nunique()),
+        reduction=float(columns["reduction"].mean()),
+        low=ends[0],
+        high=ends[1],
+        columns=columns,
+    )
+
+
+def judgement_line(judged: Judgement) -> str:
+    """The figures that decide, in words."""
+    interval = f"{100 * judged.low:.1f} to {100 * judged.high:.1f}"
+    counts = Counter(judged.columns["verdict"])
+    named = ", ".join(f"{counts[each]} {each}" for each in (FASTER, SLOWER, FEWER, OPEN) if counts[each])
+    return f"{100 * judged.reduction:.1f} % less time ({interval}) on {judged.problems:,} problems: {named}"
+
+
+def judgement_table(judged: Judgement) -> Group:
+    """The columns for a terminal: a table a class."""
+    return titled_tables(HEADINGS, _titled(judged))
+
+
+def judgement_markdown(judged: Judgement) -> str:
+    """Verdict, figures and columns as Markdown."""
+    verdict = "promoted" if judged.promoted else "refused"
+    head = f"**{verdict}**: {judged.why}.\n\n{judgement_line(judged)}.\n\n"
+    return head + titled_markdown(HEADINGS, _titled(judged))
+
+
+def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:
+    asked = rows[["problem_id", "planner", "assist", "top_k", "recall"]].astype(object)
+    return set(asked.where(asked.notna(), None).itertuples(index=False, name=None))
+
+
+def _compared(before: Panel, after: Panel) -> pd.DataFrame:
+    """The figures of a class but for intervals; p-values are of fewer or more solved, not corrected yet."""
+    times = [panel.milliseconds().mean(0) for panel in (before, after)]
+    solved = [panel.matrix("solved") for panel in (before, after)]
+    hits = [
+        panel._replace(rows=panel.rows.assign(hit=panel.rows["source"] == "recalled")).matrix("hit").mean(0)
+        for panel in (before, after)
+    ]
+    tests = [signs(2.0 - mine, 2.0 - other) for mine, other in zip(solved[1].T, solved[0].T, strict=True)]
+    return pd.DataFrame(
+        {
+            "panel": before.name,
+            "planner": [planner for planner, _ in after.columns],
+            "configuration": [configuration.label for _, configuration in after.columns],
+            "problems": after.problems,
+            "champion_ms": times[0],
+            "ms": times[1],
+            "reduction": 1.0 - times[1] / times[0],
+            "champion_solved": solved[0].mean(0),
+            "solved": solved[1].mean(0),
+            "champion_hits": hits[0],
+            "hits": hits[1],
+            "p_value": [test.p_value for test in tests],
+        }
+    )
+
+
+def _ends(resampled: Floats, confidence: float) -> tuple[Floats, Floats]:
+    tail = 0.5 * (1.0 - confidence)
+    low, high = np.quantile(resampled, [tail, 1.0 - tail], axis=0)
+    return low, high
+
+
+def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
+    """What speaks against a promotion, by the rule."""
+    found = []
+    if ends[0] <= 0.0:
+        found.append(_told("not shown to be faster", columns, ends))
+    for verdict, said in ((SLOWER, "slower"), (FEWER, "solves fewer")):
+        named = columns[columns["verdict"] == verdict]
+        if len(named):
+            worst = named.iloc[int(named["reduction"].argmin())]
+            more = f" and {len(named) - 1} more" if len(named) > 1 else ""
+            found.append(f"{said} with {worst['planner']} {worst['configuration']} on {worst['panel']}{more}")
+    mine, theirs = (
+        round((columns[name] * columns["problems"]).sum()) for name in ("solved", "champion_solved")
+    )
+    if mine < theirs:
+        found.append(f"solves fewer in all: {mine:,} attempts against {theirs:,}")
+    return found
+
+
+def _told(what: str, columns: pd.DataFrame, ends: tuple[float, float]) -> str:
+    mean = 100 * columns["reduction"].mean()
+    return f"{what}: {mean:.1f} % less time, 95 % interval {100 * ends[0]:.1f} to {100 * ends[1]:.1f}"
+
+
+def _titled(judged: Judgement) -> list[tuple[str, list[Rows]]]:
+    titled = []
+    for panel, of_panel in judged.columns.groupby("panel", sort=False):
+        decimals = decimals_of(of_panel[["champion_ms", "ms"]].to_numpy(dtype=float))
+        groups = [
+            [_cells(row, decimals) for row in of_planner.to_dict("records")]
+            for _, of_planner in of_panel.groupby("planner", sort=False)
+        ]
+        titled.append((f"{panel}, {int(of_panel['problems'].max()):,} held-back problems", groups))
+    return titled
+
+
+def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
+    return [
+        row["planner"],
+        row["configuration"],
+        *[f"{row[name]:,.{decimals}f}" for name in ("champion_ms", "ms")],
+        f"{100 * row['reduction']:.0f} [{100 * row['low']:4.0f}, {100 * row['high']:4.0f}]",
+        *[percent(row[name]) for name in ("champion_solved", "solved", "champion_hits", "hits")],
+        row["verdict"],
+    ]

@@ -1,0 +1,1 @@
+"""The command line: options, what each command calls, errors and exit codes."""

@@ -1,0 +1,24 @@
+"""The dashboard: what runs found, as pages in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = True) -> None:
+    """Serve the dashboard on loopback until Ctrl-C: runs, problems, memories, live planning, comparisons.
+
+    Parameters
+    ----------
+    data
+        Data folder; default $MOTION_MEMORY_DATA or ./data. Nothing in it is changed.
+    port
+        Where it listens; 0: any port that is free.
+    browser
+        Open it in the browser where there is a terminal.
+
+    """
+    from tasks.serving.serve_dashboard import serve_dashboard
+    from tasks.settings.run_settings import default_data
+
+    serve_dashboard(data or default_data(), port, browser)

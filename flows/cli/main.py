@@ -1,0 +1,100 @@
+"""The command line, ``motion-memory``: its commands, exit codes, and what an error or Ctrl-C looks like."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Sequence
+from types import FrameType
+from typing import Final
+
+from cyclopts import App, CycloptsError
+
+from flows.cli import dashboard_command as dashboard
+from flows.cli import map_commands as maps
+from flows.cli import problem_commands as problems
+from flows.cli import result_commands as results
+from flows.cli import retraining_commands as operations
+from flows.cli import server_commands as serving
+from flows.cli import stage_commands as stages
+from tasks.settings.redaction import redacted
+
+FAILURE: Final = 1
+WRONG_USE: Final = 2
+INTERRUPTED: Final = 130
+GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to tell the server and to take workers along
+
+app = App(
+    name="motion-memory",
+    help="Plan robot motions from experience: collect, learn, recall, measure.",
+    version_flags=[],
+    suppress_keyboard_interrupt=False,
+)
+for command in (
+    *(stages.run, stages.collect, stages.hallucinate, stages.train, stages.build_memory, stages.benchmark),
+    *(stages.report, stages.sweep, stages.experience_curve),
+    *(problems.plan, problems.optimise, problems.solve),
+    *(maps.import_worlds, maps.route),
+    *(results.verify, results.export, results.compare, dashboard.dashboard),
+    *(serving.serve_memory, serving.servers),
+    *(operations.retrain, operations.serve, operations.promote, operations.rollback),
+):
+    app.command(command)
+
+
+def call(arguments: Sequence[str] | None = None) -> int:
+    """Run a command; its exit code. A failure is one line on the error stream."""
+    debug = os.environ.get("MOTION_MEMORY_DEBUG") == "1"
+    try:
+        app(
+            arguments,
+            exit_on_error=False,
+            print_error=False,
+            result_action="return_none",
+        )
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else FAILURE
+    except Exception as error:
+        if debug:
+            print(redacted(traceback.format_exc()), file=sys.stderr)
+        print(f"motion-memory: {_one_line(error)}", file=sys.stderr)
+        return WRONG_USE if _is_wrong_use(error) else FAILURE
+    return 0
+
+
+def _is_wrong_use(error: Exception) -> bool:
+    from tasks.settings.run_settings import UsageError
+
+    return isinstance(error, CycloptsError | UsageError)
+
+
+def _one_line(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return redacted(text) or type(error).__name__
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    signal.signal(signal.SIGINT, _interrupt)
+    code = call()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # threads of Prefect and Dask would wait for servers that are gone
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    """End in order, but soon: what hangs is left, and dies with this process."""
+    last = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
+    last.daemon = True
+    last.start()
+    print("Interrupted; the same command goes on where it stopped.", file=sys.stderr)
+    raise KeyboardInterrupt
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""Maps and worlds of one's own: made into problems, driven over."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Final
+
+from cyclopts import Parameter
+
+from flows.cli.solve_options import MapOptions, SolveOptions
+
+_AS_IT_IS: Final = MapOptions()
+_USUAL: Final = SolveOptions()
+
+
+def import_worlds(
+    path: Path,
+    *,
+    format: str | None = None,
+    out: Path,
+    part: str = "both",
+    problems: int | None = None,
+    seed: int = 1,
+    vehicle: str = "car",
+    strict: Annotated[bool, Parameter(negative=())] = False,
+    picture: Path | None = None,
+    reading: MapOptions = _AS_IT_IS,
+) -> None:
+    """Make problems of worlds, or cut them from a map.
+
+    Parameters
+    ----------
+    path
+        A folder of worlds or problem files, one such file, or a map: .map, .scen, .yaml (ROS), .npy, .npz.
+    format
+        png, polygons, problems, moving-ai, ros or numpy; by default recognised by the files' endings.
+    out
+        A .parquet, .jsonl or .json file, or a new folder with parts train and test for run --worlds.
+    part
+        train, test, validation, or both of the first two.
+    problems
+        How many of each part; of a map 1,000 by default, of worlds all.
+    seed
+        Where on a map problems are cut follows from it.
+    vehicle
+        Who must have room to start: car, differential-drive, car-1-trailer or car-2-trailers.
+    strict
+        Stop at a bad world instead of skipping it.
+    picture
+        Where to draw the map with its problems, .png, .svg or .pdf.
+    reading
+        How a map is read.
+
+    """
+    from tasks.requests import import_worlds as task
+
+    settings = task.import_settings(vehicle, seed, strict, problems, **asdict(reading))
+    task.import_worlds(path, format, out, part, settings, picture)
+
+
+def route(
+    path: Path,
+    *,
+    begin: Annotated[str, Parameter(name="--from", allow_leading_hyphen=True)],
+    end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True, negative=())],
+    format: str | None = None,
+    assist: str | None = None,
+    out: Path | None = None,
+    picture: Path | None = None,
+    options: SolveOptions = _USUAL,
+    reading: MapOptions = _AS_IT_IS,
+) -> None:
+    """Drive over a map: local plans from memory where it knows them, one feasible plan in the end.
+
+    Parameters
+    ----------
+    path
+        A map: .map, .yaml (ROS), .npy, .npz.
+    begin
+        Where the vehicle stands in the map's frame: x,y,heading, in metres and radians.
+    end
+        Where it should go: x,y in metres. Given several times: through all of these, in order.
+    format
+        moving-ai, ros or numpy; by default recognised by the file's ending.
+    assist
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. By default repair
+        with a memory, fresh without.
+    out
+        Where to write the plan, .json.
+    picture
+        Where to draw the route, .png, .svg or .pdf.
+    options
+        How local problems are solved.
+    reading
+        How the map is read.
+
+    """
+    from tasks.requests import drive_route as task
+    from tasks.requests.assistant import Assistant
+    from tasks.requests.import_worlds import import_settings
+
+    assistant = Assistant(*options.way(assist or ("fresh" if options.memory is None else "repair")))
+    settings = import_settings(options.vehicle, options.seed, **asdict(reading))
+    task.route(path, format, begin, end, assistant, settings, out, picture)

@@ -1,0 +1,131 @@
+"""Problems of one's own: one planned for, one optimised, very many solved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Final
+
+from cyclopts import Parameter
+
+from flows.cli.run_options import worker_count
+from flows.cli.solve_options import SolveOptions
+
+_USUAL: Final = SolveOptions()
+
+
+def plan(
+    problem: Path,
+    *,
+    assist: str = "none",
+    improve_seconds: float = 0.0,
+    explain: Annotated[bool, Parameter(negative=())] = False,
+    out: Path | None = None,
+    picture: Path | None = None,
+    learn: Path | None = None,
+    options: SolveOptions = _USUAL,
+) -> None:
+    """Plan for one problem: one plan, one picture.
+
+    Parameters
+    ----------
+    problem
+        A .json, .jsonl or .parquet file with one problem.
+    assist
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
+    improve_seconds
+        Keep improving the plan for this long; 0: the first plan is the answer.
+    explain
+        Say, and mark in the picture, what was recalled, where it collides and what was done then.
+    out
+        Where to write the plan, .json.
+    picture
+        Where to draw it, .png, .svg or .pdf.
+    learn
+        Data folder that is to remember the plan where it is new.
+    options
+        How the problem is solved.
+
+    """
+    from tasks.requests.assistant import Assistant, plan_one
+
+    plan_one(Assistant(*options.way(assist, improve_seconds)), problem, out, picture, explain, learn)
+
+
+def optimise(
+    problem: Path,
+    *,
+    plan: Path | None = None,
+    planner: str | None = None,
+    straight: Annotated[bool, Parameter(negative=())] = False,
+    clearance_weight: float = 0.0,
+    vehicle: str = "car",
+    seed: int = 1,
+    out: Path | None = None,
+    picture: Path | None = None,
+) -> None:
+    """Optimise a plan for one problem, from a plan that may be blocked, a planner's, or a straight line.
+
+    Parameters
+    ----------
+    problem
+        A .json, .jsonl or .parquet file with one problem.
+    plan
+        Begin with the plan of this .json file, made for this problem or another.
+    planner
+        Begin with the plan of rrt, gust or follow; follow where no beginning is given.
+    straight
+        Begin with a straight line from start to goal.
+    clearance_weight
+        How much a plan should keep away from obstacles rather than be short in time.
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
+    seed
+        Everything random follows from it.
+    out
+        Where to write the plan, .json.
+    picture
+        Where to draw guess and plan, .png, .svg or .pdf.
+
+    """
+    from tasks.requests.optimise_one import beginning, optimise_one
+
+    begin = beginning(plan, planner, straight, vehicle, seed)
+    optimise_one(begin, problem, clearance_weight, out, picture)
+
+
+def solve(
+    problems: Path,
+    *,
+    assist: str = "none",
+    improve_seconds: float = 0.0,
+    out: Path,
+    plans: Path | None = None,
+    learn: Path | None = None,
+    workers: int | None = None,
+    options: SolveOptions = _USUAL,
+) -> None:
+    """Solve many problems of one's own: one attempt row each. The same command goes on where it was stopped.
+
+    Parameters
+    ----------
+    problems
+        A .json, .jsonl or .parquet file.
+    assist
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
+    improve_seconds
+        Keep improving the plan for this long; 0: the first plan is the answer.
+    out
+        Where to write the rows, .parquet.
+    plans
+        Folder for the plans, one .json a problem.
+    learn
+        Data folder that is to remember what was newly solved.
+    workers
+        Worker processes; default one a core. A few problems are solved without.
+    options
+        How the problems are solved.
+
+    """
+    from tasks.requests.solve_many import solve_many
+
+    solve_many(options.way(assist, improve_seconds), problems, out, plans, learn, worker_count(workers))

@@ -1,0 +1,120 @@
+"""Operating memories: retrain them now or on a schedule, approve a challenger, go back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+from cyclopts import Parameter
+
+from flows.cli.run_options import Options, worker_count
+from flows.cli.stage_commands import settings_of
+
+if TYPE_CHECKING:
+    from tasks.settings.run_settings import RunSettings
+
+NO_OPTIONS: Final = Options()
+Flag = Annotated[bool, Parameter(negative=())]
+
+
+def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = NO_OPTIONS) -> None:
+    """Make challengers of what was learned since the champions; promote those that are better.
+
+    Parameters
+    ----------
+    approve
+        A challenger that is better waits for `motion-memory promote`.
+    dry_run
+        Say what would be done, and write nothing.
+    options
+        What a run is and where it happens.
+
+    """
+    settings = _settings(options)
+    if dry_run:
+        from tasks.champions.dry_run import dry_run as task
+
+        task(options.folder, settings)
+        return
+    from tasks.session.command_session import run_stage
+
+    run_stage(
+        "flows.retrain",
+        "retrain",
+        settings,
+        options.folder,
+        worker_count(options.workers),
+        options.scheduler,
+        approve=approve,
+    )
+
+
+def serve(
+    *,
+    every: float | None = None,
+    cron: str | None = None,
+    approve: Flag = False,
+    options: Options = NO_OPTIONS,
+) -> None:
+    """Retrain on a schedule, one at a time, and when incoming problems are answered less often; until Ctrl-C.
+
+    Parameters
+    ----------
+    every
+        Seconds between two retrainings; 86,400, a day, where neither this nor --cron is given.
+    cron
+        When to retrain, like "0 3 * * *": at three each night.
+    approve
+        A challenger that is better waits for `motion-memory promote`.
+    options
+        What a run is and where it happens.
+
+    """
+    from tasks.champions.retraining_schedule import serve as task
+
+    settings = _settings(options)
+    workers = worker_count(options.workers)
+    task(settings, options.folder, every, cron, approve, workers, options.scheduler)
+
+
+def promote(*, memory: str | None = None, data: Path | None = None) -> None:
+    """Approve challengers that are better: they become champions.
+
+    Parameters
+    ----------
+    memory
+        Of this memory, like trap; by default all that await it.
+    data
+        Data folder; default $MOTION_MEMORY_DATA or ./data.
+
+    """
+    from tasks.champions.promote import promote_awaiting
+    from tasks.settings.run_settings import default_data
+
+    promote_awaiting(data or default_data(), memory)
+
+
+def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
+    """Make the champion before champion again.
+
+    Parameters
+    ----------
+    memory
+        Of this memory, like trap; by default of all that the last retraining promoted.
+    data
+        Data folder; default $MOTION_MEMORY_DATA or ./data.
+
+    """
+    from tasks.champions.promote import roll_back
+    from tasks.settings.run_settings import default_data
+
+    roll_back(data or default_data(), memory)
+
+
+def _settings(options: Options) -> RunSettings:
+    from tasks.settings.run_settings import UsageError
+
+    if options.learned is not None:
+        raise UsageError("--learned is not for retraining, which freezes what was learned by itself.")
+    return replace(settings_of(options), continual="none")

@@ -1,0 +1,66 @@
+"""Servers: of a memory, of the records that several people and machines share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from flows.cli.run_options import worker_count
+
+LOOPBACK: Final = "127.0.0.1"
+
+
+def serve_memory(
+    memory: str,
+    *,
+    vehicle: str = "car",
+    host: str = LOOPBACK,
+    port: int = 5001,
+    workers: int = 1,
+) -> None:
+    """Answer problems over HTTP, by MLflow's protocol, with ranked and checked plans of a memory.
+
+    Parameters
+    ----------
+    memory
+        Folder of a memory, or of a run with one, or a model in MLflow: models:/name/1, models:/name@alias, …
+    vehicle
+        car, differential-drive, car-1-trailer or car-2-trailers.
+    host
+        Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
+    port
+        Port to listen on; 0: a free one.
+    workers
+        Worker processes.
+
+    """
+    from tasks.serving.serve_memory import serve_memory as task
+
+    task(memory, vehicle, host, port, worker_count(workers))
+
+
+def servers(
+    *,
+    data: Path | None = None,
+    host: str = LOOPBACK,
+    prefect_port: int = 4200,
+    mlflow_port: int = 5000,
+) -> None:
+    """Run Prefect's and MLflow's servers for all who share them, until Ctrl-C.
+
+    Parameters
+    ----------
+    data
+        Data folder whose records they show; default $MOTION_MEMORY_DATA or ./data.
+    host
+        Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
+    prefect_port
+        Port of Prefect's server.
+    mlflow_port
+        Port of MLflow's server.
+
+    """
+    from tasks.serving.shared_servers import servers as task
+    from tasks.settings.run_settings import default_data
+
+    task(data or default_data(), host, prefect_port, mlflow_port)

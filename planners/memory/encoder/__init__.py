@@ -1,0 +1,1 @@
+"""The encoder: its network, its training, and its fast forward pass."""

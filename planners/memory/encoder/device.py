@@ -1,0 +1,41 @@
+"""Where training runs, and how: deterministic; on a GPU, if there is one, compiled and in mixed precision."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import torch
+from torch import Tensor
+
+from planners.memory.encoder.torch_network import embed
+
+Forward = Callable[[dict[str, Tensor], Tensor], Tensor]
+
+
+@contextmanager
+def deterministic(threads: int) -> Iterator[torch.device]:
+    """The device to train on, with that many threads and deterministic kernels; torch is left as it was."""
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS is not deterministic
+    before, was_deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(True)
+    try:
+        yield torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    finally:
+        torch.set_num_threads(before)
+        torch.use_deterministic_algorithms(was_deterministic)
+
+
+def forward_on(device: torch.device) -> Forward:
+    """The encoder (``network.embed``) as training runs it on a device."""
+    if device.type == "cpu":
+        return embed
+    compiled = torch.compile(embed)
+
+    def mixed(parameters: dict[str, Tensor], bits: Tensor) -> Tensor:
+        with torch.autocast(device.type, torch.bfloat16):
+            return compiled(parameters, bits).float()
+
+    return mixed

@@ -1,0 +1,178 @@
+"""The encoder: occupancy grid to embedding, and its runtime, which needs no torch.
+
+Convolutions with PReLU, then fully connected layers, no normalisation, as published. In place
+of max-pooling the first convolution takes patches of 4x4 cells with stride 4: where exactly an obstacle lies
+decides whether a plan is free, and pooling loses it. On fresh problems of class random the first plan was
+free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of training).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planners.world.arrays import Floats32
+from planners.world.geometry.occupancy import GRID, Grid
+
+Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ..., "linear.0.weight", ...
+
+PATCH = 4  # cells a side that the first convolution takes, and its stride; the others are 3x3
+PRELU_SLOPE = 0.25  # what a PReLU begins with (He et al. 2015)
+OPSET = 17
+IR_VERSION = 9  # the oldest that has the opset: readable by old runtimes
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Sizes of the encoder."""
+
+    channels: tuple[int, ...] = (16,)  # of the convolutions
+    hidden: tuple[int, ...] = (128,)  # widths of the fully connected layers before the embedding
+    dimensions: int = 30  # of the embedding
+
+    def __post_init__(self) -> None:
+        if not self.channels:
+            raise ValueError("The encoder has no convolution: give the channels of one or more.")
+        if min((*self.channels, *self.hidden, self.dimensions)) < 1:
+            sizes = f"{self.channels}, {self.hidden}, {self.dimensions}"
+            raise ValueError(f"Sizes of the encoder are {sizes}: give 1 or more.")
+
+
+def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
+    """Names and shapes of the weights, layer by layer."""
+    shapes: dict[str, tuple[int, ...]] = {}
+    inputs = 1
+    for i, outputs in enumerate(architecture.channels):
+        kernel = PATCH if i == 0 else 3
+        shapes[f"convolution.{i}.weight"] = (outputs, inputs, kernel, kernel)
+        shapes[f"convolution.{i}.bias"] = (outputs,)
+        shapes[f"convolution.{i}.slope"] = (outputs, 1, 1)
+        inputs = outputs
+    width = inputs * (GRID // PATCH) ** 2
+    for i, outputs in enumerate((*architecture.hidden, architecture.dimensions)):
+        shapes[f"linear.{i}.weight"] = (outputs, width)
+        shapes[f"linear.{i}.bias"] = (outputs,)
+        if i < len(architecture.hidden):
+            shapes[f"linear.{i}.slope"] = (outputs,)
+        width = outputs
+    return shapes
+
+
+def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
+    """Weights to begin training with: normal, scaled for PReLU (He et al. 2015); biases zero."""
+    last = f"linear.{len(architecture.hidden)}.weight"
+    weights: Weights = {}
+    for name, shape in weight_shapes(architecture).items():
+        if name.endswith(".weight"):
+            gain = 1.0 if name == last else 2.0 / (1.0 + PRELU_SLOPE**2)
+            fan_in = float(np.prod(shape[1:]))
+            weights[name] = rng.normal(0.0, np.sqrt(gain / fan_in), shape).astype(np.float32)
+        else:
+            weights[name] = np.full(shape, 0.0 if name.endswith(".bias") else PRELU_SLOPE, np.float32)
+    return weights
+
+
+def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
+    """The sizes of the network that has these weights; ValueError where they are none."""
+    try:
+        convolutions, linears = layer_counts(weights)
+        widths = [len(weights[f"linear.{i}.bias"]) for i in range(linears)]
+        architecture = Architecture(
+            tuple(len(weights[f"convolution.{i}.bias"]) for i in range(convolutions)),
+            tuple(widths[:-1]),
+            widths[-1],
+        )
+    except (KeyError, IndexError, TypeError, ValueError):
+        raise ValueError("these are no weights of an encoder: a layer is missing") from None
+    if {name: tensor.shape for name, tensor in weights.items()} != weight_shapes(architecture):
+        raise ValueError("these are no weights of an encoder: its layers do not fit each other")
+    return architecture
+
+
+def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
+    """How many convolutions and how many fully connected layers ``weights`` has."""
+    names = {name.rsplit(".", 1)[0] for name in weights}
+    convolutions, linears = (
+        sum(name.startswith(kind) for name in names) for kind in ("convolution.", "linear.")
+    )
+    return convolutions, linears
+
+
+def to_onnx(weights: Weights) -> bytes:
+    """The network as a serialised ONNX model: ``grid`` uint8 [n, 64, 64] to ``embedding`` float32 [n, D]."""
+    from onnx import TensorProto, helper, numpy_helper
+
+    convolutions, linears = layer_counts(weights)
+    nodes = [
+        helper.make_node("Cast", ["grid"], ["cells"], to=TensorProto.FLOAT),
+        helper.make_node("Reshape", ["cells", "image_shape"], ["image"]),
+    ]
+    value = "image"
+
+    def chain(operation: str, *inputs: str, **attributes: Any) -> None:
+        nonlocal value
+        output = f"value{len(nodes)}"
+        nodes.append(helper.make_node(operation, [value, *inputs], [output], **attributes))
+        value = output
+
+    for i in range(convolutions):
+        name = f"convolution.{i}"
+        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        chain("Conv", f"{name}.weight", f"{name}.bias", strides=[stride] * 2, pads=[padding] * 4)
+        chain("PRelu", f"{name}.slope")
+    chain("Flatten")
+    for i in range(linears):
+        chain("Gemm", f"linear.{i}.weight", f"linear.{i}.bias", transB=1)
+        if i + 1 < linears:
+            chain("PRelu", f"linear.{i}.slope")
+    nodes[-1].output[0] = "embedding"
+    dimensions = len(weights[f"linear.{linears - 1}.bias"])
+    graph = helper.make_graph(
+        nodes,
+        "encoder",
+        [helper.make_tensor_value_info("grid", TensorProto.UINT8, ["n", GRID, GRID])],
+        [helper.make_tensor_value_info("embedding", TensorProto.FLOAT, ["n", dimensions])],
+        [
+            numpy_helper.from_array(np.array([-1, 1, GRID, GRID], np.int64), "image_shape"),
+            *(numpy_helper.from_array(np.asarray(weights[name]), name) for name in sorted(weights)),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    serialised: bytes = model.SerializeToString()
+    return serialised
+
+
+@dataclass(frozen=True)
+class Encoder:
+    """Runs a serialised ONNX encoder on one thread; pickled as its bytes, its session made at first use."""
+
+    model: bytes
+
+    @functools.cached_property
+    def _run(self) -> Callable[..., list[Floats32]]:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.inter_op_num_threads = 1
+        options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+        session = onnxruntime.InferenceSession(self.model, options, providers=["CPUExecutionProvider"])
+        run: Callable[..., list[Floats32]] = session.run
+        return run
+
+    def __getstate__(self) -> dict[str, bytes]:
+        return {"model": self.model}
+
+    def __call__(self, grids: Grid) -> Floats32:
+        """Embedding ``[D]`` of one grid ``[64, 64]``, or ``[n, D]`` of ``[n, 64, 64]``; cells are 0 or 1."""
+        if grids.dtype != np.uint8 or grids.ndim not in (2, 3) or grids.shape[-2:] != (GRID, GRID):
+            raise ValueError(
+                f"grid is {grids.dtype} {list(grids.shape)}, the encoder needs uint8 [{GRID}, {GRID}] "
+                f"or [n, {GRID}, {GRID}]. Was it drawn by planners.world.geometry.occupancy?"
+            )
+        embeddings = self._run(None, {"grid": grids.reshape(-1, GRID, GRID)})[0]
+        return embeddings.reshape(*grids.shape[:-2], -1)

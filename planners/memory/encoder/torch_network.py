@@ -1,0 +1,52 @@
+"""The encoder in torch, for training; ``encoder.to_onnx`` writes the same network for recall."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from planners.memory.encoder.encoder import PATCH, layer_counts
+from planners.world.geometry.occupancy import GRID
+
+Parameters = dict[str, Tensor]
+
+
+def unpacked(bits: Tensor) -> Tensor:
+    """Images float32 ``[n, 1, 64, 64]`` of packed grids uint8 ``[n, 512]``."""
+    shifts = torch.arange(7, -1, -1, dtype=torch.uint8, device=bits.device)
+    return ((bits[:, :, None] >> shifts) & 1).to(torch.float32).view(-1, 1, GRID, GRID)
+
+
+def prelu(value: Tensor, slope: Tensor) -> Tensor:
+    """``value`` where it is positive, else ``slope`` times it; torch's own takes twice as long backwards."""
+    positive = functional.relu(value)
+    return torch.addcmul(positive, slope, value - positive)
+
+
+def embed(parameters: Parameters, bits: Tensor) -> Tensor:
+    """Embeddings ``[n, D]`` of packed grids uint8 ``[n, 512]``."""
+    convolutions, linears = layer_counts(parameters)
+    value = unpacked(bits)
+    for i in range(convolutions):
+        name = f"convolution.{i}"
+        weight, bias = parameters[f"{name}.weight"], parameters[f"{name}.bias"]
+        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        value = functional.conv2d(value, weight, bias, stride=stride, padding=padding)
+        value = prelu(value, parameters[f"{name}.slope"])
+    value = value.flatten(1)
+    for i in range(linears):
+        value = functional.linear(value, parameters[f"linear.{i}.weight"], parameters[f"linear.{i}.bias"])
+        if i + 1 < linears:
+            value = prelu(value, parameters[f"linear.{i}.slope"])
+    return value
+
+
+@torch.no_grad()
+def embed_all(parameters: Parameters, bits: Tensor, batch: int = 1024) -> Tensor:
+    """Like ``embed``, in batches and without gradients."""
+    last = parameters[f"linear.{layer_counts(parameters)[1] - 1}.bias"]
+    embeddings = torch.empty((len(bits), len(last)), dtype=last.dtype, device=bits.device)
+    for first in range(0, len(bits), batch):  # small results kept between large ones would scatter the heap
+        embeddings[first : first + batch] = embed(parameters, bits[first : first + batch])
+    return embeddings

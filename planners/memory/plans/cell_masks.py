@@ -1,0 +1,115 @@
+"""The cells that a plan sweeps, one bit each: ranking by counting bits, and proof that a plan is free.
+
+A cell is set where any swept box of the plan meets it, as a cell of the occupancy grid is set where any
+obstacle meets it. Where the two share no cell, the plan is free: no check is needed.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.memory.plans.sweeps import PlanSweeps
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, draw_piece
+from planners.world.jit import inlined, lean
+from planners.world.problem import BOUNDS
+
+ROUNDING_M = 1e-6  # boxes are drawn that much larger, so that rounding never loses a cell
+MOST_CELLS = 511  # a plan sweeps some 200: beyond this, one is as blocked as another
+_PAIRS = np.uint64(0x5555555555555555)
+_NIBBLES = np.uint64(0x3333333333333333)
+_BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
+_LOW = np.uint64(0x0101010101010101)
+
+
+@lean
+def _draw_sweeps(sweeps: PlanSweeps, corners: Floats, words: Bits, spans: Floats, masks: Bits) -> None:
+    boxes = sweeps.boxes
+    for i in range(masks.shape[0]):
+        for row in range(GRID):
+            masks[i, row] = np.uint64(0)
+        inside = True
+        for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
+            half_length = boxes[j, 4] + ROUNDING_M
+            half_width = boxes[j, 5] + ROUNDING_M
+            for k in range(4):
+                u = half_length if k == 1 or k == 2 else -half_length
+                w = half_width if k >= 2 else -half_width
+                x = boxes[j, 0] + u * boxes[j, 2] - w * boxes[j, 3]
+                y = boxes[j, 1] + u * boxes[j, 3] + w * boxes[j, 2]
+                inside &= BOUNDS[0] < x < BOUNDS[2] and BOUNDS[1] < y < BOUNDS[3]
+                corners[k, 0] = x
+                corners[k, 1] = y
+            row_0, row_1 = draw_piece(corners, 0, 4, words, spans)
+            for row in range(row_0, row_1 + 1):
+                masks[i, row] |= words[row]
+        if not inside:
+            for row in range(GRID):
+                masks[i, row] = ALL_CELLS
+
+
+def masks_of(sweeps: PlanSweeps) -> Bits:
+    """The swept cells ``[N, 64]`` of N plans, as bits (``planners.world.geometry.occupancy``).
+
+    A plan that leaves the window of the grid, where nothing is drawn, has all cells set: nothing is proved
+    of it.
+    """
+    masks = np.empty((len(sweeps.starts) - 1, GRID), np.uint64)
+    _draw_sweeps(sweeps, np.empty((4, 2)), np.empty(GRID, np.uint64), np.empty((2, GRID)), masks)
+    return masks
+
+
+@inlined
+def count_bits(word: np.uint64) -> np.uint64:
+    """How many bits are set; LLVM knows the idiom, and counts eight words an instruction."""
+    one = np.uint64(1)
+    word = word - ((word >> one) & _PAIRS)
+    word = (word & _NIBBLES) + ((word >> np.uint64(2)) & _NIBBLES)
+    word = (word + (word >> np.uint64(4))) & _BYTES
+    return np.uint64((word * _LOW) >> np.uint64(56))
+
+
+class Ranking(NamedTuple):
+    """N plans by the number of their swept cells that are not free; buffers are kept."""
+
+    cells: Integers  # [N] blocked cells of each plan, at most MOST_CELLS
+    order: Integers  # [N] the plans, the least blocked first; equal ones in order of storing
+    places: Integers  # [MOST_CELLS + 2] where plans with that many blocked cells begin: scratch
+
+
+@functools.lru_cache(maxsize=4)
+def allocate_ranking(count: int) -> Ranking:
+    """Buffers for that many plans."""
+    return Ranking(np.empty(count, np.int32), np.empty(count, np.int32), np.empty(MOST_CELLS + 2, np.int32))
+
+
+@lean
+def _rank(masks: Bits, occupied: Bits, ranking: Ranking) -> None:
+    cells = ranking.cells
+    places = ranking.places
+    places.fill(0)
+    for i in range(masks.shape[0]):
+        count = np.uint64(0)
+        for row in range(GRID):
+            count += count_bits(masks[i, row] & occupied[row])
+        blocked = min(int(np.int64(count)), MOST_CELLS)  # an unsigned one would make floats
+        if masks[i, 0] == ALL_CELLS:  # it leaves the window
+            blocked = MOST_CELLS
+        cells[i] = blocked
+        places[blocked + 1] += 1
+    for blocked in range(MOST_CELLS + 1):
+        places[blocked + 1] += places[blocked]
+    for i in range(masks.shape[0]):
+        blocked = cells[i]
+        ranking.order[places[blocked]] = i
+        places[blocked] += 1
+
+
+def rank_by_cells(masks: Bits, occupied: Bits) -> Ranking:
+    """N plans by how many of their cells ``[N, 64]`` are ``occupied [64]``; good until the next ranking."""
+    ranking = allocate_ranking(len(masks))
+    _rank(masks, occupied, ranking)
+    return ranking

@@ -1,0 +1,65 @@
+"""Many plans end to end in a few flat arrays, which may lie on disk; each is made when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+
+from planners.world.arrays import Floats
+from planners.world.problem import Plan
+
+Offsets = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredPlans(Sequence[Plan]):
+    """A sequence of N plans. A plan is a view of these arrays: nothing is copied, nor read before it is used.
+
+    Raises ValueError where the arrays do not fit each other.
+    """
+
+    states: Floats  # [T_0 + ... + T_{N-1}, S] of all plans, one after another
+    controls: Floats  # [T_0 + ... + T_{N-1} - N, 2]
+    starts: Offsets  # [N + 1] plan i owns states[starts[i] : starts[i + 1]]
+    dt: Floats  # [N] seconds
+
+    def __post_init__(self) -> None:
+        count = len(self.dt)
+        shapes = (self.states.ndim, self.controls.ndim, self.starts.shape, len(self.controls))
+        wanted = (2, 2, (count + 1,), len(self.states) - count)
+        ends = (self.starts[:1].tolist(), self.starts[-1:].tolist())
+        if shapes != wanted or ends != ([0], [len(self.states)]) or (np.diff(self.starts) < 1).any():
+            raise ValueError(
+                f"states {list(self.states.shape)}, controls {list(self.controls.shape)}, {len(self.starts)} "
+                f"starts and {count} time steps are no {count} plans of one control fewer than states each"
+            )
+
+    def __len__(self) -> int:
+        return len(self.dt)
+
+    @overload
+    def __getitem__(self, index: int) -> Plan: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Plan, ...]: ...
+    def __getitem__(self, index: int | slice) -> Plan | tuple[Plan, ...]:
+        if isinstance(index, slice):
+            return tuple(self[i] for i in range(*index.indices(len(self))))
+        i = range(len(self))[index]  # counts from the end, and refuses what is beyond
+        first, last = int(self.starts[i]), int(self.starts[i + 1])
+        return Plan(self.states[first:last], self.controls[first - i : last - i - 1], float(self.dt[i]))
+
+
+def store_plans(plans: Iterable[Plan], state_size: int) -> StoredPlans:
+    """Copy plans of ``state_size`` numbers a state into flat arrays."""
+    if isinstance(plans, StoredPlans):
+        return plans
+    listed = list(plans)
+    return StoredPlans(
+        np.concatenate([np.empty((0, state_size)), *(plan.states for plan in listed)]),
+        np.concatenate([np.empty((0, 2)), *(plan.controls for plan in listed)]),
+        np.cumsum([0] + [len(plan.states) for plan in listed], dtype=np.int64),
+        np.array([plan.dt for plan in listed], np.float64),
+    )

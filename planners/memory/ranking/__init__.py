@@ -1,0 +1,1 @@
+"""How stored plans are scored for an embedding, and the best of them found."""

@@ -1,0 +1,1 @@
+"""Ways to follow, and how a planner samples along them."""

@@ -1,0 +1,150 @@
+"""A fresh guide: the shortest way over the occupancy grid, found breadth first, 64 cells an operation.
+
+A cell counts as free when its whole 1 m square is, so a way between centres of free cells keeps half a metre
+clear: a little more than half the car's width. It knows nothing of how a vehicle moves.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.world.arrays import Floats
+from planners.world.geometry.occupancy import CELL, GRID, Bits
+from planners.world.jit import inlined, lean
+from planners.world.problem import BOUNDS
+
+_LEFT: Final = BOUNDS[0]
+_BOTTOM: Final = BOUNDS[1]
+_STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))  # column, row
+_ONE: Final = np.uint64(1)
+_NONE: Final = np.uint64(0)
+
+
+class Flood(NamedTuple):
+    """Buffers of the search, one set a process; rows of cells as bits, an empty row below and above."""
+
+    waves: Bits  # [GRID^2, GRID + 2] the cells that are so many steps from the goal disc
+    free: Bits  # [GRID + 2] free cells
+    fresh: Bits  # [GRID + 2] those of them that no wave has reached
+    way: Floats  # [GRID^2, 2] metres
+
+
+@functools.lru_cache(maxsize=1)
+def allocate_flood() -> Flood:
+    """Buffers for one search at a time."""
+    rows = GRID + 2
+    return Flood(
+        np.zeros((GRID * GRID, rows), np.uint64),
+        np.zeros(rows, np.uint64),
+        np.zeros(rows, np.uint64),
+        np.empty((GRID * GRID, 2)),
+    )
+
+
+@inlined
+def _is_set(rows: Bits, column: int, row: int) -> bool:
+    """Whether the bit of a cell is set in ``rows [GRID + 2]``; outside of the grid none is."""
+    if column < 0 or column >= GRID:
+        return False
+    return bool((rows[row + 1] >> np.uint64(column)) & _ONE)
+
+
+@lean
+def _first_wave(goal_x: float, goal_y: float, radius: float, free: Bits, wave: Bits) -> None:
+    wave.fill(_NONE)
+    reach = int(radius / CELL) + 1
+    column = int((goal_x - _LEFT) // CELL)
+    row = int((goal_y - _BOTTOM) // CELL)
+    for r in range(max(row - reach, 0), min(row + reach, GRID - 1) + 1):
+        for c in range(max(column - reach, 0), min(column + reach, GRID - 1) + 1):
+            dx = _LEFT + (c + 0.5) * CELL - goal_x
+            dy = _BOTTOM + (r + 0.5) * CELL - goal_y
+            if dx * dx + dy * dy <= radius * radius and _is_set(free, c, r):
+                wave[r + 1] |= _ONE << np.uint64(c)
+
+
+@lean
+def _next_wave(last: Bits, free: Bits, fresh: Bits, wave: Bits) -> bool:
+    """Fill in the fresh cells one step from those of the last wave; whether there are any."""
+    reached = _NONE
+    for r in range(1, GRID + 1):
+        here = last[r]
+        below = last[r - 1]
+        above = last[r + 1]
+        # a diagonal step needs both cells beside it free: one in this row, one in the row it comes from
+        from_below = below & free[r]
+        from_above = above & free[r]
+        spread = here << _ONE | here >> _ONE | below | above
+        spread |= (from_below << _ONE | from_below >> _ONE) & free[r - 1]
+        spread |= (from_above << _ONE | from_above >> _ONE) & free[r + 1]
+        wave[r] = spread & fresh[r]
+        reached |= wave[r]
+    for r in range(1, GRID + 1):
+        fresh[r] &= ~wave[r]
+    return bool(reached != _NONE)
+
+
+@lean
+def flood_from_goal(
+    occupied: Bits, start_x: float, start_y: float, goal_x: float, goal_y: float, radius: float, flood: Flood
+) -> int:
+    """Fill ``flood.way`` with centres of free cells from start to goal disc; how many, 0: none.
+
+    Neighbours are the eight around a cell; a diagonal step needs both cells beside it free. Where an obstacle
+    touches the start's cell, the way begins beside it.
+    """
+    waves = flood.waves
+    free = flood.free
+    for r in range(GRID):
+        free[r + 1] = ~occupied[r]
+    _first_wave(goal_x, goal_y, radius, free, waves[0])
+    for r in range(GRID + 2):
+        flood.fresh[r] = free[r] & ~waves[0, r]
+    column = int((start_x - _LEFT) // CELL)
+    row = int((start_y - _BOTTOM) // CELL)
+    inside = 0 <= row < GRID and 0 <= column < GRID
+    apart = 0 if inside and _is_set(free, column, row) else 1  # cells from the start's at which it may begin
+    wave = 0
+    while True:
+        for r in range(max(row - apart, 0), min(row + apart, GRID - 1) + 1):
+            for c in range(column - apart, column + apart + 1):
+                if _is_set(waves[wave], c, r):
+                    return _trace(waves, free, wave, c, r, flood.way)
+        if not _next_wave(waves[wave], free, flood.fresh, waves[wave + 1]):
+            return 0
+        wave += 1
+
+
+@lean
+def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, way: Floats) -> int:
+    """Fill in the way from a cell of a wave down to the first one; straight steps before diagonal ones."""
+    filled = 0
+    while True:
+        way[filled, 0] = _LEFT + (column + 0.5) * CELL
+        way[filled, 1] = _BOTTOM + (row + 0.5) * CELL
+        filled += 1
+        if wave == 0:
+            return filled
+        wave -= 1
+        for step in _STEPS:
+            c = column + step[0]
+            r = row + step[1]
+            if _is_set(waves[wave], c, r) and _is_set(free, c, row) and _is_set(free, column, r):
+                column = c
+                row = r
+                break
+
+
+def grid_path(
+    occupied: Bits, start: tuple[float, float], goal: tuple[float, float], radius: float
+) -> Floats | None:
+    """The shortest way ``[M, 2]`` over a problem's occupied cells ``[64]`` from a place to a disc, in metres.
+
+    None when the two are not connected there. The points are cell centres; the array is the caller's own.
+    """
+    flood = allocate_flood()
+    count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, flood)
+    return flood.way[:count].copy() if count else None

@@ -1,0 +1,64 @@
+"""Where a planner's samples come from: anywhere, a disc, or along a guiding way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planners.search.outcome import Guide
+from planners.world.arrays import Floats
+from planners.world.jit import inlined, lean
+
+
+@inlined
+def in_disc(x: float, y: float, radius: float, rng: np.random.Generator) -> tuple[float, float]:
+    """A uniform point of the disc around (x, y), metres."""
+    angle = 2.0 * math.pi * rng.random()
+    r = radius * math.sqrt(rng.random())
+    return x + r * math.cos(angle), y + r * math.sin(angle)
+
+
+@inlined
+def in_bounds(bounds: Floats, rng: np.random.Generator) -> tuple[float, float]:
+    """A uniform point of the bounds ``[4]``, metres."""
+    return (
+        bounds[0] + (bounds[2] - bounds[0]) * rng.random(),
+        bounds[1] + (bounds[3] - bounds[1]) * rng.random(),
+    )
+
+
+@lean
+def guided(
+    guide: Guide,
+    goal: Floats,
+    bounds: Floats,
+    near_m: float,
+    far_m: float,
+    lead: int,
+    rng: np.random.Generator,
+) -> tuple[float, float, float, float]:
+    """From where to extend, x, y, and where to, x, y: along way i of the guide with probability b_i.
+
+    From around a uniformly drawn point of the way, radius U(near_m, far_m), to around one of the ``lead``
+    points after it. With b_goal the target lies in the goal disc, else anywhere in the bounds; then what is
+    nearest to the target is extended. (The paper, III-D, draws targets near a plan as it does anywhere. That
+    says where to be, but not which way to go on from there, and is slower than no guide: docs/planners.md.)
+    """
+    draw = rng.random()
+    for i in range(guide.probabilities.shape[0]):
+        draw -= guide.probabilities[i]
+        if draw < 0.0:
+            first = guide.starts[i]
+            count = guide.starts[i + 1] - first
+            chosen = int(rng.random() * count)
+            ahead = min(chosen + 1 + int(rng.random() * lead), count - 1)
+            radius = near_m + (far_m - near_m) * rng.random()
+            x, y = in_disc(guide.points[first + chosen, 0], guide.points[first + chosen, 1], radius, rng)
+            to_x, to_y = in_disc(guide.points[first + ahead, 0], guide.points[first + ahead, 1], near_m, rng)
+            return x, y, to_x, to_y
+    if draw < guide.goal_probability:
+        x, y = in_disc(goal[0], goal[1], goal[2], rng)
+    else:
+        x, y = in_bounds(bounds, rng)
+    return x, y, x, y

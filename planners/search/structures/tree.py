@@ -1,0 +1,247 @@
+"""The motion tree: every state that an extension drives through is a vertex."""
+
+from __future__ import annotations
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.search.structures.neighbours import (
+    Buckets,
+    Indices,
+    allocate_buckets,
+    clear_buckets,
+    put,
+    remove,
+)
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.jit import inlined, lean
+from planners.world.problem import Plan
+from planners.world.trigonometry import length
+from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.vehicle import Vehicle
+
+# places in Tree.counts
+SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX = range(4)
+
+
+class Tree(NamedTuple):
+    """Vertices in the order in which they were reached; buffers are kept from problem to problem."""
+
+    states: Floats  # [C, S]
+    controls: Floats  # [C, 2] that led here from the parent
+    parents: Indices  # [C]
+    depths: Indices  # [C] steps from the root
+    waypoints: Indices  # [C] next waypoint of the lead path (Follow)
+    spent: Indices  # [C] 1 where an extension soon collided: too near an obstacle to lead anywhere
+    counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
+    bound: Floats  # [1] seconds: no vertex is added from which the goal cannot be reached sooner
+    buckets: Buckets
+
+
+class Extension(NamedTuple):
+    """How a vertex is extended towards a target (docs/planners.md)."""
+
+    steer_probability: float = 0.99  # else one random constant control
+    metres_a_step: float = 0.5  # floor(distance / this) steps ...
+    least_steps: int = 20  # ... plus a uniform number of these
+    most_steps: int = 40
+    least_added: int = 12  # a vertex from which fewer steps were free is not extended again
+    arrival_m: float = 1.0  # a target is reached within this distance
+    slowest_share: float = 0.95  # desired speed: U(this, 1) of the maximum
+    proportional: float = 10.0
+    integral: float = 0.1
+    derivative: float = 0.1
+
+
+EXTENSION = Extension()
+NO_LEAD = np.empty((0, 2))
+BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
+
+
+@functools.lru_cache(maxsize=1)
+def allocate_tree(capacity: int, state_size: int) -> Tree:
+    """Buffers for ``capacity`` vertices, one set a process."""
+    states = np.empty((capacity, state_size))
+    return Tree(
+        states,
+        np.empty((capacity, 2)),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.empty(capacity, np.int64),
+        np.zeros(4, np.int64),
+        np.zeros(1),
+        allocate_buckets(),
+    )
+
+
+@lean
+def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
+    """Begin a new tree with a drive: ``states [n, S]`` from the root on and the ``controls [n - 1, 2]``."""
+    for i in range(states.shape[0]):
+        for k in range(states.shape[1]):  # one by one: assigning a row compiles for two seconds
+            tree.states[i, k] = states[i, k]
+        tree.controls[i, 0] = controls[i - 1, 0] if i > 0 else 0.0
+        tree.controls[i, 1] = controls[i - 1, 1] if i > 0 else 0.0
+        tree.parents[i] = i - 1
+        tree.depths[i] = i
+    tree.counts.fill(0)
+    tree.bound[0] = bound_s
+    prune(tree, states.shape[0], bounds)
+
+
+@lean
+def prune(tree: Tree, size: int, bounds: Floats) -> None:
+    """Forget all but the first ``size`` vertices; what was counted stays counted."""
+    clear_buckets(tree.buckets, bounds, BUCKET_M)
+    for i in range(size):
+        tree.waypoints[i] = 0
+        tree.spent[i] = 0
+        put(tree.buckets, i, tree.states[i, 0], tree.states[i, 1])
+    tree.counts[SIZE] = size
+    tree.counts[GOAL_VERTEX] = -1
+
+
+@inlined
+def pid(error: float, last: float, total: float, gains: Extension, dt: float, limit: float) -> float:
+    """Control within plus and minus ``limit``; ``last`` error a step ago, ``total`` its sum over time."""
+    control = gains.proportional * error + gains.integral * total + gains.derivative * (error - last) / dt
+    return min(max(control, -limit), limit)
+
+
+@inlined
+def segment_distance(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance in metres from a point to the segment from a to b."""
+    dx = bx - ax
+    dy = by - ay
+    squared = dx * dx + dy * dy
+    share = 0.0
+    if squared > 0.0:
+        share = min(max(((x - ax) * dx + (y - ay) * dy) / squared, 0.0), 1.0)
+    return length(x - ax - share * dx, y - ay - share * dy)
+
+
+@lean
+def extend(
+    tree: Tree,
+    vertex: int,
+    target_x: float,
+    target_y: float,
+    goal: Floats,
+    lead: Floats,
+    tube_m: float,
+    passing_m: float,
+    settings: Extension,
+    vehicle: Vehicle,
+    scene: Scene,
+    rng: np.random.Generator,
+) -> int:
+    """Drive from ``vertex`` towards a target and add what is free; returns the number of new vertices.
+
+    ``goal [3]``: x, y, radius in metres. Along a ``lead [m, 2]`` (empty: none) each vertex must keep within
+    ``tube_m`` of the segment to its next waypoint, which is passed within ``passing_m``.
+    """
+    states = tree.states
+    counts = tree.counts
+    counts[EXPANSIONS] += 1
+    state = load(states, vertex, vehicle)
+    limit_1, limit_2 = control_limits(vehicle)
+    waypoint = tree.waypoints[vertex]
+    steered = rng.random() < settings.steer_probability
+    spread = settings.most_steps - settings.least_steps + 1
+    steps = int(length(target_x - state[0], target_y - state[1]) / settings.metres_a_step)
+    steps += settings.least_steps + int(rng.random() * spread)
+    desired_speed = (
+        settings.slowest_share + (1.0 - settings.slowest_share) * rng.random()
+    ) * vehicle.max_speed
+    control_1 = (2.0 * rng.random() - 1.0) * limit_1
+    control_2 = (2.0 * rng.random() - 1.0) * limit_2
+    turn_sum = 0.0
+    speed_sum = 0.0
+    last_turn = 0.0
+    last_speed = 0.0
+    first = counts[SIZE]
+    parent = vertex
+    arrived = False
+    for i in range(steps):
+        if counts[SIZE] == states.shape[0]:
+            break
+        if steered:
+            turn = turn_error(state, target_x, target_y, vehicle)
+            lack = desired_speed - state[3]
+            if i == 0:
+                last_turn = turn
+                last_speed = lack
+            turn_sum += turn * vehicle.dt
+            speed_sum += lack * vehicle.dt
+            control_2 = pid(turn, last_turn, turn_sum, settings, vehicle.dt, limit_2)
+            control_1 = pid(lack, last_speed, speed_sum, settings, vehicle.dt, limit_1)
+            last_turn = turn
+            last_speed = lack
+        driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
+        state = step(state, driven_1, driven_2, vehicle)
+        x = state[0]
+        y = state[1]
+        to_goal = length(x - goal[0], y - goal[1]) - goal[2]
+        depth = tree.depths[parent] + 1
+        if depth * vehicle.dt + max(to_goal, 0.0) / vehicle.max_speed >= tree.bound[0]:
+            break
+        counts[CHECKS] += 1
+        if not state_is_free(state, vehicle, scene):
+            break
+        if lead.shape[0] > 0:
+            while waypoint < lead.shape[0] - 1 and (
+                length(lead[waypoint, 0] - x, lead[waypoint, 1] - y) < passing_m
+            ):
+                waypoint += 1
+            before = max(waypoint - 1, 0)
+            if (
+                segment_distance(x, y, lead[before, 0], lead[before, 1], lead[waypoint, 0], lead[waypoint, 1])
+                > tube_m
+            ):
+                break
+        new = counts[SIZE]
+        counts[SIZE] += 1
+        store(states, new, state)
+        tree.controls[new, 0] = driven_1
+        tree.controls[new, 1] = driven_2
+        tree.parents[new] = parent
+        tree.depths[new] = depth
+        tree.waypoints[new] = waypoint
+        tree.spent[new] = 0
+        put(tree.buckets, new, x, y)
+        parent = new
+        if to_goal <= 0.0:
+            counts[GOAL_VERTEX] = new
+            break
+        arrived = length(x - target_x, y - target_y) < settings.arrival_m
+        if arrived:
+            break
+    added = int(counts[SIZE] - first)
+    if added < settings.least_added and not arrived and vertex > 0:
+        tree.spent[vertex] = 1
+        remove(tree.buckets, vertex, states[vertex, 0], states[vertex, 1])
+    return added
+
+
+@lean
+def _trace(tree: Tree, states: Floats, controls: Floats) -> None:
+    vertex = tree.counts[GOAL_VERTEX]
+    for i in range(states.shape[0] - 1, -1, -1):
+        for k in range(states.shape[1]):
+            states[i, k] = tree.states[vertex, k]
+        if i > 0:
+            controls[i - 1, 0] = tree.controls[vertex, 0]
+            controls[i - 1, 1] = tree.controls[vertex, 1]
+        vertex = tree.parents[vertex]
+
+
+def plan_to_goal(tree: Tree, dt: float) -> Plan:
+    """The way from the root to the goal vertex."""
+    steps = int(tree.depths[tree.counts[GOAL_VERTEX]])
+    plan = Plan(np.empty((steps + 1, tree.states.shape[1])), np.empty((steps, 2)), dt)
+    _trace(tree, plan.states, plan.controls)
+    return plan

@@ -1,0 +1,9 @@
+"""The kinds of NumPy arrays that kernels take."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+Floats32 = np.ndarray[tuple[int, ...], np.dtype[np.float32]]
+Integers = np.ndarray[tuple[int, ...], np.dtype[np.int32]]

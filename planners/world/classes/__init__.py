@@ -1,0 +1,1 @@
+"""The problem classes, and how each places its obstacles."""

@@ -1,0 +1,1 @@
+"""Collision, occupancy grids, and polygons into convex pieces."""

@@ -1,0 +1,243 @@
+"""Exact collision of a vehicle's footprint with convex obstacles: a cell look-up, then separating axes.
+
+Each piece is listed in every cell of a grid in which a footprint's centre could lie when it touches the
+piece, so one check reads one cell, however many obstacles there are.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.arrays import Floats, Integers
+from planners.world.jit import inlined, jit
+from planners.world.problem import Problem
+from planners.world.trigonometry import length
+from planners.world.vehicles.dynamics import State, is_folded, load, swept_bodies
+from planners.world.vehicles.vehicle import Vehicle
+
+CELL_M = 2.0  # measured: smaller cells cost more to fill than they save in checks
+REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept body, a roadmap node's
+
+
+NORMAL_X, NORMAL_Y, OFFSET, X, Y = range(5)  # columns of Scene.edges
+FIRST, LAST, FACING = range(3)  # columns of Scene.cell_pieces
+
+
+class Scene(NamedTuple):
+    """A problem made ready for collision checks."""
+
+    bounds: Floats  # [4] x_min, y_min, x_max, y_max in metres
+    edges: Floats  # [V, 5] of each edge: outward unit normal, normal . vertex (m), vertex it begins at (m)
+    piece_starts: Integers  # [P + 1] piece p owns edges[piece_starts[p] : piece_starts[p + 1]]
+    cell_starts: Integers  # [rows * columns + 1]
+    cell_pieces: Integers  # [K, 3] pieces within reach of a cell, cell by cell: edges FIRST to before LAST,
+    # and FACING, the one whose line is farthest from the cell's middle: most often it separates
+    columns: int
+
+
+@inlined
+def edge_separates(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    edge: int,
+    edges: Floats,
+) -> bool:
+    """Whether a box (centre, direction, half extents) lies outside of an edge's line."""
+    nx = edges[edge, NORMAL_X]
+    ny = edges[edge, NORMAL_Y]
+    extent = half_length * abs(nx * cos + ny * sin) + half_width * abs(ny * cos - nx * sin)
+    return bool(nx * x + ny * y - edges[edge, OFFSET] > extent)
+
+
+@inlined
+def box_meets_piece(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    first: int,
+    last: int,
+    edges: Floats,
+) -> bool:
+    """Whether a box and the convex piece of edges ``first`` to before ``last`` meet (separating axes)."""
+    for i in range(first, last):
+        if edge_separates(x, y, cos, sin, half_length, half_width, i, edges):
+            return False
+    low_u = math.inf
+    high_u = -math.inf
+    low_w = math.inf
+    high_w = -math.inf
+    for i in range(first, last):
+        dx = edges[i, X] - x
+        dy = edges[i, Y] - y
+        u = dx * cos + dy * sin
+        w = dy * cos - dx * sin
+        low_u = min(low_u, u)
+        high_u = max(high_u, u)
+        low_w = min(low_w, w)
+        high_w = max(high_w, w)
+    return not (low_u > half_length or high_u < -half_length or low_w > half_width or high_w < -half_width)
+
+
+@inlined
+def make_edges(vertices: Floats, first: int, last: int, edges: Floats, target: int) -> None:
+    """Fill in ``edges`` (as in ``Scene``) from ``target`` on for the piece ``vertices[first : last]``."""
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        ex = vertices[j, 0] - vertices[i, 0]
+        ey = vertices[j, 1] - vertices[i, 1]
+        way = length(ex, ey)
+        edge = target + i - first
+        edges[edge, NORMAL_X] = ey / way
+        edges[edge, NORMAL_Y] = -ex / way
+        edges[edge, OFFSET] = edges[edge, NORMAL_X] * vertices[i, 0] + edges[edge, NORMAL_Y] * vertices[i, 1]
+        edges[edge, X] = vertices[i, 0]
+        edges[edge, Y] = vertices[i, 1]
+
+
+@inlined
+def piece_extent(vertices: Floats, first: int, last: int) -> tuple[float, float, float, float]:
+    """Least x and y, and greatest x and y, of a piece ``vertices[first : last]``."""
+    x_min = math.inf
+    y_min = math.inf
+    x_max = -math.inf
+    y_max = -math.inf
+    for i in range(first, last):
+        x_min = min(x_min, vertices[i, 0])
+        x_max = max(x_max, vertices[i, 0])
+        y_min = min(y_min, vertices[i, 1])
+        y_max = max(y_max, vertices[i, 1])
+    return x_min, y_min, x_max, y_max
+
+
+@jit
+def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
+    """Edges and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
+    pieces = piece_starts.shape[0] - 1
+    edges = np.empty((vertices.shape[0], 5))
+    for p in range(pieces):
+        make_edges(vertices, piece_starts[p], piece_starts[p + 1], edges, piece_starts[p])
+    columns = math.ceil((bounds[2] - bounds[0]) / CELL_M) + 1
+    rows = math.ceil((bounds[3] - bounds[1]) / CELL_M) + 1
+    half = 0.5 * CELL_M + REACH_M
+    listed_cells = np.empty(64 * pieces + 64, np.int32)
+    listed_pieces = np.empty((64 * pieces + 64, 3), np.int32)
+    cell_starts = np.zeros(rows * columns + 1, np.int32)
+    listed = 0
+    for p in range(pieces):
+        first = piece_starts[p]
+        last = piece_starts[p + 1]
+        x_min, y_min, x_max, y_max = piece_extent(vertices, first, last)
+        column_0 = max(0, math.floor((x_min - REACH_M - bounds[0]) / CELL_M))
+        column_1 = min(columns - 1, math.floor((x_max + REACH_M - bounds[0]) / CELL_M))
+        row_0 = max(0, math.floor((y_min - REACH_M - bounds[1]) / CELL_M))
+        row_1 = min(rows - 1, math.floor((y_max + REACH_M - bounds[1]) / CELL_M))
+        for row in range(row_0, row_1 + 1):
+            centre_y = bounds[1] + (row + 0.5) * CELL_M
+            for column in range(column_0, column_1 + 1):
+                centre_x = bounds[0] + (column + 0.5) * CELL_M
+                near = True
+                facing = first
+                widest = -math.inf
+                for i in range(first, last):
+                    nx = edges[i, NORMAL_X]
+                    ny = edges[i, NORMAL_Y]
+                    gap = nx * centre_x + ny * centre_y - edges[i, OFFSET]
+                    if gap > half * (abs(nx) + abs(ny)):
+                        near = False
+                        break
+                    if gap > widest:
+                        widest = gap
+                        facing = i
+                if near:
+                    if listed == listed_cells.shape[0]:
+                        listed_cells = np.concatenate((listed_cells, np.empty_like(listed_cells)))
+                        listed_pieces = np.concatenate((listed_pieces, np.empty_like(listed_pieces)))
+                    cell = row * columns + column
+                    listed_cells[listed] = cell
+                    listed_pieces[listed, FIRST] = first
+                    listed_pieces[listed, LAST] = last
+                    listed_pieces[listed, FACING] = facing
+                    cell_starts[cell + 1] += 1
+                    listed += 1
+    for cell in range(rows * columns):
+        cell_starts[cell + 1] += cell_starts[cell]
+    cell_pieces = np.empty((listed, 3), np.int32)
+    for k in range(listed - 1, -1, -1):  # backwards, with starts moved up: each cell keeps its order
+        cell = listed_cells[k]
+        cell_starts[cell + 1] -= 1
+        for column in range(3):
+            cell_pieces[cell_starts[cell + 1], column] = listed_pieces[k, column]
+    for cell in range(rows * columns):
+        cell_starts[cell] = cell_starts[cell + 1]
+    cell_starts[rows * columns] = listed
+    return Scene(bounds, edges, piece_starts, cell_starts, cell_pieces, columns)
+
+
+def scene_of(problem: Problem) -> Scene:
+    """The problem made ready for collision checks."""
+    obstacles = problem.obstacles
+    return build_scene(obstacles.vertices, obstacles.piece_starts, np.array(problem.bounds))
+
+
+@inlined
+def box_is_free(
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    half_length: float,
+    half_width: float,
+    scene: Scene,
+) -> bool:
+    """Whether a box lies inside the bounds and meets no obstacle; its half-diagonal is at most REACH_M."""
+    extent_x = half_length * abs(cos) + half_width * abs(sin)
+    extent_y = half_length * abs(sin) + half_width * abs(cos)
+    bounds = scene.bounds
+    if (
+        x - extent_x < bounds[0]
+        or x + extent_x > bounds[2]
+        or y - extent_y < bounds[1]
+        or y + extent_y > bounds[3]
+    ):
+        return False
+    column = int((x - bounds[0]) * (1.0 / CELL_M))
+    row = int((y - bounds[1]) * (1.0 / CELL_M))
+    cell = row * scene.columns + column
+    pieces = scene.cell_pieces
+    edges = scene.edges
+    for k in range(scene.cell_starts[cell], scene.cell_starts[cell + 1]):
+        if edge_separates(x, y, cos, sin, half_length, half_width, pieces[k, FACING], edges):
+            continue
+        if box_meets_piece(x, y, cos, sin, half_length, half_width, pieces[k, FIRST], pieces[k, LAST], edges):
+            return False
+    return True
+
+
+@inlined
+def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether the vehicle's bodies, inflated for the steps into and out of this state, are free."""
+    if is_folded(state, vehicle):
+        return False
+    for box in swept_bodies(state, vehicle):
+        if not box_is_free(box[0], box[1], box[2], box[3], box[4], box[5], scene):
+            return False
+    return True
+
+
+@jit
+def count_free_prefix(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
+    """How many of ``states [T, S]`` are free before the first that is not; T when all are."""
+    for i in range(states.shape[0]):
+        if not state_is_free(load(states, i, vehicle), vehicle, scene):
+            return i
+    return states.shape[0]

@@ -1,0 +1,184 @@
+"""Which 1 m squares of the canonical window are not free: as bits, for recall, and as the encoder's grid."""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.arrays import Floats, Integers
+from planners.world.jit import inlined, jit, lean
+from planners.world.problem import BOUNDS, Problem
+
+Grid = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint64]]
+
+GRID = 64  # cells a side, and bits of a word
+CELL = (BOUNDS[2] - BOUNDS[0]) / GRID  # metres a side
+_LEFT, _BOTTOM = BOUNDS[0], BOUNDS[1]
+ALL_CELLS = np.uint64(0xFFFFFFFFFFFFFFFF)  # of a row
+_ONE = np.uint64(1)
+_LEAST_PIECES = 256  # convex pieces that the buffers hold at least
+
+
+class Drawing(NamedTuple):
+    """The cells that obstacles meet: bit c of word r is the cell in row r (y) and column c (x)."""
+
+    occupied: Bits  # [64] cells that are not free
+    pieces: Bits  # [C, 64] those that each convex piece meets; only the words of its rows are filled in
+    rows: Integers  # [C, 2] first and last row that each piece meets; the first after the last where none
+    spans: Floats  # [2, 64] from and to which x a piece covers each row: scratch
+
+
+@functools.lru_cache(maxsize=2)
+def _allocate(pieces: int) -> Drawing:
+    return Drawing(
+        np.empty(GRID, np.uint64),
+        np.empty((pieces, GRID), np.uint64),
+        np.empty((pieces, 2), np.int32),
+        np.empty((2, GRID)),
+    )
+
+
+def allocate_drawing(pieces: int) -> Drawing:
+    """Buffers for that many pieces, one set a process."""
+    return _allocate(max(_LEAST_PIECES, 1 << pieces.bit_length()))
+
+
+@inlined
+def cells_between(first: int, last: int) -> np.uint64:
+    """The word whose bits ``first`` to ``last`` are set; both are at least 0 and at most 63."""
+    return np.uint64((ALL_CELLS << np.uint64(first)) & (ALL_CELLS >> np.uint64(GRID - 1 - last)))
+
+
+@lean
+def draw_piece(vertices: Floats, first: int, last: int, words: Bits, spans: Floats) -> tuple[int, int]:
+    """Fill in the ``words [64]`` of the rows that a convex piece ``vertices[first : last]`` meets; which.
+
+    Exact: what a convex piece covers of a row of half-open squares is one interval of x, so its edges are
+    clipped row by row.
+    """
+    low = spans[0]
+    high = spans[1]
+    y_min = math.inf
+    y_max = -math.inf
+    for i in range(first, last):
+        y_min = min(y_min, vertices[i, 1])
+        y_max = max(y_max, vertices[i, 1])
+    row_0 = max(0, math.floor((y_min - _BOTTOM) / CELL))
+    row_1 = min(GRID - 1, math.floor((y_max - _BOTTOM) / CELL))
+    for row in range(row_0, row_1 + 1):
+        low[row] = math.inf
+        high[row] = -math.inf
+    for i in range(first, last):
+        j = i + 1 if i + 1 < last else first
+        upper = i if vertices[i, 1] > vertices[j, 1] else j
+        lower = j if upper == i else i
+        x_0 = vertices[lower, 0] - _LEFT
+        y_0 = vertices[lower, 1] - _BOTTOM
+        x_1 = vertices[upper, 0] - _LEFT
+        y_1 = vertices[upper, 1] - _BOTTOM
+        slope = (x_1 - x_0) / (y_1 - y_0) if y_1 > y_0 else 0.0
+        edge_row_0 = max(row_0, math.floor(y_0 / CELL))
+        edge_row_1 = min(row_1, math.floor(y_1 / CELL))
+        for row in range(edge_row_0, edge_row_1 + 1):
+            enter = x_0 if y_0 >= row * CELL else x_0 + slope * (row * CELL - y_0)
+            leave = x_1 if y_1 <= (row + 1) * CELL else x_0 + slope * ((row + 1) * CELL - y_0)
+            low[row] = min(low[row], enter, leave)
+            high[row] = max(high[row], enter, leave)
+    for row in range(row_0, row_1 + 1):
+        column_0 = max(0, math.floor(low[row] / CELL))
+        column_1 = min(GRID - 1, math.floor(high[row] / CELL))
+        words[row] = cells_between(column_0, column_1) if column_0 <= column_1 else np.uint64(0)
+    return row_0, row_1
+
+
+@lean
+def _draw_outside(x_min: float, y_min: float, x_max: float, y_max: float, occupied: Bits) -> None:
+    """Set the cells that are not wholly inside the bounds, and no others."""
+    columns = np.uint64(0)
+    for column in range(GRID):
+        left = _LEFT + column * CELL
+        if left >= x_min and left + CELL <= x_max:
+            columns |= _ONE << np.uint64(column)
+    for row in range(GRID):
+        bottom = _BOTTOM + row * CELL
+        inside = bottom >= y_min and bottom + CELL <= y_max
+        occupied[row] = ALL_CELLS ^ columns if inside else ALL_CELLS
+
+
+@lean
+def draw(
+    vertices: Floats, piece_starts: Integers, bounds: tuple[float, float, float, float], drawing: Drawing
+) -> None:
+    """Draw convex pieces ``[V, 2]``, ``[P + 1]``; what is not wholly inside the bounds is not free either."""
+    occupied = drawing.occupied
+    _draw_outside(bounds[0], bounds[1], bounds[2], bounds[3], occupied)
+    for p in range(piece_starts.shape[0] - 1):
+        words = drawing.pieces[p]
+        row_0, row_1 = draw_piece(vertices, piece_starts[p], piece_starts[p + 1], words, drawing.spans)
+        drawing.rows[p, 0] = row_0
+        drawing.rows[p, 1] = row_1
+        for row in range(row_0, row_1 + 1):
+            occupied[row] |= words[row]
+
+
+@lean
+def _unpack(bits: Bits, grid: Grid) -> None:
+    for row in range(GRID):
+        word = bits[row]
+        for column in range(GRID):
+            grid[row, column] = (word >> np.uint64(column)) & _ONE
+
+
+@jit
+def draw_occupancy(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Grid:
+    """Grid ``[64, 64]`` of convex pieces ``[V, 2]``, ``[P + 1]`` and bounds ``[4]``, for other kernels."""
+    occupied = np.empty(GRID, np.uint64)
+    words = np.empty(GRID, np.uint64)
+    spans = np.empty((2, GRID))
+    _draw_outside(bounds[0], bounds[1], bounds[2], bounds[3], occupied)
+    for p in range(piece_starts.shape[0] - 1):
+        row_0, row_1 = draw_piece(vertices, piece_starts[p], piece_starts[p + 1], words, spans)
+        for row in range(row_0, row_1 + 1):
+            occupied[row] |= words[row]
+    grid = np.empty((GRID, GRID), np.uint8)
+    _unpack(occupied, grid)
+    return grid
+
+
+def drawing_of(problem: Problem) -> Drawing:
+    """The cells that a canonical problem's obstacles meet; good until the next problem is drawn."""
+    obstacles = problem.obstacles
+    drawing = allocate_drawing(len(obstacles.piece_starts))
+    draw(obstacles.vertices, obstacles.piece_starts, problem.bounds, drawing)
+    return drawing
+
+
+def grid_of(bits: Bits) -> Grid:
+    """The grid ``[64, 64]`` (row = y, column = x) of bits ``[64]``."""
+    grid = np.empty((GRID, GRID), np.uint8)
+    _unpack(bits, grid)
+    return grid
+
+
+def bits_of(grids: Grid) -> Bits:
+    """The bits ``[..., 64]`` of grids ``[..., 64, 64]``."""
+    return np.packbits(grids, axis=-1, bitorder="little").view("<u8").astype(np.uint64)[..., 0]
+
+
+def occupancy_of(problem: Problem) -> Grid:
+    """The grid ``[64, 64]`` of a canonical problem: 1 where a cell's half-open square is not free."""
+    return grid_of(drawing_of(problem).occupied)
+
+
+def pack(grid: Grid) -> Grid:
+    """The bits of a grid ``[64, 64]`` in bytes ``[512]``, as shards keep them."""
+    return np.packbits(grid)
+
+
+def unpack(packed: Grid) -> Grid:
+    """The grid ``[64, 64]`` of bytes ``[512]``."""
+    return np.unpackbits(packed).reshape(GRID, GRID)

@@ -1,0 +1,1 @@
+"""Folders of arrays and weights with checksums: encoders, memories, checkpoints."""

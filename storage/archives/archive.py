@@ -1,0 +1,165 @@
+"""Archives: a folder of named files with a header, checksums of all of it, and nothing half written.
+
+Reading one runs nothing, imports nothing and unpickles nothing: files are mapped, measured and hashed before
+anybody looks at their contents.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import mmap
+import re
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from planners.world.geometry.occupancy import GRID
+from planners.world.vehicles.vehicle import Vehicle
+from storage.archives.arrays import write_array
+from storage.errors import StorageError
+from storage.places.files import local_text, parse_json, whole_folder
+from storage.places.mirror import fetch_folder
+from storage.recorded_vehicle import fields_of, refuse_another
+from storage.tables.columns import Array
+
+VERSION: Final = 2  # one more whenever an older program could no longer read an archive
+LARGEST_HEADER_BYTES: Final = 1 << 24
+_NAME: Final = re.compile(r"[a-z0-9_]{1,40}\.[a-z]{1,20}")
+
+Contents = mmap.mmap  # a whole file; kernels would be compiled anew for arrays that cannot be written to
+Files = Mapping[str, bytes | Array]
+
+
+def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str, Any], files: Files) -> None:
+    """Write ``<kind>.json`` and the files as one folder, in the place of what was there.
+
+    Arrays are written as ``storage.archives.arrays`` does. The same content gives the same bytes.
+
+    StorageError: it could not be written; the folder is as it was.
+    """
+    with whole_folder(folder) as temporary:
+        for name, data in files.items():
+            with (temporary / name).open("wb") as file:
+                if isinstance(data, bytes):
+                    file.write(data)
+                else:
+                    write_array(file, data)
+        content = {
+            "kind": kind,
+            "version": VERSION,
+            "vehicle": fields_of(vehicle),
+            "grid": GRID,
+            **header,
+            "files": {
+                name: {"bytes": len(data), "sha256": digest}
+                for name, (data, digest) in _hashed([temporary / name for name in files]).items()
+            },
+        }
+        (temporary / f"{kind}.json").write_text(_signed(content), encoding="utf-8")
+
+
+def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, Any], dict[str, Contents]]:
+    """Header and files of an archive, after every byte was compared with what was written.
+
+    StorageError: missing, damaged, with more or fewer files, of another version, for another vehicle or grid.
+    """
+    header = _header(folder, kind)
+    refuse_another(folder, header.get("vehicle"), vehicle)
+    if header.get("grid") != GRID:
+        raise StorageError(
+            f"{folder} was made for grids of {header.get('grid')!r} cells a side, wanted was {GRID}; "
+            "build it again."
+        )
+    listed: dict[str, Any] = header["files"]
+    for name, wanted in listed.items():
+        size = _size_of_plain_file(folder / name)
+        if size != wanted["bytes"]:
+            raise StorageError(
+                f"{folder / name} is damaged: it has {size} bytes, {wanted['bytes']} were written; "
+                f"copy or build the {kind} again."
+            )
+    extra = sorted({file.name for file in folder.iterdir()} - {f"{kind}.json", *listed})
+    if extra:
+        raise StorageError(
+            f"{folder / extra[0]} is no part of the {kind}; move it elsewhere, or build the {kind} again."
+        )
+    files = _hashed([folder / name for name in listed])
+    for name, (_, digest) in files.items():
+        if digest != listed[name]["sha256"]:
+            raise _damaged(folder / name, kind)
+    return header, {name: contents for name, (contents, _) in files.items()}
+
+
+def _header(folder: Path, kind: str) -> dict[str, Any]:
+    """The header of an archive of this version, as it was written to the last byte."""
+    path = fetch_folder(folder) / f"{kind}.json"
+    if not path.is_file():
+        raise StorageError(f"{folder} holds no {kind} (no {kind}.json in it); check the path or build one.")
+    if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
+        raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
+    text = local_text(path)
+    header = parse_json(text, str(path))
+    if not isinstance(header, dict) or header.get("kind") != kind:
+        raise StorageError(f"{path} does not describe a {kind}; build it again.")
+    version = header.get("version")
+    if version != VERSION:
+        newer = isinstance(version, int) and version > VERSION
+        raise StorageError(
+            f"{folder} has {kind} version {str(version)[:20]}, this program reads version {VERSION}; "
+            f"{'update the program or ' if newer else ''}build it again."
+        )
+    header.pop("sha256", None)
+    try:
+        as_written = text == _signed(header)
+    except (ValueError, RecursionError):  # a number that JSON does not have, nesting without end
+        as_written = False
+    if not as_written or not _lists_files(header.get("files")):
+        raise _damaged(path, kind)
+    return header
+
+
+def _signed(content: Mapping[str, Any]) -> str:
+    """The text of a header, with a checksum of all else in it."""
+    digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return json.dumps({**content, "sha256": digest}, indent=2, allow_nan=False) + "\n"
+
+
+def _lists_files(listed: object) -> bool:
+    """Whether names, sizes and checksums are such; no name may reach out of the folder."""
+    return isinstance(listed, dict) and all(
+        _NAME.fullmatch(name)
+        and isinstance(entry, dict)
+        and entry.keys() == {"bytes", "sha256"}
+        and isinstance(entry["bytes"], int)
+        and entry["bytes"] > 0
+        for name, entry in listed.items()
+    )
+
+
+def _size_of_plain_file(path: Path) -> int:
+    try:
+        found = path.lstat()
+    except OSError as error:
+        raise StorageError(f"{path} cannot be read: {error.strerror}; copy or build it again.") from None
+    if not stat.S_ISREG(found.st_mode):
+        raise StorageError(f"{path} is no plain file; copy or build it again.")
+    return found.st_size
+
+
+def _hashed(paths: list[Path]) -> dict[str, tuple[Contents, str]]:
+    """Contents and checksum of files, by name."""
+    found = {}
+    for path in paths:  # threads gain nothing: one file, the states, is most of an archive
+        try:
+            with path.open("rb") as file:
+                contents = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
+        except OSError as error:
+            raise StorageError(f"{path} cannot be read: {error.strerror}; copy or build it again.") from None
+        found[path.name] = contents, hashlib.sha256(contents).hexdigest()
+    return found
+
+
+def _damaged(path: Path, kind: str) -> StorageError:
+    return StorageError(f"{path} is damaged: its checksum differs; copy or build the {kind} again.")

@@ -1,0 +1,179 @@
+"""Files of problems as their objects, whole or a slice: nothing is held in memory but what is read now."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from storage.errors import StorageError
+from storage.places.files import parse_json, read_text
+
+FORMATS: Final = (".json", ".jsonl", ".parquet")
+COLUMNS: Final = ("id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale")
+BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
+SLICES_A_GROUP: Final = 16  # who wants the last rows of a row group has to decode those before
+BUFFER_BYTES: Final = 1 << 20
+
+
+@dataclass(frozen=True)
+class ProblemSlice:
+    """Some consecutive problems of a file, and where to find them without reading what is before."""
+
+    path: Path
+    first: int  # number of its first line or problem, counted from 1
+    count: int  # problems
+    place: int  # of a text the byte that it begins with; of a Parquet file the row in its group
+    group: int  # row group; 0 in a text
+    digest: str  # of what it is read from
+
+
+def format_of(path: Path) -> str:
+    """The ending of a file of problems; a StorageError for another ending."""
+    if path.suffix not in FORMATS:
+        raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
+    return path.suffix
+
+
+def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
+    """Objects and their numbers: of the line, or counted from 1.
+
+    StorageError: the file is missing, or no whole file of its format; the message names the line.
+    """
+    match format_of(path):
+        case ".json":
+            yield 1, parse_json(read_text(path), str(path))
+        case ".jsonl":
+            for number, line in enumerate(_lines(path), start=1):
+                if line.strip():
+                    yield number, _parsed(path, number, line)
+        case _:
+            yield from enumerate(_rows(path), start=1)
+
+
+def slices_of(path: Path, size: int) -> list[ProblemSlice]:
+    """The file cut into slices of ``size`` problems, those of a long row group longer; a text is read once.
+
+    The cut and its digests depend on the file's content alone, so that a corrected line leaves the slices
+    before as they are. StorageError: the file is missing, or no whole file of its format.
+    """
+    match format_of(path):
+        case ".json":
+            digest = hashlib.sha256(read_text(path).encode()).hexdigest()
+            return [ProblemSlice(path, 1, 1, 0, 0, digest)]
+        case ".jsonl":
+            return _slices_of_lines(path, size)
+        case _:
+            return _slices_of_groups(path, size)
+
+
+def raw_slice(piece: ProblemSlice) -> Iterator[tuple[int, Any]]:
+    """The objects of a slice and their numbers, as ``raw_problems`` gives them."""
+    match format_of(piece.path):
+        case ".json":
+            yield from raw_problems(piece.path)
+        case ".jsonl":
+            found = 0
+            for number, line in enumerate(_lines(piece.path, piece.place), start=piece.first):
+                if line.strip():
+                    yield number, _parsed(piece.path, number, line)
+                    found += 1
+                if found == piece.count:
+                    break
+        case _:
+            rows = _rows(piece.path, [piece.group], piece.place, piece.count)
+            yield from enumerate(rows, start=piece.first)
+
+
+def _lines(path: Path, place: int = 0) -> Iterator[bytes]:
+    try:
+        with path.open("rb") as file:
+            file.seek(place)
+            yield from file
+    except FileNotFoundError:
+        raise StorageError(f"{path} does not exist; check the name.") from None
+    except OSError as error:
+        raise StorageError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _parsed(path: Path, number: int, line: bytes) -> Any:
+    try:
+        return parse_json(line.decode(), f"{path} line {number}")
+    except UnicodeDecodeError:
+        raise StorageError(f"{path} line {number} is not text in UTF-8; is it the right file?") from None
+
+
+def _slices_of_lines(path: Path, size: int) -> list[ProblemSlice]:
+    slices: list[ProblemSlice] = []
+    first, place, count, at, digest = 1, 0, 0, 0, hashlib.sha256()
+    for number, line in enumerate(_lines(path), start=1):
+        digest.update(line)
+        at += len(line)
+        count += bool(line.strip())
+        if count == size:
+            slices.append(ProblemSlice(path, first, count, place, 0, digest.hexdigest()))
+            first, place, count, digest = number + 1, at, 0, hashlib.sha256()
+    return slices + ([ProblemSlice(path, first, count, place, 0, digest.hexdigest())] if count else [])
+
+
+def _slices_of_groups(path: Path, size: int) -> list[ProblemSlice]:
+    slices = []
+    first = 1
+    with _opened(path) as file, path.open("rb") as content:
+        for group in range(file.metadata.num_row_groups):
+            described = file.metadata.row_group(group)
+            columns = [described.column(i) for i in range(described.num_columns)]
+            begin = min((each.dictionary_page_offset or each.data_page_offset for each in columns), default=0)
+            digest = _digest(content, begin, sum(each.total_compressed_size for each in columns))
+            rows = described.num_rows
+            step = max(size, -(-rows // SLICES_A_GROUP))
+            slices += [
+                ProblemSlice(path, first + row, min(step, rows - row), row, group, digest)
+                for row in range(0, rows, step)
+            ]
+            first += rows
+    return slices
+
+
+def _digest(content: Any, begin: int, size: int) -> str:
+    digest = hashlib.sha256()
+    content.seek(begin)
+    while size > 0 and (read := content.read(min(size, BUFFER_BYTES))):
+        digest.update(read)
+        size -= len(read)
+    return digest.hexdigest()
+
+
+def _rows(
+    path: Path, groups: list[int] | None = None, first: int = 0, count: int | None = None
+) -> Iterator[Any]:
+    """Rows of all row groups, or ``count`` from row ``first`` of some."""
+    last = None if count is None else first + count
+    with _opened(path) as file:
+        names = [name for name in file.schema_arrow.names if name in COLUMNS]
+        at = 0
+        for batch in file.iter_batches(BATCH_ROWS, row_groups=groups, columns=names):
+            begin, end = max(first - at, 0), len(batch) if last is None else min(last - at, len(batch))
+            if begin < end:
+                yield from batch.slice(begin, end - begin).to_pylist()
+            at += len(batch)
+            if last is not None and at >= last:
+                break
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+    try:
+        with pq.ParquetFile(path, buffer_size=BUFFER_BYTES) as file:
+            yield file
+    except FileNotFoundError:
+        raise StorageError(f"{path} does not exist; check the name.") from None
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).partition("\n")[0].rstrip(".")
+        raise StorageError(f"{path} is no whole Parquet file ({reason}); write it again.") from None

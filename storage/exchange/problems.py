@@ -1,0 +1,216 @@
+"""Problems as files that people hand in and get: ``.json`` (one), ``.jsonl`` (one a line), ``.parquet``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from planners.world.arrays import Floats
+from planners.world.geometry.polygons import PolygonError, convex_pieces
+from planners.world.problem import Obstacles, Problem, obstacles_of
+from planners.world.problem_faults import problem_fault
+from planners.world.vehicles.vehicle import CAR, Vehicle
+from storage.errors import StorageError
+from storage.exchange.problem_files import ProblemSlice, format_of, raw_problems, raw_slice
+from storage.places.files import whole_file, write_json
+from storage.tables.schemas import PROBLEMS
+from storage.tables.shards import table_of, write_table
+
+SMALLEST_SCALE: Final = 0.01  # a robot of 2 cm
+LARGEST_SCALE: Final = 100.0
+UNKNOWN_CLASS: Final = "unknown"
+_REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
+
+
+def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
+    """All problems of a file, checked (``iterate_problems``)."""
+    return list(iterate_problems(path, vehicle))
+
+
+def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
+    """The problems of a file one by one, each checked for a vehicle when its turn comes.
+
+    StorageError: a problem is malformed, impossible or has another's id; the message names file, line, id
+    and what to do.
+    """
+    for place, problem in problems_or_faults(path, vehicle):
+        if isinstance(problem, str):
+            raise StorageError(f"{place}: {problem}.")
+        yield problem
+
+
+def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
+    """Each problem of a file, or what is wrong with it, and where it stands.
+
+    StorageError: the file itself is missing, unreadable or of no known format.
+    """
+    return _checked(path, raw_problems(path), vehicle)
+
+
+def problems_or_faults_of(piece: ProblemSlice, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
+    """The same for a slice of a file; an id may still occur in another slice."""
+    return _checked(piece.path, raw_slice(piece), vehicle)
+
+
+def _checked(
+    path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle
+) -> Iterator[tuple[str, Problem | str]]:
+    seen: set[str] = set()
+    for number, fields in raw:
+        place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
+        identity = fields.get("id") if isinstance(fields, Mapping) else None
+        named = f"{place} (id {_short(identity)})" if isinstance(identity, str) and identity else place
+        try:
+            name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
+            problem = problem_of(fields, name, vehicle)
+        except ValueError as error:
+            yield named, str(error)
+            continue
+        if problem.id in seen:
+            yield place, f'id "{problem.id}" occurs twice; give every problem its own'
+            continue
+        seen.add(problem.id)
+        yield place, problem
+
+
+def write_problems(path: Path, problems: Sequence[Problem]) -> None:
+    """Write problems, whole or not at all, in the format that the file's ending says.
+
+    Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Files hold the
+    lengths of the world outside: a problem's own times its scale. Reading gives the same problems back,
+    exactly, or to a last digit where the scale is not 1.
+    """
+    rows = [fields_of(problem) for problem in problems]
+    match format_of(path):
+        case ".json":
+            if len(rows) != 1:
+                raise StorageError(f"{path} can hold one problem, got {len(rows)}; use .jsonl or .parquet.")
+            write_json(path, rows[0])
+        case ".jsonl":
+            with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+                file.writelines(json.dumps(row, allow_nan=False, ensure_ascii=False) + "\n" for row in rows)
+        case _:
+            write_table(path, table_of(rows, PROBLEMS, "problem"))
+
+
+def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
+    """The problem that a contract's object describes, checked; ValueError says what is wrong with it."""
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
+    missing = [name for name in _REQUIRED if fields.get(name) is None]
+    if missing:
+        raise ValueError(f"field {missing[0]} is missing; wanted are {', '.join(_REQUIRED)}")
+    start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
+    bounds = _numbers(fields, "bounds", 4)
+    scale = _scale(fields.get("scale"))
+    problem = Problem(
+        id=_text(fields, "id", default_id),
+        class_name=_text(fields, "class", UNKNOWN_CLASS),
+        start=(start[0] / scale, start[1] / scale, start[2]),
+        goal=(goal[0] / scale, goal[1] / scale),
+        goal_radius=_number(fields["goal_radius"], "goal_radius") / scale,
+        bounds=(bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
+        obstacles=_obstacles(fields["obstacles"], fields.get("groups"), scale),
+        scale=scale,
+    )
+    fault = problem_fault(problem, vehicle)
+    if fault is not None:
+        raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
+    return problem
+
+
+def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:
+    if not isinstance(polygons, list):
+        raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
+    pieces = []
+    for number, points in enumerate(polygons, start=1):
+        try:
+            pieces.append(convex_pieces(_points(points) / scale))
+        except PolygonError as error:
+            raise ValueError(f"obstacle {number} {error}") from None
+    if groups is None:
+        return obstacles_of(pieces)
+    if not isinstance(groups, list) or not all(isinstance(size, int) and size > 0 for size in groups):
+        raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
+    if sum(groups) != len(pieces):
+        raise ValueError(
+            f"groups are of {sum(groups)} polygons, obstacles are {len(pieces)}; make them agree"
+        )
+    ends = np.cumsum(groups).tolist()
+    return obstacles_of(
+        [
+            [piece for polygon in pieces[end - size : end] for piece in polygon]
+            for size, end in zip(groups, ends, strict=True)
+        ]
+    )
+
+
+def _points(points: object) -> Floats:
+    if not isinstance(points, list) or not all(
+        isinstance(point, list) and len(point) == 2 for point in points
+    ):
+        raise PolygonError("must be a list of points [x, y] in metres; correct it")
+    return np.array([[_number(x, "a point"), _number(y, "a point")] for x, y in points]).reshape(-1, 2)
+
+
+def _numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
+    values = fields[name]
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError(f"{name} must be a list of {count} numbers, got {_short(values)}")
+    return [_number(value, name) for value in values]
+
+
+def _number(value: object, name: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{name} must hold numbers, got {_short(value)}")
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf")  # which the checks refuse
+
+
+def _scale(value: object) -> float:
+    scale = 1.0 if value is None else _number(value, "scale")
+    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
+        raise ValueError(
+            f"scale is {scale:g}; wanted are metres a canonical metre, "
+            f"from {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}"
+        )
+    return scale
+
+
+def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
+    value = fields.get(name)
+    if value is None or value == "":
+        return default
+    if not isinstance(value, str) or not value.isprintable():
+        raise ValueError(f"{name} must be a printable text, got {_short(value)}")
+    return value
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def fields_of(problem: Problem) -> dict[str, Any]:
+    """The contract's object that describes a problem (``problem_of``)."""
+    obstacles, scale = problem.obstacles, problem.scale
+    x, y, heading = problem.start
+    groups = np.diff(obstacles.obstacle_starts).tolist()
+    fields: dict[str, Any] = {
+        "id": problem.id,
+        "class": problem.class_name,
+        "start": [scale * x, scale * y, heading],
+        "goal": [scale * coordinate for coordinate in problem.goal],
+        "goal_radius": scale * problem.goal_radius,
+        "bounds": [scale * bound for bound in problem.bounds],
+        "obstacles": [(scale * piece).tolist() for piece in obstacles.pieces()],
+    }
+    scaled = {} if scale == 1.0 else {"scale": scale}
+    grouped = {} if all(size == 1 for size in groups) else {"groups": groups}
+    return fields | scaled | grouped

@@ -1,0 +1,278 @@
+"""Where everything lies in a data folder, and whose folder it is."""
+
+from __future__ import annotations
+
+import functools
+import os
+import re
+import uuid
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from storage.errors import StorageError
+from storage.places.files import locked, read_json, remove_leftovers, write_json
+from storage.places.lease import leased
+from storage.places.mirror import (
+    PARTIAL,
+    fetch,
+    files_in,
+    folders_in,
+    is_empty,
+    is_remote,
+    local_place,
+    object_of,
+    shown,
+)
+
+LAYOUT: Final = 1  # one more whenever an older program could no longer read the folder
+MARK: Final = "motion-memory.json"
+HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
+NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
+
+Table = Literal[
+    "candidates", "learned", "curated", "experiences", "hallucinated", "results", "recalls", "judged"
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The places of one run; nothing is created by asking for a place, writers create folders."""
+
+    path: Path
+
+    @property
+    def settings(self) -> Path:
+        """What the run was asked for."""
+        return self.path / "settings.json"
+
+    @property
+    def results(self) -> Path:
+        """All attempt rows: ``<class>/NNNN.parquet`` below."""
+        return self.path / "results"
+
+    @property
+    def recalls(self) -> Path:
+        """What the memories recalled: ``<class>/NNNN.parquet`` below."""
+        return self.path / "recalls"
+
+    @property
+    def judged(self) -> Path:
+        """Attempts of champions and challengers at held-back problems: ``<class>/NNNN.parquet`` below."""
+        return self.path / "judged"
+
+    @property
+    def figures(self) -> Path:
+        """Pictures."""
+        return self.path / "figures"
+
+    @property
+    def report(self) -> Path:
+        """The report as one page."""
+        return self.path / "report.html"
+
+    @property
+    def stages(self) -> Path:
+        """When each stage ran, how long, and where."""
+        return self.path / "stages.json"
+
+    def result(self, class_name: str, key: str) -> Path:
+        """What the chunk of a key told when it was finished: a few numbers beside its rows."""
+        return self.path / "chunks" / checked_name(class_name) / f"{key}.json"
+
+    def summary(self, suffix: str) -> Path:
+        """The summary in one of its forms, such as ``summary("json")``."""
+        return self.path / f"summary.{suffix}"
+
+    def worlds(self, class_name: str, part: str) -> Path:
+        """The problems of one part of a folder of worlds."""
+        return self.path / "worlds" / checked_name(class_name) / f"{checked_name(part)}.parquet"
+
+    def experiences(self, class_name: str) -> Path:
+        """The experiences of a class once all are collected."""
+        return self.path / "experiences" / f"{checked_name(class_name)}.parquet"
+
+    def hallucinator(self, class_name: str) -> Path:
+        """The folder of a class's network for learned hallucination."""
+        return self.path / "hallucinators" / checked_name(class_name)
+
+    def model(self, class_name: str, seed: int = 0) -> Path:
+        """The folder of a class's encoder, trained with the seed of that number."""
+        return self.path / "models" / checked_name(class_name) / str(seed)
+
+    def memory(self, class_name: str) -> Path:
+        """The folder of a class's memory."""
+        return self.path / "memories" / checked_name(class_name)
+
+    def champion(self, class_name: str) -> Path:
+        """The folder of the memory that a retraining begins from and is judged against."""
+        return self.path / "champions" / checked_name(class_name)
+
+    def shard(self, table: Table, class_name: str, index: int) -> Path:
+        """Chunk ``index`` of a table: ``<table>/<class>/NNNN.parquet``."""
+        return self.path / table / checked_name(class_name) / f"{index:04d}.parquet"
+
+    def shards(self, table: Table, class_name: str) -> list[Path]:
+        """The chunks of a table that are there, in order."""
+        return files_in(self.path / table / checked_name(class_name), "[0-9]*.parquet")
+
+
+@dataclass(frozen=True)
+class DataFolder:
+    """A folder that holds runs, the tracking database and the orchestrator's own files.
+
+    One in object storage has a copy here (``mirror.py``); what is not written through this package, such as a
+    command's own Prefect server, stays in the copy.
+    """
+
+    path: Path  # absolute
+
+    @property
+    def place(self) -> str:
+        """What opens it again, on any machine: ``s3://bucket/folder`` or its path."""
+        return shown(self.path)
+
+    @property
+    def is_remote(self) -> bool:
+        """Whether it lies in object storage."""
+        return object_of(self.path) is not None
+
+    @property
+    def mlflow_database(self) -> Path:
+        """MLflow's SQLite file."""
+        return self.path / "mlflow.db"
+
+    @property
+    def mlflow_artifacts(self) -> Path:
+        """MLflow's artifacts."""
+        return self.path / "mlartifacts"
+
+    @property
+    def prefect(self) -> Path:
+        """Prefect's own folder."""
+        return self.path / "prefect"
+
+    def learned(self, vehicle: str) -> Path:
+        """The folder of what was learned on the job for a vehicle (``learned.py``)."""
+        return self.path / "learned" / checked_name(vehicle)
+
+    @property
+    def watched(self) -> Path:
+        """The folder of what memories answered at work (``watched.py``)."""
+        return self.path / "watched"
+
+    def run(self, name: str) -> RunFolder:
+        """The folder of a run; a StorageError for a name that is no plain word."""
+        return RunFolder(self.path / "runs" / checked_name(name))
+
+    def runs(self) -> list[RunFolder]:
+        """All runs that are there, by name."""
+        return [RunFolder(path) for path in folders_in(self.path / "runs")]
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the folder for this process; leftovers of killed writers are removed on the way in.
+
+        StorageError: another command holds it; the message says which process.
+        """
+        with ExitStack() as stack:
+            try:
+                stack.enter_context(locked(self.path / ".lock", self.place))
+            except OSError as error:
+                raise _not_writable(self.path, error) from None
+            lease = object_of(self.path / ".lock")
+            if lease is not None:
+                stack.enter_context(leased(lease, _holder(self.path), self.place))
+            remove_leftovers(self.path / "runs")
+            yield
+
+
+def open_run(path: Path) -> RunFolder:
+    """The folder of a run that is there; a StorageError for any other place."""
+    run = RunFolder(local_place(path))
+    if not fetch(run.settings).is_file():
+        raise StorageError(f"{path} is no run: it has no {run.settings.name}; name a folder in DATA/runs.")
+    return run
+
+
+def open_data_folder(path: Path | str) -> DataFolder:
+    """Open a data folder, or make one of a missing or empty folder.
+
+    ``s3://bucket/folder`` is one in object storage.
+
+    StorageError: no folder, not writable, of another version, or full of somebody else's files.
+    """
+    if is_remote(path):
+        return _open_remote(local_place(path))
+    folder = Path(path).expanduser().absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        names = [entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)]
+    except OSError as error:
+        raise _not_writable(folder, error) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise _not_writable(folder, PermissionError(13, "Permission denied"))
+    if MARK in names:
+        _check_layout(folder)
+    elif names:
+        raise StorageError(
+            f"{folder} is not empty and has no {MARK}, so it is not a data folder; "
+            "give an empty or a new folder."
+        )
+    else:
+        write_json(folder / MARK, {"layout": LAYOUT})
+    return DataFolder(folder)
+
+
+@functools.lru_cache(maxsize=8)
+def _open_remote(folder: Path) -> DataFolder:
+    """The same of a folder in object storage, by its copy here; asked once a process."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _not_writable(folder, error) from None
+    if fetch(folder / MARK).exists():
+        _check_layout(folder)
+    elif not is_empty(folder):
+        raise StorageError(
+            f"{shown(folder)} is not empty and has no {MARK}, so it is no data folder; give another folder."
+        )
+    else:
+        write_json(folder / MARK, {"layout": LAYOUT})
+    return DataFolder(folder)
+
+
+def _check_layout(folder: Path) -> None:
+    found = read_json(folder / MARK)
+    version = found.get("layout") if isinstance(found, dict) else None
+    if version != LAYOUT:
+        raise StorageError(
+            f"{shown(folder)} has data layout {version!r}, this program reads layout {LAYOUT}; "
+            "use the version that wrote it or give another data folder."
+        )
+
+
+def _holder(folder: Path) -> str:
+    """The name of this copy of a folder: whoever holds the copy may take over what it held in storage."""
+    path = folder / HOLDER
+    if not path.exists():
+        path.write_text(uuid.uuid4().hex)  # only the one who holds the lock comes here
+    return path.read_text()
+
+
+def checked_name(name: str) -> str:
+    """The name of a class or run if it can be a file's name everywhere, else a StorageError."""
+    if not NAME.fullmatch(name):
+        raise StorageError(
+            f"{name[:100]!r} cannot name a class or run; use up to 100 letters, digits, '-' and '_', "
+            "beginning with a letter or digit."
+        )
+    return name
+
+
+def _not_writable(folder: Path, error: OSError) -> StorageError:
+    return StorageError(
+        f"{folder} cannot be used as a data folder: {error.strerror}; give a folder that you may write to."
+    )

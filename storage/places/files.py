@@ -1,0 +1,179 @@
+"""Whole files and whole folders: what is there under its name is complete, whatever was killed when."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from storage.errors import InUseError, StorageError
+from storage.places.mirror import PARTIAL, fetch, publish, publish_folder
+
+REMOVALS: Final = 10
+REMOVAL_SECONDS: Final = 0.2
+
+
+@contextmanager
+def whole_file(path: Path, note: str = "") -> Iterator[Path]:
+    """Yield a temporary name beside ``path``; put it in the place of ``path`` once it is on the disk.
+
+    Where ``path`` stands for an object (``mirror.py``), it is put into storage first, with the ``note``.
+
+    StorageError: it could not be written (disk full, no permission); ``path`` is as it was.
+    """
+    with _errors_in_one_line(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            temporary.chmod(0o666 & ~_umask())
+            _synchronise(temporary)
+            publish(temporary, path, note)
+            temporary.replace(path)
+            _synchronise(path.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Yield an empty temporary folder beside ``path``; put it in the place of ``path`` once it is full.
+
+    StorageError: it could not be written; ``path`` is as it was.
+    """
+    with _errors_in_one_line(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent))
+        old = temporary.with_name(f".old{temporary.name}")
+        try:
+            yield temporary
+            temporary.chmod(0o777 & ~_umask())
+            for file in temporary.iterdir():
+                _synchronise(file)
+            _synchronise(temporary)
+            publish_folder(temporary, path)
+            if path.exists():  # a full folder cannot be renamed over: the old one steps aside
+                path.replace(old)
+            temporary.replace(path)
+            _synchronise(path.parent)
+        finally:
+            if old.exists() and not path.exists():
+                old.replace(path)
+            for leftover in (temporary, old):
+                shutil.rmtree(leftover, ignore_errors=True)
+
+
+@contextmanager
+def locked(path: Path, what: str) -> Iterator[None]:
+    """Hold the lock file ``path`` for this process; a killed one loses it.
+
+    InUseError: another process holds it; the message begins with ``what`` is in use, and says who it is.
+    OSError: it cannot be opened.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
+            raise InUseError(
+                f"{what} is in use by another command (process {holder}); wait for it to end or give another."
+            ) from None
+        os.ftruncate(handle, 0)
+        os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
+        yield
+    finally:
+        os.close(handle)
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Delete what killed writers left below ``folder``; only while nobody else writes there."""
+    for leftover in [*folder.rglob(f".*{PARTIAL}")]:
+        if leftover.is_dir():
+            shutil.rmtree(leftover, ignore_errors=True)
+        else:
+            leftover.unlink(missing_ok=True)
+
+
+def remove_folder(folder: Path) -> None:
+    """Delete a folder with all that is in it, also where somebody who is about to end still writes to it."""
+    for _ in range(REMOVALS):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            break
+        time.sleep(REMOVAL_SECONDS)
+
+
+def write_json(path: Path, value: object, indent: int | None = 2) -> None:
+    """Write a value as JSON, whole or not at all; the same value gives the same bytes.
+
+    Without ``indent`` it is on one line, ten times as fast.
+    """
+    text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def read_json(path: Path) -> Any:
+    """The value in a JSON file; a StorageError where it is missing or no JSON."""
+    return parse_json(read_text(path), str(path))
+
+
+def read_text(path: Path) -> str:
+    """The text of a file; a StorageError where it is missing, unreadable or not UTF-8."""
+    return local_text(fetch(path))
+
+
+def local_text(path: Path) -> str:
+    """The same of a file that is here, such as one of a folder that was fetched."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise StorageError(f"{path} does not exist; check the name.") from None
+    except UnicodeDecodeError:
+        raise StorageError(f"{path} is not a text file in UTF-8; is it the right file?") from None
+    except OSError as error:
+        raise StorageError(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def parse_json(text: str, where: str) -> Any:
+    """The value that a JSON text holds; ``where`` names it in the StorageError when it is none."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise StorageError(f"{where} is not valid JSON ({error}); was it cut off?") from None
+
+
+@contextmanager
+def _errors_in_one_line(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or str(error).partition("\n")[0]
+        raise StorageError(
+            f"{path} cannot be written: {reason}. Make room or give another place, and run it again."
+        ) from error
+
+
+def _synchronise(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

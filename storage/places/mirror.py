@@ -1,0 +1,280 @@
+"""A local copy of what lies in object storage: put there whole when written, fetched when read.
+
+A path below the cache folder stands for the object of the same name:
+``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. So any process of any machine knows from a
+path alone which object it is; to paths elsewhere nothing here applies. The object is the truth, the file its
+copy, marked by its time as the copy of that very content. A folder that must appear at once is one object: a
+tar.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import functools
+import hashlib
+import os
+import re
+import tarfile
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Final
+from urllib.parse import urlsplit
+
+from storage.errors import StorageError
+from storage.places import objects
+from storage.places.objects import Place
+
+SCHEME: Final = re.compile(r"s3:/{1,2}(?P<bucket>[^/]+)/?(?P<key>.*)")  # pathlib makes one slash of two
+FOLDER: Final = ".tar"
+PARTIAL: Final = ".partial"  # ending of what is still being written; nobody reads it
+_TICK: Final = 100  # nanoseconds that every usual file system keeps of a file's time
+_SECOND: Final = 10**9
+
+_seen: ContextVar[set[Path] | None] = ContextVar("seen", default=None)
+
+
+def is_remote(place: Path | str) -> bool:
+    """Whether a place is in object storage rather than a folder."""
+    return SCHEME.fullmatch(str(place)) is not None
+
+
+def local_place(place: Path | str) -> Path:
+    """The path that stands for ``s3://bucket/key``; any other place is its own."""
+    remote = SCHEME.fullmatch(str(place))
+    if remote is None:
+        return Path(place)
+    parts = [part for part in remote["key"].split("/") if part]
+    if {".", ".."} & {remote["bucket"], *parts}:
+        raise StorageError(f"{place} names no place in object storage; give s3://bucket/folder.")
+    server = urlsplit(objects.endpoint()).netloc.rpartition("@")[2] or "s3.amazonaws.com"
+    return cache_folder() / re.sub(r"[^A-Za-z0-9.-]", "-", server) / remote["bucket"] / Path(*parts)
+
+
+def shown(path: Path) -> str:
+    """How people and other programs call a place: ``s3://bucket/key`` or the path."""
+    place = object_of(path)
+    return str(path) if place is None else str(place).rstrip("/")
+
+
+def uri_of(path: Path) -> str:
+    """The same as an address: ``s3://…`` or ``file://…``."""
+    return path.absolute().as_uri() if object_of(path) is None else shown(path)
+
+
+def cache_folder() -> Path:
+    """Where copies lie: $MOTION_MEMORY_CACHE, or a folder in the user's own cache."""
+    own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "motion-memory" / "s3"
+    return Path(os.environ.get("MOTION_MEMORY_CACHE") or own).absolute()
+
+
+def object_of(path: Path) -> Place | None:
+    """The object that a path stands for; None where it is a path like any other."""
+    cache = cache_folder()
+    if not path.is_relative_to(cache):
+        return None
+    _, bucket, *parts = (*path.relative_to(cache).parts, "", "")
+    key = "/".join(part for part in parts if part)
+    return Place(bucket, key) if bucket else None
+
+
+@contextmanager
+def looking_once() -> Iterator[None]:
+    """Inside, what was looked up once is not asked for again: for a chunk, whose inputs are finished."""
+    token = _seen.set(set())
+    try:
+        yield
+    finally:
+        _seen.reset(token)
+
+
+def publish(written: Path, path: Path, note: str = "") -> None:
+    """Put what was written, for ``path``, into object storage if ``path`` stands for an object."""
+    place = object_of(path)
+    if place is not None:
+        _mark(written, objects.upload(written, place, note))
+        _see(path)
+
+
+def publish_folder(written: Path, path: Path) -> None:
+    """The same for a folder of files, as one object."""
+    place = object_of(path)
+    if place is None:
+        return
+    with _scratch(path) as scratch:
+        packed = scratch / "whole.tar"
+        with tarfile.open(packed, "w") as tar:
+            for file in sorted(written.iterdir()):
+                tar.add(file, file.name)
+        etag = objects.upload(packed, _as_folder(place))
+    _mark(written, etag)
+    _see(path)
+
+
+def fetch(path: Path) -> Path:
+    """The path, where now lies what the object holds: nothing if there is none."""
+    place = object_of(path)
+    if place is None or not _unseen(path):
+        return path
+    found = objects.look(place)
+    if found is not None and not _is_copy(path, found.etag):
+        with _scratch(path) as scratch:
+            if objects.download(place, scratch / path.name):
+                _mark(scratch / path.name, found.etag)
+                (scratch / path.name).replace(path)
+            else:  # it went in between
+                found = None
+    if found is None:
+        path.unlink(missing_ok=True)
+    _see(path)
+    return path
+
+
+def fetch_folder(path: Path) -> Path:
+    """The same for a folder that was published as one."""
+    place = object_of(path)
+    if place is None or not _unseen(path):
+        return path
+    found = objects.look(_as_folder(place))
+    if found is not None and not _is_copy(path, found.etag):
+        with _scratch(path) as scratch, _alone(path):  # a full folder cannot be renamed over
+            if not _is_copy(path, found.etag):
+                objects.download(_as_folder(place), scratch / "whole.tar")
+                with tarfile.open(scratch / "whole.tar") as tar:
+                    tar.extractall(scratch / path.name, filter="data")
+                _mark(scratch / path.name, found.etag)
+                if path.exists():
+                    path.replace(scratch / "old")
+                (scratch / path.name).replace(path)
+    elif found is None and path.exists():
+        with _scratch(path) as scratch:
+            path.replace(scratch / "old")
+    _see(path)
+    return path
+
+
+def folders_here(place: str, name: str) -> Path:
+    """The path of a place after fetching, where it is in object storage, what was published as folders there.
+
+    That is all in its folder ``name``, or else the place itself. StorageError: there is neither.
+    """
+    if not is_remote(place):
+        return Path(place)
+    folder = local_place(place)
+    inside = files_in(folder / name, f"*{FOLDER}")
+    for packed in inside:
+        fetch_folder(packed.with_suffix(""))
+    if not inside and not fetch_folder(folder).exists():
+        raise StorageError(f"{place} holds nothing that could be fetched; check the name.")
+    return folder
+
+
+def note_of(path: Path) -> str | None:
+    """What the content of an object was made from, as its writer noted; None where a path stands for none."""
+    place = object_of(path)
+    if place is None:
+        return None
+    found = objects.look(place)
+    return "" if found is None else found.note
+
+
+def files_in(folder: Path, pattern: str, below: bool = False) -> list[Path]:
+    """Paths of files in a folder, or anywhere below it, whose names match; in storage, none is fetched."""
+    place = object_of(folder)
+    if place is None:
+        return sorted(folder.rglob(pattern) if below else folder.glob(pattern))
+    root = _inside(place)
+    names = (key.removeprefix(root.key) for key in objects.keys(root))
+    return sorted(
+        folder / name
+        for name in names
+        if (below or "/" not in name) and fnmatch(name.rpartition("/")[2], pattern)
+    )
+
+
+def folders_in(folder: Path) -> list[Path]:
+    """The folders in a folder, by name."""
+    place = object_of(folder)
+    if place is None:
+        return sorted(path for path in folder.glob("*") if path.is_dir())
+    return sorted(folder / name for name in objects.prefixes(_inside(place)))
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is a file or folder, which is not fetched to find out."""
+    place = object_of(path)
+    if place is None:
+        return path.exists()
+    return any(objects.look(each) for each in (place, _as_folder(place))) or not is_empty(path)
+
+
+def is_empty(folder: Path) -> bool:
+    """Whether there is no object below the place of a folder."""
+    place = object_of(folder)
+    return place is None or next(objects.keys(_inside(place)), None) is None
+
+
+def remove(path: Path) -> None:
+    """Delete a file, and the object that it stands for."""
+    place = object_of(path)
+    if place is not None:
+        objects.delete(place)
+    path.unlink(missing_ok=True)
+
+
+def _inside(place: Place) -> Place:
+    return Place(place.bucket, f"{place.key}/" if place.key else "")
+
+
+def _as_folder(place: Place) -> Place:
+    return Place(place.bucket, place.key + FOLDER)
+
+
+def _unseen(path: Path) -> bool:
+    seen = _seen.get()
+    return seen is None or path not in seen
+
+
+def _see(path: Path) -> None:
+    seen = _seen.get()
+    if seen is not None:
+        seen.add(path)
+
+
+@contextmanager
+def _scratch(path: Path) -> Iterator[Path]:
+    """A folder beside ``path`` that goes afterwards."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent) as name:
+        yield Path(name)
+
+
+@contextmanager
+def _alone(path: Path) -> Iterator[None]:
+    """Nobody else on this machine fetches the same folder."""
+    with path.with_name(f".{path.name}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@functools.cache
+def _fraction(etag: str) -> int:
+    """The nanoseconds that mark a copy of the content with this tag."""
+    return int.from_bytes(hashlib.sha256(etag.encode()).digest()[:6]) * _TICK % _SECOND
+
+
+def _mark(path: Path, etag: str) -> None:
+    """Mark a file or folder as the copy of the content with this tag; a renaming keeps the mark."""
+    when = int(time.time()) * _SECOND + _fraction(etag)
+    os.utime(path, ns=(when, when))
+
+
+def _is_copy(path: Path, etag: str) -> bool:
+    try:
+        return path.stat().st_mtime_ns % _SECOND == _fraction(etag)
+    except FileNotFoundError:
+        return False

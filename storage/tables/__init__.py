@@ -1,0 +1,1 @@
+"""Parquet tables: one door to each."""

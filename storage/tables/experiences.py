@@ -1,0 +1,129 @@
+"""Solved problems with their plans."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from planners.memory.plans.experience import Experience
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
+from storage.errors import StorageError
+from storage.recorded_vehicle import fields_of, refuse_another
+from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
+from storage.tables.schemas import EXPERIENCES
+from storage.tables.shards import metadata_of, read_table, write_table
+
+_CONTROL = 2
+_VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
+
+
+def write_experiences(
+    path: Path,
+    experiences: Sequence[Experience],
+    *,
+    planner: str,
+    seeds: Sequence[int],
+    planning_seconds: Sequence[float],
+    key: str = "",
+    vehicle: Vehicle = CAR,
+) -> None:
+    """Write experiences with the planner that found them, its seeds and its times, one of each a row."""
+    plans = [experience.plan for experience in experiences]
+    columns = {
+        **problem_columns([experience.problem for experience in experiences]),
+        **_plan_columns(plans),
+        "planner": [planner] * len(plans),
+        "seed": list(seeds),
+        "planning_seconds": list(planning_seconds),
+    }
+    table = pa.table(columns, schema=EXPERIENCES.with_metadata(_metadata(vehicle)))
+    write_table(path, table, key)
+
+
+def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = None) -> list[Experience]:
+    """The experiences of a file, in order; the first ``count`` if given.
+
+    StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
+    """
+    return experiences_of(read_experience_table(path, vehicle).slice(0, count), vehicle)
+
+
+def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
+    """The experiences in a table of a vehicle."""
+    size = state_size(vehicle)
+    return [
+        Experience(
+            problem,
+            Plan(states.reshape(-1, size).copy(), controls.reshape(-1, _CONTROL).copy(), dt),
+            vehicle,
+        )
+        for problem, states, controls, dt in zip(
+            problems_of(table),
+            lists_of(table["states"]),
+            lists_of(table["controls"]),
+            table["dt"].to_pylist(),
+            strict=True,
+        )
+    ]
+
+
+def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
+    """The same as a table."""
+    table = read_table(path, EXPERIENCES)
+    refuse_another(path, _recorded(path), vehicle)
+    return table
+
+
+def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:
+    """Write rows of the shards, numbered in the order of the shards, as one file.
+
+    StorageError: there are no shards, fewer rows in them, or plans of several vehicles.
+    """
+    tables = [read_table(shard, EXPERIENCES) for shard in shards]
+    if not tables:
+        raise StorageError(f"{path} has no shards to be made from; run collect.")
+    if any(_recorded(shard) != _recorded(shards[0]) for shard in shards):
+        raise StorageError(
+            f"{path} would hold plans of several vehicles; run collect with a new data folder."
+        )
+    merged = pa.concat_tables(tables)
+    if max(rows, default=0) >= merged.num_rows:
+        raise StorageError(f"{path} would need more than the {merged.num_rows} rows there are; run collect.")
+    write_table(path, merged.take(pa.array(rows, pa.int64())), key)
+
+
+def copy_experiences(source: Path, path: Path, key: str) -> int:
+    """Write the experiences of a file as another; how many they are."""
+    table = read_table(source, EXPERIENCES)
+    write_table(path, table, key)
+    return int(table.num_rows)
+
+
+def replace_plans(source: Path, path: Path, first: int, plans: Sequence[Plan], key: str = "") -> None:
+    """Write rows ``first`` to before ``first + len(plans)`` of a file with other plans for their problems."""
+    table = read_table(source, EXPERIENCES).slice(first, len(plans))
+    columns = {name: table[name] for name in table.schema.names} | _plan_columns(plans)
+    write_table(path, pa.table(columns, schema=table.schema), key)
+
+
+def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
+    return {
+        "states": list_column([plan.states for plan in plans], np.float64),
+        "controls": list_column([plan.controls for plan in plans], np.float64),
+        "dt": [plan.dt for plan in plans],
+    }
+
+
+def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:
+    return {**EXPERIENCES.metadata, _VEHICLE: json.dumps(fields_of(vehicle)).encode()}
+
+
+def _recorded(path: Path) -> Any:
+    """The vehicle's settings that a file was written with."""
+    return json.loads(metadata_of(path).get(_VEHICLE, b"null"))

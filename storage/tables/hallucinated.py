@@ -1,0 +1,96 @@
+"""Hallucinated problems: what the encoder learns from, with the exact label of every stored plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from planners.memory.plans.sweeps import Flags
+from planners.world.arrays import Integers
+from planners.world.problem import Problem
+from storage.errors import StorageError
+from storage.tables.columns import Bits, bits_column, bits_of, problem_columns, problems_of
+from storage.tables.schemas import hallucinated
+from storage.tables.shards import metadata_of, read_table, write_table
+
+
+class Labelled(NamedTuple):
+    """What training needs of n problems; bits are packed most significant first, as ``np.packbits`` does."""
+
+    grids: Bits  # uint8 [n, 512] occupancy 64 x 64, row by row
+    plan_index: Integers  # int32 [n] the plan a problem was made for; -1: for none
+    labels: Bits  # uint8 [n, ceil(N / 8)] which plans are free
+    plans: int  # N
+
+    @property
+    def free(self) -> Flags:
+        """The labels as truth values ``[n, N]``."""
+        return np.unpackbits(self.labels, axis=1, count=self.plans).astype(bool)
+
+
+def write_hallucinated(
+    path: Path,
+    problems: Sequence[Problem],
+    *,
+    plan_index: Sequence[int] | Integers,
+    methods: Sequence[str],
+    grids: Bits,
+    labels: Bits,
+    plans: int,
+    key: str = "",
+) -> None:
+    """Write n problems with ``grids [n, 512]`` and ``labels [n, ceil(plans / 8)]``, both packed bits."""
+    schema = hallucinated(plans)
+    widths = (schema.field("grid").type.byte_width, schema.field("labels").type.byte_width)
+    if (grids.shape, labels.shape) != ((len(problems), widths[0]), (len(problems), widths[1])):
+        raise StorageError(
+            f"{path}: grids {grids.shape} and labels {labels.shape} do not fit {len(problems)} problems "
+            f"and {plans} plans; pack the bits, {widths[0]} and {widths[1]} bytes a problem."
+        )
+    columns = {
+        **problem_columns(problems),
+        "plan_index": np.asarray(plan_index, np.int32),
+        "method": list(methods),
+        "grid": bits_column(grids),
+        "labels": bits_column(labels),
+    }
+    write_table(path, pa.table(columns, schema=schema), key)
+
+
+def read_labelled(paths: Sequence[Path]) -> Labelled:
+    """Grids, labels and plan numbers of some shards, one after another; geometry is not read."""
+    if not paths:
+        raise StorageError("There are no hallucinated problems; run hallucinate.")
+    plans = plans_of(paths[0])
+    parts = []
+    for path in paths:
+        if plans_of(path) != plans:
+            raise StorageError(
+                f"{path} is labelled for {plans_of(path)} plans, {paths[0]} for {plans}; "
+                "run hallucinate again."
+            )
+        table = read_table(path, hallucinated(plans), ["grid", "plan_index", "labels"])
+        parts.append((bits_of(table["grid"]), table["plan_index"].to_numpy(), bits_of(table["labels"])))
+    grids, indices, labels = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Labelled(grids, indices, labels, plans)
+
+
+def read_hallucinated_problems(path: Path) -> list[Problem]:
+    """The problems of one shard, without their labels."""
+    table = read_table(path, hallucinated(plans_of(path)))
+    return problems_of(table)
+
+
+def read_methods(path: Path) -> list[str]:
+    """By which method each problem of a shard was made."""
+    table = read_table(path, hallucinated(plans_of(path)), ["method"])
+    return [str(method) for method in table["method"].to_pylist()]
+
+
+def plans_of(path: Path) -> int:
+    """For how many stored plans a shard is labelled."""
+    return int(metadata_of(path).get(b"plans", b"0"))

@@ -1,0 +1,23 @@
+"""Problems that were read and checked once and are read often, such as those of a folder of worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+
+from planners.world.problem import Problem
+from storage.tables.columns import problem_columns, problems_of
+from storage.tables.schemas import IMPORTED
+from storage.tables.shards import read_table, write_table
+
+
+def write_imported(path: Path, problems: Sequence[Problem], key: str = "") -> None:
+    """Write checked problems, obstacles and their pieces as they are."""
+    write_table(path, pa.table(problem_columns(problems), schema=IMPORTED), key)
+
+
+def read_imported(path: Path) -> list[Problem]:
+    """The problems of ``write_imported``, exactly, without checking them again."""
+    return problems_of(read_table(path, IMPORTED))

@@ -1,0 +1,45 @@
+"""Recalls: what a memory says to a problem, beside which plans are really free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from storage.tables.columns import bits_column, bits_of, list_column, lists_of
+from storage.tables.hallucinated import plans_of
+from storage.tables.schemas import recalls
+from storage.tables.shards import read_table, write_table
+
+
+def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key: str = "") -> None:
+    """Write recall rows with the fields of ``storage.tables.schemas.recalls``.
+
+    ``order``: the numbers of the first plans, best first, all of them or not. ``free``: one truth value a
+    plan. KeyError where a row lacks a field.
+    """
+    schema = recalls(plans)
+    columns = {name: [row[name] for row in rows] for name in schema.names}
+    free = np.array(columns["free"], bool).reshape(-1, plans)
+    arrays = {
+        "order": list_column(columns["order"], np.int32),
+        "free": bits_column(np.packbits(free, axis=1)),
+    }
+    write_table(path, pa.table(columns | arrays, schema=schema), key)
+
+
+def read_recalls(paths: Sequence[Path]) -> pd.DataFrame:
+    """The recall rows of some shards; ``order`` holds int32 arrays, ``free`` bool arrays."""
+    return pd.concat([_read(path) for path in paths], ignore_index=True)
+
+
+def _read(path: Path) -> pd.DataFrame:
+    plans = plans_of(path)
+    table = read_table(path, recalls(plans))
+    frame: pd.DataFrame = table.drop_columns(["order", "free"]).to_pandas()
+    free = np.unpackbits(bits_of(table["free"]), axis=1, count=plans).astype(bool)
+    return frame.assign(order=pd.Series(lists_of(table["order"]), dtype=object), free=list(free))

@@ -1,0 +1,38 @@
+"""How useful memories were at work, beside what their benchmark promised: one small file each time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final
+from uuid import uuid4
+
+import pandas as pd
+import pyarrow as pa
+
+from storage.errors import StorageError
+from storage.places.mirror import files_in
+from storage.tables.schemas import WATCHED
+from storage.tables.shards import read_table, table_of, write_table
+
+NEWEST: Final = 300  # files that are read
+
+
+def add_watched(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Add what was seen just now: rows of ``storage.tables.schemas.WATCHED`` without their time."""
+    at = datetime.now(UTC)
+    stamped = [{"at": at, **row} for row in rows]
+    write_table(folder / f"{at:%Y%m%dT%H%M%S}-{uuid4().hex[:8]}.parquet", table_of(stamped, WATCHED, "seen"))
+
+
+def read_watched(folder: Path) -> tuple[pd.DataFrame, list[str]]:
+    """What was seen, the oldest first, of the newest files, and what is wrong with those left out."""
+    tables, faults = [WATCHED.empty_table()], []
+    for path in files_in(folder, "[!.]*.parquet")[-NEWEST:]:
+        try:
+            tables.append(read_table(path, WATCHED))
+        except StorageError as error:
+            faults.append(str(error))
+    rows: pd.DataFrame = pa.concat_tables(tables, promote_options="none").to_pandas()
+    return rows.sort_values("at", kind="stable", ignore_index=True), faults

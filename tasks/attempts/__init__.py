@@ -1,0 +1,1 @@
+"""Attempts at problems: timed alike, judged, written as rows."""

@@ -1,0 +1,70 @@
+"""Attempts as rows, and the independent check of their plans."""
+
+from __future__ import annotations
+
+import functools
+import math
+import platform
+import subprocess
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final
+
+from planners.solve import Attempt
+from planners.world.authority.authority import faults
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle, name_of
+from storage.tables.schemas import ATTEMPTS
+from tasks.settings.run_settings import RunError
+
+_FIELDS: Final = [field.name for field in fields(Attempt) if field.name in ATTEMPTS.names]
+_UNKNOWN_WHEN_UNSOLVED: Final = ("source", "length_m", "duration_s")
+
+
+class PlanFaultError(RunError):
+    """A plan that was called solved is not: a bug, never data."""
+
+
+def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes], vehicle: Vehicle) -> None:
+    """Have the authority check an attempt's plan, once however many attempts gave the same (``checked``)."""
+    if attempt.plan is None:
+        return
+    plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
+    if plan in checked:
+        return
+    wrong = faults(problem, attempt.plan, vehicle)
+    if wrong:
+        asked = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
+        raise PlanFaultError(f"{problem.id} solved by {asked}: {wrong[0]}")
+    checked.add(plan)
+
+
+def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
+    """The row of a checked attempt (``storage.tables.schemas.ATTEMPTS``)."""
+    row = {name: getattr(attempt, name) for name in _FIELDS}
+    if not attempt.solved:
+        row |= dict.fromkeys(_UNKNOWN_WHEN_UNSOLVED)
+    where = {"run_id": run_id, "commit": commit(), "host": platform.node(), "vehicle": name_of(vehicle)}
+    return row | where | {"memory": memory, "verified": True if attempt.solved else None}
+
+
+def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> bool:
+    """Whether an attempt made again came out as its row says, timings aside."""
+    again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
+    counted = ("status", "solved", "collision_checks", "expansions", "nodes")
+    lengths = (again["length_m"] or math.nan, row["length_m"])
+    return (
+        all(again[name] == row[name] for name in counted)
+        and list(again["recalled"]) == list(row["recalled"])
+        and (not attempt.solved or math.isclose(*lengths, rel_tol=1e-12))
+    )
+
+
+@functools.cache
+def commit() -> str:
+    """The commit of the sources, or nothing where they are no checkout."""
+    asked = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
+    try:
+        return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""

@@ -1,0 +1,51 @@
+"""Compile what planning with a memory needs; Numba keeps it, so that later processes only load it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import sweep_plans
+from planners.memory.recall import RECALLS, TRIED_DRAWN, Memory
+from planners.solve import solve
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    GOAL_RADIUS,
+    Problem,
+    obstacles_of,
+)
+from planners.world.randomness import generator
+from planners.world.vehicles.vehicle import Vehicle
+from tasks.settings.run_settings import COLLECTOR
+
+EMPTY: Final = Problem(
+    "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
+)
+
+
+def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequence[str] = RECALLS) -> None:
+    """What a memory needs, by each strategy of recall: of copies of one plan, with a box put on it."""
+    plan = solve(EMPTY, planner, vehicle=vehicle).plan
+    if plan is None:
+        return
+    plans = [plan] * (TRIED_DRAWN + 1)  # so that the last is checked with the scene
+    sweeps = sweep_plans(plans, vehicle)
+    architecture = Architecture()
+    readout = np.zeros((len(plans) + 1, architecture.dimensions), np.float32)
+    weights = initial_weights(architecture, generator(0))
+    masks = masks_of(sweeps)
+    biases = readout[:, 0].copy()
+    memory = Memory("empty", vehicle, plans, sweeps, masks, readout, readout, biases, "labels", weights)
+    x, y = plan.states[len(plan.states) // 2, :2]
+    box = np.array([[x - 1.0, y - 1.0], [x + 1.0, y - 1.0], [x + 1.0, y + 1.0], [x - 1.0, y + 1.0]])
+    blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
+    for strategy in strategies:
+        for assist in ("open", "repair"):
+            solve(blocked, planner, assist, 1, memory, vehicle=vehicle, strategy=strategy)

@@ -1,0 +1,1 @@
+"""Retraining: what is new, who is champion, when to retrain."""

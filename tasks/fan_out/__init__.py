@@ -1,0 +1,1 @@
+"""Stages, their chunks and keys, sent to Dask workers, with progress."""

@@ -1,0 +1,211 @@
+"""The fan-out: chunks to Dask workers that survive a killed one, with a live progress bar."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any, Final
+
+import dask
+import distributed
+import yaml
+from dask.system import CPU_COUNT
+from prefect.tasks import Task
+from prefect_dask.task_runners import DaskTaskRunner
+
+from tasks.fan_out.progress import progress
+from tasks.fan_out.progress_artifact import progress_artifact
+from tasks.fan_out.stage import AnyPiece, Piece, kept_result
+from tasks.fan_out.workload import WORK, note
+from tasks.settings.redaction import redacted
+from tasks.settings.run_settings import RunError, default_scheduler
+
+SETTINGS: Final = Path(__file__).with_name("dask.yaml")
+CONNECT_SECONDS: Final = 5
+RECONNECT_SECONDS: Final = 120  # for which a scheduler may be away
+LOSSES_ALLOWED: Final = 5  # of a scheduler within a stage
+CLOSE_SECONDS: Final = 0.3
+POLL_SECONDS: Final = 0.05
+AHEAD: Final = 200  # chunks that wait for a worker: enough that none waits, few enough for any memory
+LOST: Final = ("cancelled", "lost")  # of a chunk whose scheduler is gone
+LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which reads files
+
+Client: Any = distributed.Client  # Dask has no types
+LocalCluster: Any = distributed.LocalCluster
+
+_shared: ContextVar[str | None] = ContextVar("scheduler", default=None)
+
+
+class ChunkError(RunError):
+    """A chunk could not be done."""
+
+
+@contextmanager
+def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[str]:
+    """Address of the scheduler that every flow inside shares: the one around it, the given one, or a new one.
+
+    Without one given it is $MOTION_MEMORY_SCHEDULER.
+
+    A new one is local: ``workers`` processes (default: one a core) of one thread, reachable on loopback only.
+    RuntimeError with one line when nobody answers at ``scheduler``.
+    """
+    around = _shared.get()
+    if around is not None:
+        yield around
+        return
+    given = scheduler or default_scheduler()
+    with _connected(given) if given else _local(workers or int(CPU_COUNT)) as address:
+        token = _shared.set(address)
+        try:
+            yield address
+        finally:
+            _shared.reset(token)
+
+
+def task_runner() -> Any:
+    """What a flow gives its tasks to: the shared cluster, found when the first task is submitted."""
+    shared: Any = cluster  # entered by the runner, which is all that it wants of a cluster
+    return DaskTaskRunner(cluster_class=shared, client_kwargs={"timeout": RECONNECT_SECONDS})
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[str]:
+    try:
+        with Client(address, timeout=CONNECT_SECONDS, set_as_default=False):
+            yield address
+    except (OSError, ValueError) as error:
+        raise RuntimeError(
+            redacted(f"No Dask scheduler answers at {address}; start one with `dask scheduler`.")
+        ) from error
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[str]:
+    with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(_settings()):
+        local = LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            local_directory=scratch,
+            silence_logs="CRITICAL",
+        )
+        try:
+            yield local.scheduler_address
+        finally:
+            _kill(local)  # what was wanted of them is written; leaving politely takes seconds
+            _close(local)
+
+
+def _settings() -> dict[str, Any]:
+    """The settings of ``dask.yaml``, by their dotted names."""
+
+    def named(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+        for name, value in values.items():
+            if isinstance(value, dict):
+                yield from named(f"{prefix}{name}.", value)
+            else:
+                yield f"{prefix}{name}", value
+
+    return dict(named("", yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))))
+
+
+def _kill(local: Any) -> None:
+    for nanny in local.workers.values():
+        nanny.close_gracefully()  # that is: do not start it again
+        with suppress(AttributeError, ProcessLookupError):  # between two workers there is no process
+            nanny.process.process.kill()
+
+
+def _close(local: Any) -> None:
+    with suppress(TimeoutError):  # what is left then dies with this process
+        local.close(timeout=CLOSE_SECONDS)
+
+
+def fan_out(
+    task: Task[[AnyPiece], dict[str, Any]],
+    chunks: Sequence[AnyPiece],
+    description: str,
+    is_done: Callable[[AnyPiece], bool],
+    units: Callable[[AnyPiece], int] = lambda chunk: chunk.last - chunk.first,
+    partly_done: Callable[[], int] = lambda: 0,
+) -> list[dict[str, Any]]:
+    """Do chunks on the flow's workers; results in the order of the chunks.
+
+    A chunk that ``is_done``, and has left what it told, is not done again. ``units`` are what the bar counts;
+    ``partly_done`` tells those of chunks still at work. A scheduler that goes away and comes back is given
+    anew what it had not finished. ChunkError at the first failure of a chunk, RunError without a scheduler.
+    """
+    began = time.time()
+    results: dict[int, dict[str, Any]] = {}
+    sizes = [units(chunk) for chunk in chunks]
+    with (
+        progress(description, sum(sizes)) as bar,
+        progress_artifact(description, sum(sizes), bar) as show,
+    ):
+        waiting = deque(range(len(chunks)))
+        pending: dict[int, Any] = {}
+        done = begun = losses = 0
+        looked = time.monotonic()
+        while len(results) < len(chunks):
+            for i in [waiting.popleft() for _ in range(min(len(waiting), AHEAD - len(pending)))]:
+                kept = kept_result(chunks[i]) if is_done(chunks[i]) else None
+                if kept is None:
+                    pending[i] = task.submit(chunks[i])
+                else:
+                    results[i] = kept
+                    done += sizes[i]
+            ended = [i for i, future in pending.items() if future.wrapped_future.done()]
+            lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
+            if lost:
+                losses += 1
+                _wait_for_scheduler(pending[lost[0]].wrapped_future.client, losses)
+            for i in ended:
+                future = pending.pop(i)
+                if i in lost:
+                    waiting.append(i)
+                else:
+                    results[i] = _result(future, chunks[i], description)
+                    done += sizes[i]
+            if time.monotonic() - looked >= LOOK_SECONDS:
+                begun, looked = partly_done(), time.monotonic()
+            show(max(done, min(begun, sum(sizes))))
+            time.sleep(POLL_SECONDS)
+    ordered = [results[i] for i in range(len(chunks))]
+    note(description, ordered, began)
+    return [{name: value for name, value in result.items() if name != WORK} for result in ordered]
+
+
+def _wait_for_scheduler(client: Any, losses: int) -> None:
+    """Return when the client has the scheduler again; RunError when it gave up, or this is too often."""
+    while client.status == "connecting":
+        time.sleep(POLL_SECONDS)
+    if client.status != "running" or losses > LOSSES_ALLOWED:
+        raise RunError(
+            f"The Dask scheduler went away {losses} times, or for more than {RECONNECT_SECONDS} s; finished "
+            "chunks are kept: when it is back, the same command goes on."
+        )
+
+
+def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
+    where = f"{description}: chunk {chunk.index} of {chunk.class_name}"
+    dask_future = future.wrapped_future
+    if dask_future.status != "finished":
+        cause = dask_future.exception()
+        if isinstance(cause, distributed.KilledWorker):
+            killed = cause.allowed_failures + 1
+            raise ChunkError(
+                f"{where} ended {killed} worker processes; was there too little memory?"
+            ) from cause
+        raise ChunkError(redacted(f"{where} was lost: {cause}")) from cause
+    try:
+        result: dict[str, Any] = future.result()
+    except Exception as error:
+        reason = str(error).partition("\n")[0]
+        raise ChunkError(redacted(f"{where} failed: {reason or type(error).__name__}")) from error
+    return result

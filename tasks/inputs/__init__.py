@@ -1,0 +1,1 @@
+"""Where problems and experiences of a stage come from."""

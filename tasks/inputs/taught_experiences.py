@@ -1,0 +1,42 @@
+"""Memories of more plans than an encoder is taught: it learns the first of a class, the others join later."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from planners.memory.growth import grow
+from planners.memory.plans.experience import Experience
+from planners.memory.recall import Memory
+from planners.world.vehicles.vehicle import vehicle_named
+from storage.places.data_folder import RunFolder
+from storage.tables.experiences import read_experiences
+from tasks.fan_out.stage import Chunk
+from tasks.inputs.problem_sources import source_of
+from tasks.settings.run_settings import COMBINED, RunSettings
+
+READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/growth.md)
+
+
+def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list[Experience]:
+    """Those of a memory that problems are hallucinated for, class by class; its labels say which are free."""
+    classes = settings.class_names if name == COMBINED else (name,)
+    vehicle = vehicle_named(settings.vehicle)
+    return [
+        experience
+        for each in classes
+        for experience in read_experiences(run.experiences(each), vehicle, settings.taught)
+    ]
+
+
+def grown_memory(chunk: Chunk, memory: Memory) -> Memory:
+    """The memory with all plans that were collected, read out from problems as the classes have them."""
+    settings, name = chunk.settings, chunk.class_name
+    experiences = read_experiences(chunk.run.experiences(name), memory.vehicle)
+    classes = settings.class_names if name == COMBINED else (name,)
+    sources = [source_of(chunk.data, settings, each) for each in classes]
+    problems = [
+        source.problem("collect", index)
+        for source in sources
+        for index in range(source.count("collect", READ_OUT_PROBLEMS))
+    ]
+    return grow(memory, [experience.plan for experience in experiences], problems)

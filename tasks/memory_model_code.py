@@ -1,7 +1,0 @@
-"""All the code that MLflow keeps of a memory's model; the rest is the installed package's."""
-
-from mlflow.models import set_model
-
-from tasks.memory_model import MemoryModel
-
-set_model(MemoryModel())

@@ -1,0 +1,1 @@
+"""Memories in MLflow's registry: addresses, versions, champions."""

@@ -1,0 +1,42 @@
+"""Experience curve: what memories of fewer experiences recall, each with the whole pipeline of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pandas as pd
+
+from dashboards.figures.experience_curve import experience_chart, experience_rows, experience_table
+from dashboards.figures.style import save
+from storage.tables.recalls import read_recalls
+from tasks.fan_out.stage import run_folder
+from tasks.reports.report import console
+from tasks.settings.run_settings import COMBINED, RunSettings
+from tasks.stages.fewer_experiences import runs_of_continual
+from tasks.stages.measure_recall import recall_chunks
+
+
+def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
+    """The run with a fifth, two fifths ... and all of its experiences; UsageError for too few of them.
+
+    The smaller ones are those of continual improvement: what either has made serves the other.
+    """
+    return [*runs_of_continual(replace(settings, continual="all")), settings]
+
+
+def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
+    """Print the curve of these runs, and draw it beside the figures of the run with all experiences."""
+    rows = pd.concat([_rows(data, run) for run in runs], ignore_index=True)
+    console().print(experience_table(rows))
+    save(experience_chart(rows), run_folder(data, runs[-1]).figures, "experience-curve")
+
+
+def _rows(data: str, run: RunSettings) -> pd.DataFrame:
+    folder = run_folder(data, run)
+    shards = [
+        folder.shard("recalls", chunk.class_name, chunk.index)
+        for chunk in recall_chunks(data, run)
+        if chunk.index > 0 and chunk.class_name != COMBINED  # those with fewer experiences have none
+    ]
+    return experience_rows(read_recalls(shards))

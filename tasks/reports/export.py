@@ -1,0 +1,64 @@
+"""Export: the attempts of a run in the formats of the field's tools."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Final
+
+from storage.exchange.ompl_log import write_ompl_logs
+from storage.exchange.planner_arena import Origin, write_planner_arena
+from storage.places.data_folder import RunFolder, open_run
+from storage.places.files import read_text, whole_file
+from storage.places.mirror import fetch
+from storage.tables.attempts import attempt_frames, tables_below
+from tasks.reports.stage_times import stages_of
+from tasks.settings.run_settings import UsageError, check_known
+
+ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv"}
+
+
+def export_run(folder: Path, form: str, out: Path) -> None:
+    """Write a run's attempts to ``out``, whole or not at all, and say so.
+
+    ``form``: ``ompl``, a folder of benchmark logs; ``planner-arena``, a SQLite database; ``csv``. UsageError
+    for another form or name, StorageError where the folder is no run or has no attempts.
+    """
+    check_known("format", [form], ENDINGS)
+    if ENDINGS[form] and out.suffix != ENDINGS[form]:
+        raise UsageError(f"{out} does not end in {ENDINGS[form]}.")
+    if form == "ompl" and out.exists():
+        raise UsageError(f"{out} is there already; give a new folder for the logs.")
+    run = open_run(folder)
+    folders = {path.parent for path in tables_below(run.results, "benchmark")}
+    classes = {folder.name: folder for folder in sorted(folders)}
+    if form == "ompl":
+        write_ompl_logs(out, classes, _origin(run))
+    else:
+        with whole_file(out) as temporary:
+            if form == "planner-arena":
+                write_planner_arena(temporary, classes, _origin(run))
+            else:
+                _write_csv(temporary, run.results)
+    print(f"exported {out}")
+
+
+def _write_csv(path: Path, results: Path) -> None:
+    """All attempt rows; the recalled plans of each with spaces between."""
+    with path.open("w", encoding="utf-8", newline="") as text:
+        for number, rows in enumerate(attempt_frames(results)):
+            rows["recalled"] = [" ".join(map(str, plans)) for plans in rows["recalled"]]
+            rows.to_csv(text, index=False, header=number == 0, lineterminator="\n")
+
+
+def _origin(run: RunFolder) -> Origin:
+    measured = next((each for each in reversed(stages_of(run)) if each["stage"] == "benchmark"), None)
+    oldest = min(fetch(path).stat().st_mtime for path in tables_below(run.results, "benchmark"))
+    return Origin(
+        run_name=run.path.resolve().name,
+        version=version("motion-memory"),
+        setup=read_text(run.settings),
+        processor=f"{measured['processor']}\n" if measured else None,
+        date=datetime.fromisoformat(measured["began"]) if measured else datetime.fromtimestamp(oldest),
+    )

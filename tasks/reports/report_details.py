@@ -1,0 +1,99 @@
+"""A run's report as one page: which pictures it shows, and what it says of how the run was made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from dashboards.report.report_page import Picture, page
+from dashboards.statistics.distributions import endings
+from dashboards.verdicts.claim_rules import Claim
+from storage.places.data_folder import RunFolder
+from storage.places.mirror import fetch, files_in
+from tasks.reports.stage_times import stage_cells, stages_of
+from tasks.settings.run_settings import RunSettings
+
+CAPTIONS: Final = {  # in the order of the page; other figures follow by name
+    "planning-times": "Mean planning time with and without memory",
+    "controls": "Mean planning time with the best recall and repair, beside a control",
+    "continual-improvement": "Mean planning time as experience grows",
+    "experience-curve": "What is recalled as experience grows",
+    "ablation": "Plans recalled or picked blindly",
+    "solved-against-time": "Problems solved within a time",
+    "performance-profile": "Performance profile",
+    "time-split": "Where planning time goes",
+    "retrieval": "How often a recalled plan is free",
+}
+
+
+def page_of(
+    run: RunFolder,
+    settings: RunSettings,
+    attempts: pd.DataFrame,
+    summary: pd.DataFrame,
+    retrieval: pd.DataFrame,
+    claims: Sequence[Claim],
+    made_by: Mapping[str, Sequence[str]],
+) -> str:
+    """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from.
+
+    ``made_by``: the hosts and the commits that made rows.
+    """
+    problems = attempts["problem_id"].nunique()
+    return page(
+        f"Motion Memory: {settings.run_name}",
+        f"{len(attempts):,} attempts at {problems:,} unseen problems of {', '.join(settings.class_names)}: "
+        f"{', '.join(settings.planners)} without memory and with {settings.experiences} experiences a class.",
+        summary=summary,
+        retrieval=retrieval,
+        endings=endings(attempts),
+        claims=claims,
+        pictures=_pictures(run),
+        made=_made(run, settings, made_by),
+    )
+
+
+def _pictures(run: RunFolder) -> list[Picture]:
+    """Every figure once, as PNG or SVG, whichever is smaller."""
+    smaller: dict[str, Path] = {}
+    drawn = [fetch(path) for path in files_in(run.figures, "*.[ps][nv]g")]
+    for path in sorted(drawn, key=lambda path: path.stat().st_size):
+        smaller.setdefault(path.stem, path)
+    return [Picture(smaller[name], CAPTIONS.get(name, _words(name))) for name in sorted(smaller, key=_place)]
+
+
+def _place(name: str) -> tuple[int, str]:
+    known = list(CAPTIONS)
+    return (known.index(name) if name in known else len(known), name)
+
+
+def _words(name: str) -> str:
+    """A caption from a file's name: ``problems-trap`` is "Problems: trap"."""
+    what, _, of = name.partition("-")
+    return f"{what.capitalize()}: {of}" if of else what.capitalize()
+
+
+def _made(
+    run: RunFolder, settings: RunSettings, made_by: Mapping[str, Sequence[str]]
+) -> dict[str, dict[str, str]]:
+    """Where the rows come from: host and commit of the rows themselves, settings, stages, versions."""
+    records = stages_of(run)
+    rows = {name: ", ".join(known) or "unknown" for name, known in made_by.items()}
+    measured = next((each for each in reversed(records) if each["stage"] == "benchmark"), None)
+    of_machine = {name: str(measured[name]) for name in ("processor", "system")} if measured else {}
+    stages = {
+        name: f"{seconds} s; {chunks} chunks by {workers} workers, {between} % of their time between chunks; "
+        f"{first} MB a worker after the first chunk, {last} MB after the last"
+        for name, seconds, chunks, workers, between, first, last in stage_cells(records)
+    }
+    return {
+        "Rows": {"run": settings.run_name, **rows, **of_machine},
+        "Stages": stages or {"times": "not recorded"},
+        "Settings": {name: json.dumps(value) for name, value in asdict(settings).items()},
+        "Versions": dict(measured["versions"]) if measured else {"versions": "not recorded"},
+    }

@@ -1,0 +1,174 @@
+"""Import worlds: problems of worlds and maps, in one file or in a folder for ``run --worlds``."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal, get_args
+
+from rich.console import Console
+from rich.table import Table
+
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
+from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
+from storage.exchange.problems import LARGEST_SCALE, SMALLEST_SCALE, write_problems
+from storage.places.files import whole_file, whole_folder
+from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
+from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
+from tasks.fan_out.progress import progress
+from tasks.settings.run_settings import RunError, UsageError, check_known, check_picture
+
+PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
+BOTH: Final = "both"
+SHOWN_SKIPPED: Final = 20
+ONLY_OF_MAPS: Final = {"scale": 1.0, "tolerance_m": 0.0, "seed": 1}  # options, and what they are by default
+
+Unknown = Literal["occupied", "free"]
+
+
+def import_settings(
+    vehicle: str,
+    seed: int,
+    strict: bool = False,
+    problems: int | None = None,
+    *,
+    scale: float,
+    resolution: float | None,
+    unknown: str,
+    tolerance: float,
+) -> ImportSettings:
+    """The settings as asked; UsageError with one line where one is not possible."""
+    check_known("vehicle", [vehicle], VEHICLES)
+    check_known("way to take unknown cells", [unknown], get_args(Unknown))
+    if problems is not None and problems < 1:
+        raise UsageError(f"{problems} problems: give 1 or more.")
+    if seed < 0:
+        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
+        raise UsageError(
+            f"Scale is {scale:g}: give {SMALLEST_SCALE:g} to {LARGEST_SCALE:g} metres a canonical metre."
+        )
+    if not 0.0 <= tolerance < math.inf:
+        raise UsageError(f"Tolerance is {tolerance:g}: give 0 or more metres.")
+    return ImportSettings(
+        vehicle_named(vehicle),
+        strict,
+        problems,
+        seed,
+        scale,
+        resolution,
+        "free" if unknown == "free" else "occupied",
+        tolerance,
+    )
+
+
+def import_worlds(
+    path: Path, named: str | None, out: Path, part: str, settings: ImportSettings, drawing: Path | None
+) -> None:
+    """Import, write, and print a table; RunError where there is no problem to write."""
+    check_known("format", [] if named is None else [named], FORMATS)
+    check_known("part", [part], (*PARTS, BOTH))
+    if out.suffix not in ("", *PROBLEM_FORMATS):
+        raise UsageError(f"{out} is neither a folder's name nor ends in {', '.join(PROBLEM_FORMATS)}.")
+    check_picture(drawing)
+    source = source_at(path, named)
+    _refuse_unused(source, settings, drawing)
+    if out.suffix == "":
+        _refuse_foreign(out, source)
+    parts: tuple[Part, ...] = ("train", "test") if part == BOTH else tuple(p for p in PARTS if p == part)
+    table = Table("class", "part", "problems", "skipped", "pieces", "a problem", "seconds", box=None)
+    found: dict[Part, Imported] = {}
+    for name in parts:
+        began = time.perf_counter()
+        with progress(f"import {name}", ended=False) as tell:
+            found[name] = import_part(source, name, settings, tell)
+        _add_row(table, source, name, found[name], time.perf_counter() - began)
+    _refuse_empty(source, out, found)
+    _write(out, found)
+    if drawing is not None:
+        _draw(source, settings, found, drawing)
+    Console().print(table)
+    _tell_skipped([line for imported in found.values() for line in imported.skipped])
+    print(f"problems {out}")
+
+
+def _write(out: Path, found: Mapping[Part, Imported]) -> None:
+    if out.suffix == "":
+        with whole_folder(out) as folder:
+            for part, imported in found.items():
+                (folder / part).mkdir()
+                write_problems(folder / part / PROBLEMS_FILE, imported.problems)
+        return
+    problems: dict[str, Problem] = {}
+    for problem in (problem for imported in found.values() for problem in imported.problems):
+        if problem.id in problems:
+            raise RunError(
+                f'Both parts have a problem "{problem.id}"; ask for one --part, or --out a folder.'
+            )
+        problems[problem.id] = problem
+    write_problems(out, list(problems.values()))
+
+
+def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | None) -> None:
+    """UsageError for an option that would change nothing."""
+    if source.is_map:
+        if source.format == "ros" and settings.resolution is not None:
+            raise UsageError(f"--resolution is not for {source.path}: its YAML says it.")
+        return
+    given = [name for name, otherwise in ONLY_OF_MAPS.items() if getattr(settings, name) != otherwise]
+    given += ["resolution"] * (settings.resolution is not None) + ["picture"] * (drawing is not None)
+    if given:
+        option = given[0].removesuffix("_m")
+        raise UsageError(f"--{option} is for maps, from which problems are cut; {source.path} holds worlds.")
+
+
+def _refuse_foreign(out: Path, source: Source) -> None:
+    """UsageError where a folder to write holds something else than an earlier import."""
+    if out.absolute() == source.path or source.path.is_relative_to(out.absolute()):
+        raise UsageError(f"{out} is what is to be imported; give --out another name.")
+    own = {Path(part) / PROBLEMS_FILE for part in PARTS} | {Path(part) for part in PARTS}
+    if out.is_file() or (out.is_dir() and any(file.relative_to(out) not in own for file in out.rglob("*"))):
+        raise UsageError(f"{out} is there and holds something else; give --out the name of a new folder.")
+
+
+def _refuse_empty(source: Source, out: Path, found: Mapping[Part, Imported]) -> None:
+    empty = [part for part, imported in found.items() if not imported.problems]
+    if len(empty) == len(found) or (out.suffix == "" and empty):
+        reason = found[empty[0]].explained()
+        raise RunError(f"{source.path} holds no usable problem of part {empty[0]} ({reason}).")
+
+
+def _add_row(table: Table, source: Source, part: str, imported: Imported, seconds: float) -> None:
+    pieces = sum(len(problem.obstacles.piece_starts) - 1 for problem in imported.problems)
+    mean = pieces / len(imported.problems) if imported.problems else 0.0
+    counts = (len(imported.problems), len(imported.skipped), pieces)
+    table.add_row(
+        source.class_name, part, *(f"{count:,}" for count in counts), f"{mean:.1f}", f"{seconds:.1f}"
+    )
+
+
+def _tell_skipped(skipped: list[tuple[str, str]]) -> None:
+    if skipped:
+        shown = [f"{place}: {reason}" for place, reason in skipped[:SHOWN_SKIPPED]]
+        more = [f"and {len(skipped) - SHOWN_SKIPPED:,} more"] * (len(skipped) > SHOWN_SKIPPED)
+        print(
+            f"{len(skipped):,} skipped (use --strict to stop instead):",
+            *shown,
+            *more,
+            sep="\n  ",
+            file=sys.stderr,
+        )
+
+
+def _draw(source: Source, settings: ImportSettings, found: Mapping[Part, Imported], drawing: Path) -> None:
+    from dashboards.figures.map_picture import map_picture  # late: few imports draw
+
+    cuts: dict[str, Any] = {part: imported.cuts for part, imported in found.items()}
+    figure = map_picture(load_map(source, settings), cuts, settings.scale, settings.vehicle)
+    with whole_file(drawing) as temporary:
+        figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+    print(f"picture  {drawing}")

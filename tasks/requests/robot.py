@@ -1,0 +1,121 @@
+"""A planner with a memory for a robot's own process: one call, without Prefect, MLflow, pandas or torch.
+
+    planner = load_planner("data/runs/…/memories/random")
+    answer = planner.plan({"start": [0.0, 0.0, 0.785], "goal": [50.0, 50.0], …})
+
+Everything is loaded, checked and compiled before ``load_planner`` returns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from planners.memory.recall import RECALLS, Memory, default_recall
+from planners.search.registry import PLANNERS
+from planners.solve import ASSISTS, solve
+from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
+from storage.archives.memories import load_memory
+from storage.errors import StorageError
+from storage.exchange.problems import problem_of
+from storage.places.files import parse_json
+from tasks.attempts.attempt_rows import check_attempt
+from tasks.attempts.compile_assists import EMPTY, compile_assists
+from tasks.registry.memory_at import one_memory
+from tasks.settings.run_settings import UsageError, check_known
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What came of a problem."""
+
+    problem_id: str
+    status: str  # "solved", or how planning failed (planners.search.outcome.Status)
+    source: str | None  # "recalled", "repaired" or "searched"; None when not solved
+    plan: Plan | None  # in the frame and the lengths of the problem as given; None when not solved
+    planning_seconds: (
+        float  # from the obstacles to the plan, without reading the problem and judging the plan
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPlanner:
+    """Plans for one problem at a time, from whatever thread."""
+
+    memory: Memory
+    planner: str
+    assist: str
+    top_k: int
+    recall: str
+    seed: int
+    judged: bool
+    _turn: Lock = field(default_factory=Lock, repr=False)  # kernels draw into buffers of the process
+
+    def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
+        """Plan for a problem, or for the contract's object (or its JSON text) that describes one.
+
+        ValueError with one line: the problem is malformed, impossible, or of a scale that the memory is not
+        made for. No plan is an answer. PlanFaultError: the independent judge refuses the plan.
+        """
+        vehicle = self.memory.vehicle
+        if isinstance(problem, str):
+            problem = _parsed(problem)
+        if not isinstance(problem, Problem):
+            problem = problem_of(problem, "problem", vehicle)
+        with self._turn:
+            asked, alignment = to_canonical(problem)
+            attempt = solve(
+                *(asked, self.planner, self.assist, self.top_k, self.memory, self.seed),
+                vehicle=vehicle,
+                strategy=self.recall,
+            )
+            if self.judged:
+                check_attempt(asked, attempt, set(), vehicle)
+        plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
+        return Answer(problem.id, attempt.status, attempt.source, plan, attempt.planning_seconds)
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return parse_json(text, "the problem")
+    except StorageError as error:
+        raise ValueError(str(error)) from None
+
+
+def load_planner(
+    memory: str | Path,
+    *,
+    vehicle: str = "car",
+    planner: str = "gust",
+    assist: str = "repair",
+    top_k: int = 5,
+    recall: str | None = None,
+    seed: int = 1,
+    judged: bool = True,
+) -> RobotPlanner:
+    """A planner that is ready: the memory read and checked, kernels compiled, one problem planned.
+
+    ``memory``: a folder of one, of a run with one, or a model in MLflow. ``judged``: each plan is simulated
+    and swept again by code that shares nothing with the planners, some milliseconds beside the planning.
+
+    UsageError: an unknown name. StorageError: the memory is missing, damaged or of another vehicle. RunError:
+    MLflow does not have it, or there are several.
+    """
+    check_known("vehicle", [vehicle], VEHICLES)
+    check_known("planner", [planner], PLANNERS)
+    check_known("assist", [assist], ASSISTS)
+    check_known("recall", [] if recall is None else [recall], RECALLS)
+    if top_k < 1:
+        raise UsageError(f"Top k is {top_k}: give 1 or more.")
+    with one_memory(str(memory)) as folder:
+        found = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
+    strategy = recall or default_recall(found)
+    compile_assists(found.vehicle, planner, [strategy])
+    ready = RobotPlanner(found, planner, assist, top_k, strategy, seed, judged)
+    ready.plan(replace(EMPTY, scale=found.scales[0]))
+    return ready

@@ -1,0 +1,22 @@
+"""Verify a data folder, once it is known to be one and the libraries are told where to write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from storage.places.data_folder import MARK, open_data_folder
+from storage.places.mirror import fetch, local_place
+from tasks.servers.prefect_server import set_environment
+from tasks.settings.run_settings import RunError, UsageError
+
+
+def verify(folder: Path, sample: float, workers: int) -> None:
+    """Check what lies in a data folder; nothing is written where there is none."""
+    if not 0.0 <= sample <= 1.0:
+        raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")
+    if not fetch(local_place(folder) / MARK).is_file():
+        raise RunError(f"{folder} is no data folder: it has no {MARK}.")
+    set_environment(open_data_folder(folder).path)
+    from tasks.requests.verify_folder import verify_folder
+
+    verify_folder(folder, sample, workers)

@@ -1,0 +1,99 @@
+"""Closed by default: a server listens on loopback, or asks for the password of the one setting for all.
+
+``MOTION_MEMORY_AUTH=user:password`` is that setting, read from the environment alone. Who listens elsewhere
+without it is refused; with it our servers, Prefect's and MLflow's ask for it, and clients here send it.
+"""
+
+from __future__ import annotations
+
+import base64
+import hmac
+import ipaddress
+import os
+import socket
+from typing import TYPE_CHECKING, Final
+
+from tasks.settings.run_settings import UsageError
+
+if TYPE_CHECKING:
+    from starlette.types import ASGIApp, Receive, Scope, Send
+
+AUTH: Final = "MOTION_MEMORY_AUTH"
+OPEN: Final = ("/ping", "/health")  # whether a server lives is no secret
+_REFUSAL: Final = b'{"error_code": "UNAUTHENTICATED", "message": "Give user and password (HTTP Basic)."}'
+
+
+def auth() -> str | None:
+    """The ``user:password`` that servers ask for; None: for none. UsageError, without it: it is malformed."""
+    value = os.environ.get(AUTH)
+    if not value:
+        return None
+    user, _, password = value.partition(":")
+    if not (user and password and value.isascii() and value.isprintable()):
+        raise UsageError(f"{AUTH} is set, but not to user:password in plain letters, digits and signs.")
+    return value
+
+
+def auth_environment() -> dict[str, str]:
+    """What tells Prefect and MLflow to ask for the password as servers, and to send it as clients."""
+    value = auth()
+    if value is None:
+        return {}
+    user, _, password = value.partition(":")
+    return {
+        "PREFECT_SERVER_API_AUTH_STRING": value,
+        "PREFECT_API_AUTH_STRING": value,
+        "MLFLOW_TRACKING_USERNAME": user,
+        "MLFLOW_TRACKING_PASSWORD": password,
+    }
+
+
+def check_address(host: str) -> None:
+    """UsageError unless a server on ``host`` is this machine's alone, or will ask for a password."""
+    if not _is_loopback(host) and auth() is None:
+        raise UsageError(f"Other machines reach {host}: set {AUTH}=user:password, or listen on 127.0.0.1.")
+
+
+def access() -> str:
+    """Who is let in, for the summary of a server."""
+    return f"user and password of {AUTH}" if auth() else "every user of this machine"
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        found = socket.getaddrinfo(host, None)
+    except (OSError, UnicodeError):
+        raise UsageError(
+            f"No address is known of {host!r}; give one of this machine, like 127.0.0.1."
+        ) from None
+    return all(ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found)
+
+
+class Guarded:
+    """An ASGI application that only whoever knows ``secret`` (``user:password``) reaches; None: everybody."""
+
+    def __init__(self, app: ASGIApp, secret: str | None) -> None:
+        self._app = app
+        self._wanted = None if secret is None else base64.b64encode(secret.encode())
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what may pass; 401 else."""
+        if scope["type"] == "lifespan" or self._may_pass(scope):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            headers = [
+                (b"content-type", b"application/json"),
+                (b"content-length", str(len(_REFUSAL)).encode()),
+                (b"www-authenticate", b'Basic realm="motion-memory"'),
+            ]
+            await send({"type": "http.response.start", "status": 401, "headers": headers})
+            await send({"type": "http.response.body", "body": _REFUSAL})
+
+    def _may_pass(self, scope: Scope) -> bool:
+        if self._wanted is None or (scope["path"] in OPEN and scope.get("method") == "GET"):
+            return True
+        given = [value for name, value in scope["headers"] if name == b"authorization"]
+        scheme, _, credentials = (given[0] if len(given) == 1 else b"").partition(b" ")
+        return scheme.lower() == b"basic" and hmac.compare_digest(credentials.strip(), self._wanted)

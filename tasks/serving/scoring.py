@@ -1,0 +1,140 @@
+"""MLflow's scoring server around a memory, with a guard before it: a bad request gets one clear line.
+
+``/invocations`` takes MLflow's protocol as JSON (``dataframe_split``, ``dataframe_records``, ``instances`` or
+``inputs``, and ``params``); MLflow parses it and enforces the signature. ``/ping``, ``/health`` and
+``/version`` are MLflow's own. Its server alone answers some bad requests with 500 or a stack trace, bounds
+nothing, and spends most of its time on writing numbers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any, Final, cast
+
+import orjson
+import pandas as pd
+from mlflow.exceptions import MlflowException
+from mlflow.pyfunc import PyFuncModel, scoring_server
+from starlette.types import Receive, Scope, Send
+
+from tasks.tracking.memory_model import TOP_K
+
+PATH: Final = "/invocations"
+MOST_BYTES: Final = 8 << 20  # of a request
+MOST_PLANS: Final = 1_000  # problems times top k of a request: some 30 MB of answer
+BODY_SECONDS: Final = 20.0  # for a whole request to arrive
+LONGEST: Final = 400  # characters of a message
+FORMATS: Final = ("dataframe_split", "dataframe_records", "instances", "inputs")
+
+
+class RefusedError(Exception):
+    """A request that is not answered: its HTTP status, and one line that says why and what to do."""
+
+    def __init__(self, status: int, message: str) -> None:
+        """Shorten the line where it quotes much of the request."""
+        line = " ".join(message.split()).encode("utf-8", "replace").decode()
+        super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}...")
+        self.status = status
+
+
+class Scoring:
+    """The ASGI application of a model."""
+
+    def __init__(self, model: PyFuncModel) -> None:
+        self._model = model
+        self._mlflow = scoring_server.init(model)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; one line of JSON for what is refused."""
+        if scope["type"] != "http" or scope["path"] != PATH or scope["method"] != "POST":
+            await self._mlflow(scope, receive, send)
+            return
+        try:
+            _check_headers(dict(scope["headers"]))
+            body = await _body(receive)
+            status, content = 200, await asyncio.to_thread(self.answer, body)
+        except RefusedError as error:
+            code = "BAD_REQUEST" if error.status == 400 else "INVALID_PARAMETER_VALUE"
+            status, content = error.status, orjson.dumps({"error_code": code, "message": str(error)})
+        headers = [(b"content-type", b"application/json"), (b"content-length", str(len(content)).encode())]
+        await send({"type": "http.response.start", "status": status, "headers": headers})
+        await send({"type": "http.response.body", "body": content})
+
+    def answer(self, body: bytes) -> bytes:
+        """The answer to a body, ``{"predictions": [a row a plan]}``. RefusedError: it is no good."""
+        table, top_k = self._asked(body)
+        try:
+            plans = cast("pd.DataFrame", self._model.predict(table, {"top_k": top_k}))
+        except MlflowException as error:
+            if error.get_http_status_code() >= 500:  # type: ignore[no-untyped-call]
+                raise
+            raise RefusedError(400, str(error.message).rpartition("Error: ")[2]) from None
+        return orjson.dumps({"predictions": plans.to_dict("records")})
+
+    def _asked(self, body: bytes) -> tuple[pd.DataFrame, int]:
+        """The table of problems, and how many plans each is to get."""
+        try:
+            asked = orjson.loads(body)
+        except orjson.JSONDecodeError as error:
+            raise RefusedError(400, f"The body is no valid JSON ({error}).") from None
+        given = [name for name in FORMATS if name in asked] if isinstance(asked, dict) else []
+        if len(given) != 1:
+            told = ", ".join(given) or "none of them"
+            raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {told}.")
+        top_k = _top_k(asked.get("params"))
+        try:
+            schema = self._model.metadata.get_input_schema()  # type: ignore[no-untyped-call]
+            table = scoring_server.infer_and_parse_data({given[0]: asked[given[0]]}, schema)
+            if not isinstance(table, pd.DataFrame):
+                table = pd.DataFrame(table)
+        except Exception as error:  # MLflow and pandas have one of their own for each kind of nonsense
+            raise RefusedError(400, f"{given[0]} is no table of problems: {error}") from None
+        if len(table) * top_k > MOST_PLANS:
+            raise RefusedError(
+                413,
+                f"{len(table)} problems with top_k {top_k} are more than {MOST_PLANS} plans; "
+                "send fewer at once.",
+            )
+        return table, top_k
+
+
+def _top_k(params: Any) -> int:
+    if params is None:
+        return TOP_K
+    if not isinstance(params, dict) or params.keys() - {"top_k"}:
+        raise RefusedError(400, f'params is {params!r}; wanted was {{"top_k": a number}}, or nothing.')
+    top_k = params.get("top_k", TOP_K)
+    if type(top_k) is not int or not 1 <= top_k <= MOST_PLANS:
+        raise RefusedError(400, f"top_k is {top_k!r}; give a number from 1 to {MOST_PLANS}.")
+    return top_k
+
+
+def _check_headers(headers: dict[bytes, bytes]) -> None:
+    kind = headers.get(b"content-type", b"nothing").decode("latin-1")
+    if kind.partition(";")[0].strip().lower() != "application/json":
+        raise RefusedError(415, f"Content-Type is {kind}; send application/json.")
+    length = headers.get(b"content-length", b"0")
+    if length.isdigit() and int(length[:20]) > MOST_BYTES:
+        raise _too_long()
+
+
+async def _body(receive: Receive) -> bytes:
+    body = bytearray()
+    try:
+        async with asyncio.timeout(BODY_SECONDS):
+            more = True
+            while more:
+                message = await receive()
+                if message["type"] == "http.disconnect":
+                    raise RefusedError(400, "The connection ended before the request did.")
+                body += message.get("body", b"")
+                if len(body) > MOST_BYTES:
+                    raise _too_long()
+                more = message.get("more_body", False)
+    except TimeoutError:
+        raise RefusedError(408, f"The request did not arrive within {BODY_SECONDS:g} s.") from None
+    return bytes(body)
+
+
+def _too_long() -> RefusedError:
+    return RefusedError(413, f"The request is longer than {MOST_BYTES} bytes; send fewer problems at once.")

@@ -1,0 +1,106 @@
+"""The dashboard's server: on loopback, over one data folder, until it is interrupted."""
+
+from __future__ import annotations
+
+import math
+import os
+import socket
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+from dashboards.web.notices import NoticeError
+from dashboards.web.retrained import Retrained, Retrainings
+from storage.places.data_folder import MARK, DataFolder, open_data_folder
+from tasks.registry.champion_registry import Registry, Version
+from tasks.settings.run_settings import RunError, UsageError
+
+LOOPBACK = "127.0.0.1"
+HURRIED = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
+
+
+def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
+    """Serve the pages; UsageError for a port that cannot be had or a folder that is no data folder."""
+    folder = _existing(data)
+    if not 0 <= port <= 65535:
+        raise UsageError(f"Port is {port}: give 0 (any that is free) to 65535.")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((LOOPBACK, port))
+        listener.listen()  # from now on a browser waits
+    except OSError as error:
+        raise UsageError(
+            f"Port {port} cannot be used ({error.strerror}): give another --port, or 0."
+        ) from None
+    import uvicorn  # late: with the application a second
+
+    from dashboards.web.app import dashboard_app
+
+    address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
+    for name, value in HURRIED.items():
+        os.environ.setdefault(name, value)
+    retrainings = partial(_retrainings, Registry(folder))
+    threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
+    config = uvicorn.Config(
+        dashboard_app(folder, retrainings), log_level="warning", access_log=False, server_header=False
+    )
+    print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
+    if open_browser and sys.stdout.isatty():
+        import webbrowser
+
+        webbrowser.open(address)
+    uvicorn.Server(config).run(sockets=[listener])
+
+
+def _retrainings(registry: Registry) -> Sequence[Retrained]:
+    """Every version of a memory, in order; a NoticeError where the registry does not answer."""
+    try:
+        found = []
+        for name in registry.names():
+            champion = registry.aliased(name)
+            found += [_retrained(each, champion) for each in registry.versions(name)]
+        return found
+    except RunError as error:
+        raise NoticeError(str(error)) from None
+
+
+def _retrained(version: Version, champion: Version | None) -> Retrained:
+    def figure(name: str) -> float:
+        try:
+            return float(version.tag(name))
+        except ValueError:
+            return math.nan
+
+    return Retrained(
+        memory=version.name,
+        number=version.number,
+        retraining=version.retraining,
+        run=version.tag("run"),
+        verdict=version.tag("verdict"),
+        against=version.tag("against"),
+        reduction=figure("reduction"),
+        low=figure("low"),
+        high=figure("high"),
+        why=version.tag("why"),
+        is_champion=champion is not None and champion.number == version.number,
+    )
+
+
+def _read_ahead(retrainings: Retrainings) -> None:
+    """Load MLflow, some seconds, before a page asks it."""
+    with suppress(NoticeError):
+        retrainings()
+
+
+def _existing(data: Path) -> DataFolder:
+    """A data folder that is there: looking at one makes none."""
+    folder = data.expanduser().absolute()
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is not there; give --data and the folder that holds your runs.")
+    if not (folder / MARK).is_file() and any(folder.iterdir()):
+        raise UsageError(f"{folder} has no {MARK}, so it is no data folder; give one that `run` has made.")
+    return open_data_folder(folder) if (folder / MARK).is_file() else DataFolder(folder)

@@ -1,0 +1,66 @@
+"""Serve a memory over HTTP: worker processes behind one port, which opens when the first is ready."""
+
+from __future__ import annotations
+
+import functools
+import json
+import math
+import os
+from pathlib import Path
+
+from planners.memory.recall import Memory
+from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
+from storage.archives.memories import load_memory
+from tasks.registry.memory_at import one_memory
+from tasks.servers.access import Guarded, access, auth, auth_environment, check_address
+from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
+from tasks.servers.prefect_server import ENVIRONMENT
+from tasks.settings.run_settings import check_known
+
+
+def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) -> None:
+    """Serve until Ctrl-C or SIGTERM. UsageError, RunError, StorageError: nothing is served, and why."""
+    check_known("vehicle", [vehicle], VEHICLES)
+    check_address(host)
+    for name, value in (ENVIRONMENT | auth_environment()).items():
+        os.environ.setdefault(name, value)
+    with one_memory(memory) as folder, bound(host, port) as place:
+        found = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
+
+        def tell() -> None:
+            print(f"memory   {memory}: {len(found.plans)} plans of class {found.class_name}, {vehicle}")
+            print(f"serving  {address_of(place)}/invocations, workers: {workers}; Ctrl-C stops")
+            print(f"access   {access()}", flush=True)
+
+        serve_with(functools.partial(scoring_app, str(folder), vehicle), place, workers, tell)
+
+
+def scoring_app(folder: str, vehicle: str) -> Guarded:
+    """What a worker serves: loaded, compiled, asked once. It ends with the process that started it."""
+    end_with_parent()
+    from tasks.serving.scoring import Scoring
+    from tasks.tracking.memory_model import (  # MLflow and pandas: only where it is served
+        MemoryModel,
+        pyfunc_of,
+    )
+
+    model = MemoryModel()
+    model.open(Path(folder), vehicle)
+    scoring = Scoring(pyfunc_of(model))
+    scoring.answer(sample_request(model.memory))
+    return Guarded(scoring, auth())
+
+
+def sample_request(memory: Memory) -> bytes:
+    """A request that needs all kernels: of the memory's scale, askew, around a notched obstacle."""
+    scale = memory.scales[0]
+    notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]
+    problem = {
+        "start": [0.0, 0.0, math.pi / 4 + 0.3],
+        "goal": [50.5 * scale, 49.5 * scale],
+        "goal_radius": 2.0 * scale,
+        "bounds": [scale * bound for bound in (-7.0, -7.0, 57.0, 57.0)],
+        "obstacles": [[[scale * x, scale * y] for x, y in notched]],
+        "scale": scale,
+    }
+    return json.dumps({"dataframe_records": [{"problem": json.dumps(problem)}]}).encode()

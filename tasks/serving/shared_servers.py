@@ -1,0 +1,118 @@
+"""Prefect's and MLflow's servers for several people or machines: one address, one password, one folder.
+
+They hold what a command's own servers hold; other databases, and places for artifacts, by the variables that
+Prefect and MLflow have for that. Commands use them by PREFECT_API_URL and MLFLOW_TRACKING_URI.
+"""
+
+from __future__ import annotations
+
+import functools
+import multiprocessing
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from storage.places.data_folder import DataFolder, open_data_folder
+from tasks.servers.access import Guarded, access, auth, check_address
+from tasks.servers.listening import STOP_SECONDS, address_of, bound, config_of, end_with_parent
+from tasks.servers.prefect_server import START_SECONDS, is_healthy, set_environment
+from tasks.settings.run_settings import RunError
+
+LOOK_SECONDS: Final = 0.2  # between two looks at whether they live
+
+
+def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
+    """Serve until Ctrl-C or SIGTERM.
+
+    UsageError, RunError: an address or a port cannot be used, or a server ended.
+    """
+    check_address(host)
+    folder = open_data_folder(data)
+    set_environment(folder.path)
+    with bound(host, prefect_port) as one, bound(host, mlflow_port) as other:
+        apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
+            "Prefect": (prefect_app, one),
+            "MLflow": (functools.partial(mlflow_app, folder), other),
+        }
+        healthy = (f"{address_of(one)}/api", address_of(other))
+        with _running(apps) as wait:
+            wait(lambda: all(is_healthy(url) for url in healthy), START_SECONDS)
+            print(f"Prefect  {address_of(one)}  PREFECT_API_URL={healthy[0]}")
+            print(f"MLflow   {address_of(other)}  MLFLOW_TRACKING_URI={healthy[1]}")
+            print(f"access   {access()}; Ctrl-C stops", flush=True)
+            wait(lambda: False, float("inf"))
+
+
+def prefect_app() -> Any:
+    """Prefect's server, which asks for the password by itself."""
+    from prefect.server.api.server import create_app
+
+    return create_app()
+
+
+def mlflow_app(data: DataFolder) -> Guarded:
+    """MLflow's server behind the guard; it hands out artifacts, so that clients need no access to them."""
+    from mlflow.server import constants
+
+    store = os.environ.get("MLFLOW_BACKEND_STORE_URI") or f"sqlite:///{data.mlflow_database}"
+    artifacts = os.environ.get("MLFLOW_ARTIFACTS_DESTINATION") or data.mlflow_artifacts.as_uri()
+    root = "mlflow-artifacts:/"
+    os.environ.pop("MLFLOW_TRACKING_URI", None)  # it is the server, not its client
+    os.environ |= {
+        constants.BACKEND_STORE_URI_ENV_VAR: store,
+        constants.ARTIFACT_ROOT_ENV_VAR: root,
+        constants.SERVE_ARTIFACTS_ENV_VAR: "true",
+        constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
+        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # ten processes more, for what nobody here asks of it
+    }
+    from mlflow.server.fastapi_app import app
+    from mlflow.server.handlers import initialize_backend_stores
+
+    initialize_backend_stores(store, store, root)
+    return Guarded(app, auth())
+
+
+@contextmanager
+def _running(
+    apps: dict[str, tuple[Callable[[], Any], socket.socket]],
+) -> Iterator[Callable[[Callable[[], bool], float], None]]:
+    """Processes that serve; what is yielded waits for a condition or the user, or says which ended."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    context = multiprocessing.get_context("spawn")
+    processes = {name: context.Process(target=_serve, args=args, name=name) for name, args in apps.items()}
+
+    def wait(until: Callable[[], bool], seconds: float) -> None:
+        last = time.monotonic() + seconds
+        while not (stop.is_set() or until()):
+            ended = [name for name, process in processes.items() if not process.is_alive()]
+            if ended:
+                raise RunError(f"{ended[0]}'s server ended; what it printed says why.")
+            if time.monotonic() > last:
+                raise RunError(f"The servers were not up after {seconds:.0f} s; what they printed says why.")
+            stop.wait(LOOK_SECONDS)
+
+    for process in processes.values():
+        process.start()
+    try:
+        yield wait
+    finally:
+        for process in processes.values():
+            process.terminate()
+        for process in processes.values():
+            process.join(STOP_SECONDS + 1.0)
+            process.kill()
+
+
+def _serve(app: Callable[[], Any], place: socket.socket) -> None:
+    from uvicorn import Server
+
+    end_with_parent()
+    Server(config_of(app)).run(sockets=[place])

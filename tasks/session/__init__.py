@@ -1,0 +1,1 @@
+"""One command: the folder that it holds, its server, its workers."""

@@ -1,0 +1,68 @@
+"""Compile the kernels while servers start: Numba keeps what it compiled, so later processes only load it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from planners.memory.hallucination.mixture import hallucinate
+from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.labelling import label_problems
+from planners.memory.plans.experience import Experience
+from planners.search.registry import PLANNERS
+from planners.solve import solve
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.problem import Plan, start_state
+from planners.world.randomness import generator
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from tasks.attempts.compile_assists import EMPTY, compile_assists
+from tasks.fan_out.fan_out import Client
+from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
+
+
+@contextmanager
+def warm_up(scheduler: str, vehicle: str) -> Iterator[None]:
+    """Have the workers behind ``scheduler`` compile for a vehicle, beside other work, in this context."""
+    with Client(scheduler, set_as_default=False) as client:
+        work = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
+        yield
+        client.cancel(work)
+
+
+def _compile_collecting(vehicle: Vehicle) -> None:
+    """The collecting planner."""
+    solve(EMPTY, COLLECTOR, vehicle=vehicle)
+
+
+def _compile_hallucination(vehicle: Vehicle) -> None:
+    """Drawing problems, and what hallucinate makes of them unless it is asked for another mixture."""
+    controls = np.tile([vehicle.max_acceleration, 0.0], (140, 1))
+    plan = Plan(simulate(start_state(EMPTY, vehicle), controls, vehicle), controls)
+    end = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
+    experience = Experience(replace(EMPTY, goal=end), plan, vehicle)
+    for name in CLASSES:
+        draw = problem_class(name, vehicle=vehicle).draw_obstacles
+        made = next(hallucinate(experience, dict(DEFAULT_MIXTURE), draw, generator(0)))
+        label_problems([made.problem], experience.sweep)
+        no_plan(experience.sweep, draw, generator(0), name, 0)
+
+
+def _compile_rest(vehicle: Vehicle) -> None:
+    """What only the benchmark needs."""
+    compile_assists(vehicle)
+    for planner in PLANNERS:
+        for assist in ("none", "fresh"):
+            solve(EMPTY, planner, assist, vehicle=vehicle)
+
+
+# In the order of need: of two workers each compiles one of the first two, and whoever is free the last.
+GROUPS: Final[tuple[Callable[[Vehicle], object], ...]] = (
+    _compile_collecting,
+    _compile_hallucination,
+    _compile_rest,
+)

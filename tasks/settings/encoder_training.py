@@ -1,0 +1,46 @@
+"""How encoders are trained, beyond objective and epochs: part of a run's settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planners.memory.encoder.encoder import Architecture
+from planners.memory.encoder.training import TrainingSettings
+
+_DEFAULT = TrainingSettings()
+
+
+@dataclass(frozen=True)
+class Learning:
+    """What can be chosen of ``TrainingSettings``, and how many seeds are trained with."""
+
+    seeds: int = 1  # encoders trained a memory; the one best on validation problems is kept
+    patience: int = _DEFAULT.patience
+    learning_rate: float = _DEFAULT.learning_rate
+    origin_weight: float = _DEFAULT.origin_weight
+    margin: float = _DEFAULT.margin
+    semi_hard: bool = _DEFAULT.semi_hard
+    channels: tuple[int, ...] = _DEFAULT.architecture.channels
+    hidden: tuple[int, ...] = _DEFAULT.architecture.hidden
+    dimensions: int = _DEFAULT.architecture.dimensions
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "channels", tuple(self.channels))  # lists, where they come from JSON
+        object.__setattr__(self, "hidden", tuple(self.hidden))
+        if self.seeds < 1:
+            raise ValueError(f"{self.seeds} training seeds: give 1 or more.")
+        self.settings(_DEFAULT.objective, 1, 0)
+
+    def settings(self, objective: str, epochs: int, seed: int) -> TrainingSettings:
+        """All settings of one training; ValueError with one line where it is impossible."""
+        return TrainingSettings(
+            objective=objective,
+            epochs=epochs,
+            patience=self.patience,
+            learning_rate=self.learning_rate,
+            origin_weight=self.origin_weight,
+            margin=self.margin,
+            semi_hard=self.semi_hard,
+            architecture=Architecture(self.channels, self.hidden, self.dimensions),
+            seed=seed,
+        )

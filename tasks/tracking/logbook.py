@@ -1,0 +1,218 @@
+"""What each stage of a run leaves in MLflow."""
+
+from __future__ import annotations
+
+import functools
+import math
+import platform
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import pandas as pd
+
+from dashboards.statistics.headline import headline, headline_retrieval
+from dashboards.verdicts.promotion import Judgement
+from storage.places.data_folder import open_data_folder
+from tasks.attempts.attempt_rows import commit
+from tasks.fan_out.keys import key_of
+from tasks.fan_out.stage import Chunk, run_folder
+from tasks.reports.report import Report
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.benchmark import benchmark_chunks
+from tasks.stages.build_memory import figure_names
+from tasks.stages.collect import experiences_key
+from tasks.stages.judge import judged_key
+from tasks.stages.sweep import swept
+from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, Tracker
+from tasks.tracking.parameters import parameters_of
+
+COMPARED: Final = ("controls", "planning-times", "retrieval")  # pictures on the parent run
+
+_SHOWN = (
+    "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
+    "collision_checks",
+)  # fmt: skip
+
+
+@functools.cache
+def tracker(data: str) -> Tracker:
+    """The tracker of a data folder; the first call begins to connect."""
+    return Tracker(open_data_folder(data))
+
+
+@contextmanager
+def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
+    """The parent run: settings as parameters and tags, where and from which commit it was made.
+
+    What it brings forth is among its children; the figures by which runs are compared are its own, too.
+    """
+    tags = {"commit": commit(), "host": platform.node(), "learned": settings.learned}
+    tags |= {name: str(getattr(settings, name)) for name in ("vehicle", "preset", "objective", "difficulty")}
+    tags |= {"classes": ", ".join(settings.class_names)}
+    with tracker(data).run(settings.run_name, "run", tags) as run_id:
+        tracker(data).parameters(run_id, parameters_of(settings))
+        yield run_id
+
+
+def log_training(
+    data: str, settings: RunSettings, chunks: Sequence[Chunk], results: Sequence[dict[str, Any]]
+) -> None:
+    """One child run for each encoder: parameters, metrics of every epoch, the data it learned from."""
+    log, run = tracker(data), run_folder(data, settings)
+    for chunk, result in zip(chunks, results, strict=True):
+        with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
+            if log.is_logged(run_id, chunk.key):
+                continue
+            asked: dict[str, Any] = parameters_of(settings) | {"class": chunk.class_name}
+            asked |= {"training_seed": settings.seed + chunk.index}
+            log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
+            log.metrics(run_id, result["epochs"], step="epoch")
+            place = run.path / "hallucinated" / chunk.class_name
+            log.dataset(run_id, f"hallucinated-{chunk.class_name}", place, chunk.key, "training")
+            log.mark_logged(run_id, chunk.key)
+
+
+def log_memories(
+    data: str,
+    settings: RunSettings,
+    chunks: Sequence[Chunk],
+    results: Sequence[dict[str, Any]],
+    retrieval: pd.DataFrame,
+) -> None:
+    """Each memory as a model that its training brought forth, what it recalls as metrics, and all curves."""
+    log, run = tracker(data), run_folder(data, settings)
+    for chunk, result in zip(chunks, results, strict=True):
+        name = chunk.class_name
+        with _child(data, settings, _stage(settings, name, result["training_seed"])) as run_id:
+            if not log.is_logged(run_id, chunk.key, "memory"):
+                model_id = log.memory(run_id, "memory", run.memory(name), settings.vehicle)
+                log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
+                for figure in ("retrieval", *figure_names(name)):
+                    log.artifacts(run_id, run.figures / f"{figure}.png", "figures")
+                log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
+                log.mark_logged(run_id, chunk.key, "memory")
+    _log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
+
+
+def log_report(data: str, settings: RunSettings, report: Report) -> None:
+    """The benchmark's child run: every figure of the summary as a metric, figures and tables as artifacts."""
+    log, run = tracker(data), run_folder(data, settings)
+    key = key_of([chunk.key for chunk in benchmark_chunks(data, settings)])
+    _log_headline(data, settings, headline(report.summary, report.retrieval), COMPARED)
+    with _child(data, settings, "benchmark") as run_id:
+        log.parameters(run_id, parameters_of(settings))
+        log.artifacts(run_id, run.figures, "figures")
+        for path in (run.summary("csv"), run.summary("md"), run.report):
+            log.artifacts(run_id, path)
+        if log.is_logged(run_id, key):
+            return
+        rows: dict[str, float] = {}
+        for row in report.summary.to_dict("records"):
+            place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
+            rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
+        rows |= _retrieval_metrics(report.retrieval)
+        log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
+        log.dataset(run_id, "attempts", run.results, key, "benchmark")
+        log.mark_logged(run_id, key)
+
+
+def _log_headline(
+    data: str, settings: RunSettings, figures: Mapping[str, float], pictures: Sequence[str]
+) -> None:
+    """On the parent run, if there is one: figures, pictures and the data that it rests on."""
+    log, run = tracker(data), run_folder(data, settings)
+    parent = log.find(settings.run_name, "run")
+    if parent is None:
+        return
+    log.metrics(parent, [figures])
+    for picture in pictures:
+        log.artifacts(parent, run.figures / f"{picture}.png", "figures")
+    for name in settings.class_names:
+        key = experiences_key(data, settings, name)
+        if not log.is_logged(parent, key, f"experiences.{name}"):
+            log.dataset(parent, f"experiences-{name}", run.experiences(name), key, "experiences")
+            log.mark_logged(parent, key, f"experiences.{name}")
+
+
+def log_judgement(
+    data: str,
+    settings: RunSettings,
+    memory: str,
+    verdict: str,
+    judgement: Judgement | None,
+    markdown: str,
+    attempts: Sequence[pd.DataFrame],
+) -> None:
+    """One child run for each memory that was judged: the verdict, every figure, the attempts it rests on."""
+    log, run = tracker(data), run_folder(data, settings)
+    key = key_of(judged_key(data, settings, memory))
+    with _child(data, settings, f"judge {memory}") as run_id:
+        log.tag(run_id, {"verdict": verdict, "memory": memory})
+        if log.is_logged(run_id, key):
+            return
+        log.parameters(run_id, parameters_of(settings) | {"memory": memory})
+        if judgement is not None:
+            log.metrics(run_id, [_judgement_metrics(judgement)])
+        with TemporaryDirectory(prefix="motion-memory-") as scratch:
+            told = Path(scratch) / "verdict.md"
+            told.write_text(markdown, encoding="utf-8")
+            log.artifacts(run_id, told)
+        problems = {str(each) for side in attempts for each in side["problem_id"].unique()}
+        log.metrics(run_id, [{"problems": float(len(problems))}])
+        log.dataset(run_id, f"judged-{memory}", run.judged, key, "promotion")
+        log.mark_logged(run_id, key)
+
+
+def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
+    figures = {name: float(getattr(judgement, name)) for name in ("reduction", "low", "high")}
+    for row in judgement.columns.to_dict("records"):
+        place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
+        names = ("champion_ms", "ms", "reduction", "champion_solved", "solved", "champion_hits", "hits")
+        figures |= {f"{place}/{name}": float(row[name]) for name in names}
+    return figures
+
+
+def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
+    """Every figure of the retrieval table under a name of its own."""
+    rows: dict[str, float] = {}
+    for row in retrieval.to_dict("records"):
+        place = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}/{row['recall']}"
+        numbers = {
+            str(name).replace("@", "-"): value for name, value in row.items() if isinstance(value, float)
+        }
+        rows |= {f"{place}/{name}": value for name, value in numbers.items() if math.isfinite(value)}
+    return rows
+
+
+def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
+    """The name of a training: with several seeds it says which."""
+    return f"train {class_name}" + (f" seed {seed}" if settings.learning.seeds > 1 else "")
+
+
+def log_sweep(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
+    """One run for the sweep, and in it a child for each variant: parameters, metrics of every epoch."""
+    log = tracker(data)
+    with _child(data, settings, "sweep") as parent:
+        for chunk in chunks:
+            row, epochs = swept(chunk)
+            stage = f"sweep {chunk.class_name} {chunk.index}"
+            with log.run(settings.run_name, stage, {}, parent=parent) as run_id:
+                if log.is_logged(run_id, chunk.key):
+                    continue
+                found = ("hit@1", "hit@5", "seconds")
+                log.parameters(run_id, {name: value for name, value in row.items() if name not in found})
+                log.metrics(run_id, epochs, step="epoch")
+                log.metrics(
+                    run_id, [{f"of_oracle_{name.replace('@', '_')}": row[name] for name in found[:2]}]
+                )
+                log.mark_logged(run_id, chunk.key)
+
+
+@contextmanager
+def _child(data: str, settings: RunSettings, stage: str) -> Iterator[str]:
+    log = tracker(data)
+    with log.run(settings.run_name, stage, {}, parent=log.find(settings.run_name, "run")) as run_id:
+        yield run_id

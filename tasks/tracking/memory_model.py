@@ -1,0 +1,160 @@
+"""A memory as an MLflow model: problem JSON in, ranked plans out, checked and in the problem's own frame.
+
+The model is saved *from code*: it is the archive and ``memory_model_code.py``, three lines that import this
+file from the installed package. Nothing of it is pickled, and the archive is checked as any other.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any, Final
+
+import pandas as pd
+from mlflow.exceptions import MlflowException
+from mlflow.models import ModelSignature
+from mlflow.models.model import Model
+from mlflow.protos.databricks_pb2 import INVALID_PARAMETER_VALUE
+from mlflow.pyfunc import PyFuncModel, save_model
+from mlflow.pyfunc.model import PythonModel, PythonModelContext
+from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
+from mlflow.types.schema import Array
+
+from planners.memory.plans.sweeps import plan_answers
+from planners.memory.ranking.scores import best_plans
+from planners.memory.recall import Memory, scale_fault
+from planners.solve import turned
+from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import vehicle_named
+from storage.archives.memories import load_memory
+from storage.errors import StorageError
+from storage.exchange.problems import fields_of, problem_of
+from storage.places.files import parse_json
+
+CODE: Final = Path(__file__).with_name("memory_model_code.py")
+ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
+REQUIREMENTS: Final = ("motion-memory",)  # given, so that MLflow infers none, which takes seconds
+TOP_K: Final = 5
+MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: others wait meanwhile
+MOST_CORNERS_OF_ONE: Final = 1_000  # making convex pieces of a polygon grows with their square
+_ROWS: Final = Array(Array(DataType.double))
+SIGNATURE: Final = ModelSignature(
+    inputs=Schema([ColSpec(DataType.string, "problem")]),
+    outputs=Schema(
+        [
+            ColSpec(DataType.string, "problem_id"),
+            ColSpec(DataType.long, "rank"),  # from 1
+            ColSpec(DataType.long, "plan"),  # its number in the memory
+            ColSpec(DataType.boolean, "free"),  # it answers the problem: checked exactly
+            ColSpec(DataType.double, "score"),  # the encoder's, higher is better
+            ColSpec(DataType.double, "dt"),  # seconds
+            ColSpec(_ROWS, "states"),  # [T, S] in the problem's own frame
+            ColSpec(_ROWS, "controls"),  # [T - 1, 2]
+        ]
+    ),
+    params=ParamSchema([ParamSpec("top_k", DataType.long, TOP_K)]),
+)
+
+
+class MemoryModel(PythonModel):
+    """Recalls plans; a row of input is a problem as JSON text, a row of output is a plan."""
+
+    def load_context(self, context: PythonModelContext) -> None:
+        """Load and check the archive; a StorageError where it is not as it was written."""
+        self.open(Path(context.artifacts[ARTIFACT]), context.model_config["vehicle"])
+
+    def open(self, archive: Path, vehicle: str) -> None:
+        """The same, of an archive that need not be MLflow's."""
+        self.vehicle = vehicle_named(vehicle)
+        self.memory: Memory = load_memory(archive, self.vehicle)
+        self._turn = Lock()  # kernels draw into buffers of the process, and servers call from many threads
+
+    def predict(
+        self,
+        context: PythonModelContext,
+        model_input: pd.DataFrame,
+        params: dict[str, Any] | None = None,
+    ) -> pd.DataFrame:
+        """The ``top_k`` best plans of each problem, best first; none where the memory says that none fits.
+
+        MlflowException: a problem is malformed or impossible; its message is one line.
+        """
+        return self.plans(model_input, params)
+
+    def plans(self, model_input: pd.DataFrame, params: dict[str, Any] | None = None) -> pd.DataFrame:
+        """``predict`` without MLflow's context."""
+        top_k = (params or {}).get("top_k", TOP_K)
+        if top_k is None or top_k < 1:
+            raise MlflowException(f"top_k is {top_k}: give 1 or more.", INVALID_PARAMETER_VALUE)
+        with self._turn:
+            rows = [
+                row
+                for number, text in enumerate(model_input["problem"], start=1)
+                for row in self._ranked(self._problem(text, number), top_k)
+            ]
+        return pd.DataFrame(rows, columns=SIGNATURE.outputs.input_names())
+
+    def _problem(self, text: object, number: int) -> Problem:
+        try:
+            if not isinstance(text, str):
+                raise ValueError(f"it is {type(text).__name__}, wanted was the text of a JSON object")
+            fields = parse_json(text, "it")
+            _refuse_endless(fields)
+            problem = problem_of(fields, f"problem-{number}", self.vehicle)
+            unfit = scale_fault(self.memory, problem.scale)
+            if unfit is not None:
+                raise ValueError(unfit)
+        except (StorageError, ValueError) as error:
+            raise MlflowException(f"Problem {number}: {error}", INVALID_PARAMETER_VALUE) from None
+        return problem
+
+    def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
+        asked, alignment = to_canonical(problem)
+        memory, scene = self.memory, scene_of(asked)
+        embedding = memory.forward(drawing_of(asked).occupied)
+        known = memory.vectors[1:] @ embedding + memory.biases[1:]
+        rows = []
+        best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
+        for rank, i in enumerate(best, start=1):
+            free, _ = plan_answers(memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
+            aligned = from_canonical(turned(memory.plans[i], asked.start[2]), alignment)
+            plan = scaled(aligned, problem.scale)
+            row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
+            rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
+        return rows
+
+
+def pyfunc_of(model: MemoryModel) -> PyFuncModel:
+    """A model as MLflow would load it, but by the installed code, whatever lies beside its archive."""
+    return PyFuncModel(Model(signature=SIGNATURE), model, predict_fn="plans")
+
+
+def _refuse_endless(fields: object) -> None:
+    """ValueError where polygons have so many corners that everybody else would wait."""
+    polygons = fields.get("obstacles") if isinstance(fields, Mapping) else None
+    corners = [len(each) for each in polygons if isinstance(each, list)] if isinstance(polygons, list) else []
+    if max(corners, default=0) > MOST_CORNERS_OF_ONE or sum(corners) > MOST_CORNERS:
+        raise ValueError(
+            f"obstacles have {sum(corners)} corners, one of them {max(corners)}; at most {MOST_CORNERS} and "
+            f"{MOST_CORNERS_OF_ONE} are taken: simplify them, or use the command `solve`"
+        )
+
+
+def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:
+    """Write an archive and all that MLflow wants to load it as a model into a new folder."""
+    save_model(
+        folder,
+        python_model=str(CODE),
+        artifacts={ARTIFACT: str(archive)},
+        model_config={"vehicle": vehicle},
+        signature=SIGNATURE,
+        input_example=pd.DataFrame({"problem": [json.dumps(fields_of(problem_class("trap").draw(0, 0)))]}),
+        pip_requirements=list(REQUIREMENTS),
+        mlflow_model=model,
+    )

@@ -1,0 +1,200 @@
+"""What a run leaves in MLflow: a parent run, and below it a run for each training and one for the benchmark.
+
+Only the command's own process talks to MLflow. Runs are found by tags, so the same command again adds to what
+is there. MLflow is imported, and its database made, in a background thread: both take seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, Final
+
+from storage.places.data_folder import DataFolder
+from storage.places.files import whole_file
+from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
+from tasks.settings.redaction import redacted
+from tasks.settings.run_settings import UsageError
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+
+EXPERIMENT: Final = "motion-memory"
+RUN_TAG: Final = "motion_memory.run"  # name of the run's folder
+STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
+KEY_TAG: Final = "motion_memory.key"  # what the logged content depends on
+MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was made of its encoder
+MODEL_TAG: Final = "motion_memory.model"  # and the id of that memory's model
+PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
+
+
+def tracking_uri(data: DataFolder) -> str:
+    """Where MLflow is: as the user says, else a database in the data folder.
+
+    UsageError: the data folder is in object storage, where no database can be.
+    """
+    given = os.environ.get("MLFLOW_TRACKING_URI")
+    if not given and data.is_remote:
+        raise UsageError(
+            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
+            "keeps its own (docs/runbook.md)."
+        )
+    return given or f"sqlite:///{data.mlflow_database}"
+
+
+def _make_database(path: Path, artifacts: str) -> None:
+    """Make MLflow's database with all its tables: it stands no kill while it makes them, one by one."""
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    for left in path.parent.glob(f".{path.name}.*"):
+        left.unlink()
+    with whole_file(path) as temporary:
+        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
+        store.engine.dispose()
+
+
+class Tracker:
+    """The runs of one data folder in MLflow."""
+
+    def __init__(self, data: DataFolder) -> None:
+        """Begin to connect; whatever is asked first waits for it."""
+        self.uri = tracking_uri(data)
+        self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._connect, name="mlflow", daemon=True)
+        self._thread.start()
+
+    def _connect(self) -> None:
+        try:
+            from mlflow import MlflowClient
+
+            artifacts = None
+            if self._own is not None:
+                artifacts = self._own.mlflow_artifacts.as_uri()
+                if not self._own.mlflow_database.exists():
+                    _make_database(self._own.mlflow_database, artifacts)
+            client = MlflowClient(self.uri)
+            found = client.get_experiment_by_name(EXPERIMENT)
+            self._experiment = (
+                found.experiment_id if found else client.create_experiment(EXPERIMENT, artifacts)
+            )
+            self._connected = client
+        except Exception as error:  # shown by whoever asks first, in one line
+            self._failure = error
+
+    @property
+    def _client(self) -> MlflowClient:
+        self._thread.join()
+        if self._failure is not None:
+            reason = str(self._failure).partition("\n")[0]
+            raise RuntimeError(redacted(f"MLflow at {self.uri} cannot be used: {reason}")) from self._failure
+        return self._connected
+
+    @contextmanager
+    def run(
+        self, run_name: str, stage: str, tags: Mapping[str, str], parent: str | None = None
+    ) -> Iterator[str]:
+        """Id of the MLflow run of a stage, found again or made; it ends finished, or failed on an error."""
+        client = self._client
+        run_id = self.find(run_name, stage)
+        if run_id is not None:
+            client.update_run(run_id, status="RUNNING")
+        else:
+            own = {RUN_TAG: run_name, STAGE_TAG: stage} | ({PARENT_TAG: parent} if parent else {})
+            name = run_name if stage == "run" else stage
+            run_id = str(client.create_run(self._experiment, tags=own, run_name=name).info.run_id)
+        self.tag(run_id, tags)
+        try:
+            yield run_id
+        except BaseException:
+            client.set_terminated(run_id, "FAILED")
+            raise
+        client.set_terminated(run_id, "FINISHED")
+
+    def find(self, run_name: str, stage: str) -> str | None:
+        """Id of the MLflow run of a stage, if there is one."""
+        asked = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{STAGE_TAG}` = '{stage}'"
+        found = self._client.search_runs([self._experiment], filter_string=asked, max_results=1)
+        return str(found[0].info.run_id) if found else None
+
+    def is_logged(self, run_id: str, key: str, what: str = "content") -> bool:
+        """Whether this content, made from what ``key`` says, is logged already (``mark_logged``)."""
+        return bool(self._client.get_run(run_id).data.tags.get(f"{KEY_TAG}.{what}") == key)
+
+    def mark_logged(self, run_id: str, key: str, what: str = "content") -> None:
+        """Note that the content is logged."""
+        self._client.set_tag(run_id, f"{KEY_TAG}.{what}", key)
+
+    def tag(self, run_id: str, tags: Mapping[str, str]) -> None:
+        """Set tags of a run."""
+        for tag, value in tags.items():
+            self._client.set_tag(run_id, tag, value)
+
+    def logged_memory(self, run_name: str, memory: str, key: str) -> tuple[str, str]:
+        """Ids of the training that a memory came from, and of its model; RuntimeError: it is not logged."""
+        asked = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
+        for run in self._client.search_runs([self._experiment], filter_string=asked):
+            if run.data.tags.get(f"{KEY_TAG}.memory") == key:
+                return str(run.info.run_id), str(run.data.tags[MODEL_TAG])
+        raise RuntimeError(
+            f"Memory {memory} of {run_name} is not in MLflow at {self.uri}; run build-memory again."
+        )
+
+    def parameters(self, run_id: str, values: Mapping[str, Any]) -> None:
+        """Log parameters that the run does not have yet; a run's parameters never change."""
+        from mlflow.entities import Param
+
+        known = self._client.get_run(run_id).data.params
+        new = [Param(name, str(value)[:500]) for name, value in values.items() if name not in known]
+        self._client.log_batch(run_id, params=new)
+
+    def metrics(self, run_id: str, rows: Sequence[Mapping[str, float]], step: str | None = None) -> None:
+        """Log metrics, one row a step; ``step`` names the column that counts them."""
+        from mlflow.entities import Metric
+
+        now = int(time.time() * 1000)
+        entries = [
+            Metric(name, float(value), now, int(row[step]) if step else 0)
+            for row in rows
+            for name, value in row.items()
+            if name != step and value == value  # NaN is no metric
+        ]
+        for first in range(0, len(entries), 1000):  # MLflow's limit a call
+            self._client.log_batch(run_id, metrics=entries[first : first + 1000])
+
+    def artifacts(self, run_id: str, place: Path, under: str | None = None) -> None:
+        """Log a file, or the files of a folder, as artifacts."""
+        for path in [place] if place.suffix else files_in(place, "[!.]*"):
+            if fetch(path).is_file():
+                self._client.log_artifact(run_id, str(path), under)
+
+    def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
+        """Log an archive as the model ``name`` that the run brought forth; the id of the model."""
+        from mlflow.entities import LoggedModelOutput
+        from mlflow.models.model import Model
+
+        from tasks.tracking.memory_model import save_memory_model
+
+        made = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
+        self._client.log_outputs(run_id, [LoggedModelOutput(made.model_id, step=0)])
+        with TemporaryDirectory(prefix="motion-memory-") as scratch:
+            folder = Path(scratch) / name
+            model = Model(made.artifact_location, run_id)
+            model.model_id = model.model_uuid = made.model_id
+            save_memory_model(folder, fetch_folder(archive), vehicle, model)
+            self._client.log_model_artifacts(made.model_id, str(folder))
+        self._client.finalize_logged_model(made.model_id, "READY")
+        return str(made.model_id)
+
+    def dataset(self, run_id: str, name: str, place: Path, digest: str, context: str) -> None:
+        """Log which data went in (``context``: "training", "benchmark")."""
+        from mlflow.entities import Dataset, DatasetInput, InputTag
+
+        source = f'{{"uri": "{uri_of(place)}"}}'
+        entry = Dataset(name, digest, "local", source)
+        self._client.log_inputs(run_id, [DatasetInput(entry, [InputTag("mlflow.data.context", context)])])

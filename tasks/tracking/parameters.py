@@ -1,0 +1,32 @@
+"""A run's settings as flat texts, so that runs can be compared and searched by any of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from tasks.settings.run_settings import RunSettings
+
+
+def parameters_of(settings: RunSettings) -> dict[str, str]:
+    """Each setting under its name; those of ``learning`` and ``retraining`` as ``learning.margin``."""
+    return dict(
+        _leaves("", asdict(settings) | {"hallucination": _shares(settings), "assists": _assists(settings)})
+    )
+
+
+def _leaves(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _leaves(f"{prefix}{name}.", value)
+        elif value is not None:
+            yield prefix + name, ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def _shares(settings: RunSettings) -> list[str]:
+    return [f"{name} {share:.2g}" for name, share in settings.hallucination]
+
+
+def _assists(settings: RunSettings) -> list[str]:
+    return [" ".join(str(part) for part in assist if part) for assist in settings.assists]

@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from rich.console import Console
+
+from dashboards.figures.experience_curve import experience_chart, experience_rows, experience_table
+from tests.dashboards.synthetic import recalls
+
+
+@pytest.fixture
+def rows() -> pd.DataFrame:
+    made = [recalls(("curves", "trap"), plans=plans, protocols=("fresh",)) for plans in (3, 20, 40)]
+    return pd.concat([experience_rows(each) for each in made], ignore_index=True)
+
+
+def test_a_hit_is_the_mean_over_seeds_with_an_interval_over_problems() -> None:
+    given = recalls(("curves",), plans=30, protocols=("fresh",), seeds=2)
+    (row,) = experience_rows(given).to_dict("records")
+    asked = given[given["recall"] == "centroid"]
+    hits = [free[order[:5]].any() for free, order in zip(asked["free"], asked["order"], strict=True)]
+    assert row["hit"] == pytest.approx(np.mean(hits))
+    by_problem = np.array(hits, float).reshape(2, -1).mean(0)
+    means = np.random.default_rng(0).choice(by_problem, (4000, len(by_problem))).mean(1)
+    assert [row["low"], row["high"]] == pytest.approx(np.quantile(means, [0.025, 0.975]), abs=0.02)
+    assert (row["plans"], row["problems"], row["seeds"]) == (30, 60, 2)
+
+
+def test_a_panel_a_class_and_a_line_a_number_of_experiences(rows: pd.DataFrame) -> None:
+    assert [axes.get_title() for axes in experience_chart(rows).axes] == ["curves", "trap"]
+    table = experience_table(rows)
+    assert table.row_count == 3
+    assert [column.header for column in table.columns] == ["experiences", "curves", "trap"]
+    with (console := Console(width=110, record=True)).capture():
+        console.print(table)
+    assert "…" not in console.export_text()

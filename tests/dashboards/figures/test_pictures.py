@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from shapely import Polygon, affinity, box
+
+from dashboards.figures.pictures import Example, draw_plan, footprint_spacing_m, gallery, picture
+from dashboards.figures.style import save
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_GOAL,
+    CANONICAL_START,
+    GOAL_RADIUS,
+    Plan,
+    Problem,
+    obstacles_of,
+    start_state,
+)
+from planners.world.vehicles.bodies import body_count, footprints
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+
+WALL = np.array([[20.0, 30.0], [30.0, 20.0], [31.0, 21.0], [21.0, 31.0]])
+
+
+def problem(*pieces: np.ndarray) -> Problem:
+    obstacles = obstacles_of([[piece] for piece in pieces])
+    return Problem("p-1", "trap", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles)
+
+
+@pytest.fixture(scope="module")
+def straight() -> Plan:
+    """Straight from the start to the goal, through the place of WALL."""
+    controls = np.zeros((190, 2))
+    controls[:20, 0] = 2.0
+    return Plan(simulate(start_state(problem()), controls, CAR), controls)
+
+
+def texts(figure: Figure) -> list[str]:
+    figure.draw_without_rendering()
+    return [found.get_text() for found in figure.findobj(Text)]
+
+
+@given(x=st.floats(-50, 50), y=st.floats(-50, 50), heading=st.floats(-7.0, 7.0))
+def test_footprints_are_the_body_moved_and_turned(x: float, y: float, heading: float) -> None:
+    corners = footprints(np.array([[x, y, heading, 0.0, 0.0]]))[0, 0]
+    body = box(-CAR.rear, -0.5 * CAR.width, CAR.front, 0.5 * CAR.width)
+    turned = affinity.rotate(body, heading, origin=(0.0, 0.0), use_radians=True)
+    moved = affinity.translate(turned, x, y)
+    assert Polygon(corners).symmetric_difference(moved).area < 1e-9
+    assert Polygon(corners).exterior.is_ccw
+
+
+def test_a_plan_in_collision_is_marked_where_it_first_collides(straight: Plan) -> None:
+    figure = gallery([Example(problem(WALL), [straight], None, "closed 1")])
+    marks = [line for line in figure.axes[0].lines if line.get_marker() == "X"]
+    assert len(marks) == 1
+    mark = np.hypot(*np.asarray(marks[0].get_xydata())[0])
+    surface = 51.0 / math.sqrt(2.0) - math.sqrt(0.5)  # the wall's near side, along the diagonal
+    assert surface - CAR.front - 1.0 < mark < surface - CAR.front + 0.5
+    assert any("no plan found" in text for text in texts(figure))
+
+
+def test_a_free_plan_has_no_mark(straight: Plan) -> None:
+    figure = gallery([Example(problem(), [straight], straight, "closed 1")])
+    assert not [line for line in figure.axes[0].lines if line.get_marker() == "X"]
+    assert not any("no plan found" in text for text in texts(figure))
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+def test_every_body_is_drawn_and_every_trailer_hangs_on_the_body_before(vehicle: Vehicle) -> None:
+    controls = np.tile([1.0, 0.1], (30, 1))
+    plan = Plan(simulate(start_state(problem(), vehicle), controls, vehicle), controls)
+    axes = Figure().add_subplot()
+    draw_plan(axes, plan, vehicle=vehicle)
+    (bodies,) = [found for found in axes.collections if isinstance(found, PolyCollection)]
+    states = 1 + 1 + int(plan.length_m / footprint_spacing_m(vehicle))
+    assert len(bodies.get_paths()) == states * body_count(vehicle)
+    bars = [found for found in axes.collections if isinstance(found, LineCollection)]
+    assert len(bars) == (body_count(vehicle) > 1)
+    for bar in bars:
+        hitch = bar.get_segments()[0][1]  # of the first trailer at the start
+        assert hitch == pytest.approx(plan.states[0, :2], abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4, 6])
+def test_a_gallery_shows_every_example(count: int, straight: Plan) -> None:
+    figure = gallery([Example(problem(WALL), [straight], None, f"caption {i}") for i in range(count)])
+    assert sum(text.startswith("caption") for text in texts(figure)) == count
+
+
+def test_an_empty_gallery_says_what_to_do() -> None:
+    assert any("first." in text for text in texts(gallery([])))
+
+
+def test_a_plan_of_one_state_can_be_drawn() -> None:
+    plan = Plan(start_state(problem())[None, :], np.empty((0, 2)))
+    draw_plan(Figure().add_subplot(), plan)
+    draw_plan(Figure().add_subplot(), plan, first_collision=0)
+
+
+def test_a_picture_of_a_problem_is_written_with_and_without_a_plan(tmp_path: Path, straight: Plan) -> None:
+    for name, plan in (("with", straight), ("without", None)):
+        for path in save(picture(problem(WALL), plan, "RRT, none"), tmp_path, name):
+            assert path.stat().st_size > 5000

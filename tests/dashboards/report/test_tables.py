@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import io
+
+import pandas as pd
+import pytest
+from rich.console import Console, RenderableType
+
+from dashboards.report.tables import (
+    FULL_HEADINGS,
+    NOTHING,
+    as_csv,
+    retrieval_markdown,
+    retrieval_table,
+    summary_markdown,
+    summary_table,
+)
+from dashboards.statistics.panels import summarise
+from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_retrieval
+from storage.tables.configurations import Configuration
+from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
+
+ALL = [*STANDARD, *ABLATION, Configuration("open", "hybrid", 5)]
+
+
+def rendered(table: RenderableType) -> list[str]:
+    text = io.StringIO()
+    Console(file=text, width=110).print(table)
+    return text.getvalue().splitlines()
+
+
+def test_the_table_holds_every_planner_configuration_and_class() -> None:
+    seen = set()
+    panel = planner = ""
+    for line in rendered(summary_table(summarise(attempts(configurations=ALL), resamples=10))):
+        words = line.split()
+        if "problems;" in words:
+            panel = words[0].rstrip(",")
+        elif words and words[0] in {"rrt", "gust", "follow"}:
+            planner = words.pop(0)
+        named = " ".join(words)
+        labels = [each.label for each in ALL if named.startswith(f"{each.label} ")]
+        seen |= {(panel, planner, max(labels, key=len))} if labels else set()
+    assert seen == {
+        (name, planner, each.label)
+        for name in ("curves", "random", "trap")
+        for planner in ("rrt", "gust", "follow")
+        for each in ALL
+    }
+
+
+@pytest.mark.parametrize("slowness", [1e-4, 1.0, 1e4])
+def test_the_tables_fit_110_columns_uncut(slowness: float) -> None:
+    rows = attempts(
+        ("multiple_bugtraps",),
+        configurations=[*ALL, Configuration("random-closed", "random", 5)],
+        speed_up=0.3,
+    )
+    rows["planning_seconds"] *= slowness
+    rows["collision_checks"] = (rows["collision_checks"] * slowness).astype(int)
+    retrieval = summarise_retrieval(retrieval_curve(recalls(("multiple_bugtraps",))))
+    for table in (summary_table(summarise(rows, resamples=50)), retrieval_table(retrieval)):
+        lines = rendered(table)
+        assert max(len(line) for line in lines) <= 110
+        assert not any("…" in line for line in lines)
+
+
+def test_what_was_not_attempted_is_seen_to_be_missing(attempt_rows: pd.DataFrame) -> None:
+    missing = (attempt_rows["problem_class"] == "trap") & (attempt_rows["assist"] == "open")
+    text = summary_markdown(summarise(attempt_rows[~missing], resamples=10))
+    trap = text[text.index("### trap") :].splitlines()
+    open_rows = [line for line in trap if "| open" in line]
+    assert len(open_rows) == 9
+    assert all(line.count(NOTHING) == len(FULL_HEADINGS) - 2 for line in open_rows)
+
+
+def test_markdown_columns_are_aligned(attempt_rows: pd.DataFrame, recall_rows: pd.DataFrame) -> None:
+    tables = summary_markdown(summarise(attempt_rows, resamples=10)).split("### ")[1:]
+    tables = [table.split("\n\n", 1)[1] for table in tables]
+    tables.append(retrieval_markdown(summarise_retrieval(retrieval_curve(recall_rows))))
+    for table in tables:
+        bars = [[i for i, letter in enumerate(line) if letter == "|"] for line in table.strip().splitlines()]
+        assert all(each == bars[0] for each in bars)
+
+
+def test_csv_reads_back_unrounded(attempt_rows: pd.DataFrame) -> None:
+    summary = summarise(attempt_rows, resamples=10)
+    back = pd.read_csv(io.StringIO(as_csv(summary)))
+    names = ("panel", "planner", "configuration", "assist", "recall")
+    back = back.fillna({"recall": ""}).astype({name: summary[name].dtype for name in names})
+    pd.testing.assert_frame_equal(back, summary, rtol=1e-15)

@@ -1,0 +1,45 @@
+"""The figures that runs are told apart by: means of what the tables show, under the same names everywhere."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+import pytest
+
+from dashboards.statistics.headline import headline
+from dashboards.statistics.panels import summarise
+from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_retrieval
+from tests.dashboards import synthetic
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[pd.DataFrame, pd.DataFrame, dict[str, float]]:
+    summary = summarise(synthetic.attempts(("curves", "trap"), ("gust",)), resamples=100)
+    retrieval = summarise_retrieval(retrieval_curve(synthetic.recalls(("curves", "trap"))))
+    return summary, retrieval, headline(summary, retrieval)
+
+
+def test_headlines_are_means_of_the_tables(
+    found: tuple[pd.DataFrame, pd.DataFrame, dict[str, float]],
+) -> None:
+    summary, retrieval, figures = found
+    closed = summary[summary["configuration"] == "closed 5 centroid"]
+    assert figures["reduction/closed-5-centroid"] == pytest.approx(closed["reduction"].mean())
+    assert figures["solved/none"] == pytest.approx(
+        summary.loc[summary["configuration"] == "none", "solved"].mean()
+    )
+    fresh = retrieval[(retrieval["protocol"] == "fresh") & (retrieval["recall"] == "centroid")]
+    assert figures["fresh_hit_1"] == pytest.approx(fresh["hit@1"].mean())
+    assert 0.6 < figures["reduction"] < 0.9  # memory was made four times as fast
+
+
+def test_names_do_not_depend_on_what_was_measured_and_no_figure_is_no_number(
+    found: tuple[pd.DataFrame, pd.DataFrame, dict[str, float]],
+) -> None:
+    other = headline(
+        summarise(synthetic.attempts(("random",), ("rrt", "follow")), resamples=100),
+        summarise_retrieval(retrieval_curve(synthetic.recalls(("random",)))),
+    )
+    assert set(other) == set(found[2])
+    assert all(math.isfinite(value) for value in other.values())

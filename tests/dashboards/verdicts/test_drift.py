@@ -1,0 +1,59 @@
+"""Drift: told when hits have fallen, and never of what chance does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dashboards.verdicts.drift import Usefulness, drifts, usefulness
+from storage.tables.configurations import Configuration
+from tests.dashboards.synthetic import attempts
+
+THEN = Usefulness(problems=1_000, hits=800, mean_ms=1.0, median_ms=0.1)
+NAME = "gust open 5 exhaustive"
+
+
+def _fallen(problems: int, hits: int) -> bool:
+    (found,) = drifts("trap/2", {NAME: replace(THEN, problems=problems, hits=hits)}, {NAME: THEN})
+    return found.has_fallen
+
+
+@pytest.mark.parametrize(
+    ("problems", "hits", "fallen"),
+    [
+        (100, 80, False),
+        (100, 100, False),
+        (100, 75, False),
+        (100, 60, True),
+        (1_000, 700, True),
+        (5, 0, False),
+    ],
+)
+def test_hits_have_fallen_where_they_are_significantly_fewer(problems: int, hits: int, fallen: bool) -> None:
+    assert _fallen(problems, hits) is fallen
+
+
+def test_chance_hardly_ever_is_a_drift() -> None:
+    rng = np.random.default_rng(1)
+    drawn = rng.binomial(200, 0.8, 2_000)
+    assert sum(_fallen(200, int(hits)) for hits in drawn) <= 8  # 2 are expected at most
+
+
+def test_only_configurations_that_both_know_are_compared() -> None:
+    rows = attempts(("trap",), ("gust", "rrt"), [Configuration("open", "exhaustive", 5)], problems=30)
+    known = usefulness(rows)
+    assert set(known) == {"gust open 5 exhaustive", "rrt open 5 exhaustive"}
+    assert drifts("trap/2", known, {"follow open 5": THEN}) == []
+    (found,) = drifts("trap/2", {"gust open 5 exhaustive": known["gust open 5 exhaustive"]}, known)
+    assert not found.has_fallen
+    assert found.p_value > 0.4
+    assert found.to_json()["hit_rate"] == found.to_json()["benchmark_hit_rate"]
+
+
+def test_usefulness_counts_recalled_plans() -> None:
+    rows = attempts(("trap",), ("gust",), [Configuration("open", "exhaustive", 5)], problems=30)
+    (found,) = usefulness(rows).values()
+    assert (found.problems, found.hits) == (30, int((rows["source"] == "recalled").sum()))
+    assert found.mean_ms == pytest.approx(1e3 * rows["planning_seconds"].mean())

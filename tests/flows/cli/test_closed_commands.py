@@ -1,0 +1,175 @@
+"""Whole commands: each port is on loopback and in the documented list; a planted secret is found nowhere."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import re
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import httpx
+import pyarrow.parquet as pq
+import pytest
+
+from storage.exchange.problems import fields_of
+from tests.flows.watched import ROOT, Watched, watch
+from tests.tasks.served import JSON, good_request, problem, write_memory
+
+SECRET = "s3cret-of-the-fleet"
+PLANTED = {
+    "MOTION_MEMORY_AUTH": f"robot:{SECRET}",
+    "AWS_SECRET_ACCESS_KEY": f"aws-{SECRET}",
+    "SOME_API_KEY": f"key-{SECRET}",
+    "OF_AN_ADDRESS": f"postgresql://robot:{SECRET}@10.0.0.5/db",
+}
+ELSEWHERE = f"http://robot:{SECRET}@127.0.0.1:9"  # where nobody answers
+IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0", "PREFECT_CLIENT_MAX_RETRIES": "0"}
+TINY = [
+    "--preset", "smoke", "--classes", "random", "--experiences", "3", "--candidates", "3", "--workers", "2",
+    "--problems-per-experience", "6", "--test-problems", "4", "--epochs", "1",
+]  # fmt: skip
+PARTS_OF_ONE = "from tasks import parts; parts.PART_PROBLEMS = 1; from flows.cli.main import main; main()"
+LISTENERS = {  # who a process may be, by command
+    "run": {
+        "server": "Prefect's server",
+        "command": "Dask's scheduler",
+        "child": "Dask's workers and nannies",
+    },
+    "solve": {
+        "server": "Prefect's server",
+        "command": "Dask's scheduler",
+        "child": "Dask's workers and nannies",
+    },
+    "serve-memory": {"command": "the scoring server", "child": "the scoring server"},
+    "servers": {"command": "MLflow's server", "child": "Prefect's server"},
+    "plan": {},
+}
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a memory and problems."""
+    place = tmp_path_factory.mktemp("closed")
+    write_memory(place / "memory")
+    (place / "one.json").write_text(json.dumps(fields_of(problem(0))))
+    lines = [json.dumps(fields_of(problem(i))) for i in range(4)]
+    (place / "many.jsonl").write_text("\n".join(lines))
+    return place
+
+
+def documented(command: str) -> set[str]:
+    """The listeners that the page knows for a command."""
+    page = (ROOT / "docs" / "security.md").read_text()
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if "|" in line]
+    return {row[1] for row in rows if f"`{command}`" in row[0]}
+
+
+def assert_closed(command: str, watched: Watched) -> None:
+    assert SECRET not in watched.output
+    for port in watched.ports:
+        assert ipaddress.ip_address(port.address).is_loopback, (command, port)
+        assert LISTENERS[command][port.process] in documented(command), (command, port)
+
+
+@pytest.mark.timeout(600)  # three commands
+def test_a_run_and_what_it_leaves(place: Path) -> None:
+    data = place / "data"
+    watched = watch(["run", *TINY, "--data", str(data)], place / "run.log", PLANTED)
+    assert watched.code == 0, watched.output[-2000:]
+    assert {port.process for port in watched.ports} == {"server", "command", "child"}
+    assert_closed("run", watched)
+    assert_nowhere_in(data)
+    (memory,) = data.glob("runs/*/memories/random/masks.npy")
+    memory.write_bytes(memory.read_bytes()[:-1] + b"x")  # now a worker's chunk fails
+    failing = watch(["benchmark", *TINY, "--seed", "1", "--data", str(data)], place / "failed.log", PLANTED)
+    assert SECRET not in failing.output
+    unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
+    failed = watch(["report", *TINY, "--data", str(data)], place / "mlflow.log", unreached)
+    assert failed.code == 1
+    assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
+    assert SECRET not in failed.output
+    assert_nowhere_in(data)
+
+
+def test_solving_with_workers(place: Path) -> None:
+    arguments = ["solve", str(place / "many.jsonl"), "--out", str(place / "rows.parquet"), "--workers", "2"]
+    watched = watch(arguments, place / "solve.log", PLANTED, script=PARTS_OF_ONE)
+    assert watched.code == 0, watched.output[-2000:]
+    assert {port.process for port in watched.ports} == {"server", "command", "child"}
+    assert_closed("solve", watched)
+    assert_nowhere_in(place)
+
+
+def test_serving_a_memory(place: Path) -> None:
+    def asked(output: str) -> bool:
+        found = re.search(r"serving  (http://\S+)/invocations.*\naccess", output)
+        if found is None:
+            return False
+        for password in ("wrong", SECRET):
+            for body in (good_request(), b"{"):
+                httpx.post(f"{found[1]}/invocations", content=body, headers=JSON, auth=("robot", password))
+        return True
+
+    arguments = ["serve-memory", str(place / "memory"), "--port", "0"]
+    watched = watch(arguments, place / "serve.log", PLANTED, asked)
+    assert watched.code == 0, watched.output
+    assert {port.process for port in watched.ports} >= {"child"}
+    assert_closed("serve-memory", watched)
+
+
+def test_servers_for_all(place: Path) -> None:
+    answers = []
+
+    def asked(output: str) -> bool:
+        found = re.findall(r"(?:PREFECT_API_URL|MLFLOW_TRACKING_URI)=(\S+)", output)
+        if "Ctrl-C" not in output:
+            return False
+        prefect, mlflow = found
+        search = f"{mlflow}/api/2.0/mlflow/experiments/search?max_results=5"
+        for auth in (None, ("robot", "wrong"), ("robot", SECRET)):
+            answers.append(httpx.get(f"{prefect}/admin/version", auth=auth).status_code)
+            answers.append(httpx.get(search, auth=auth).status_code)
+        answers.append(httpx.get(f"{mlflow}/health").status_code)
+        return True
+
+    ports = ["--prefect-port", "0", "--mlflow-port", "0"]
+    watched = watch(["servers", "--data", str(place / "shared"), *ports], place / "all.log", PLANTED, asked)
+    assert watched.code == 0, watched.output[-2000:]
+    assert answers == [401, 401, 401, 401, 200, 200, 200]
+    assert {port.process for port in watched.ports} >= {"child"}
+    assert_closed("servers", watched)
+    assert_nowhere_in(place / "shared")
+
+
+@pytest.mark.parametrize("debug", ["0", "1"])
+def test_planning_opens_no_port_and_failing_tells_no_secret(place: Path, debug: str) -> None:
+    arguments = ["plan", str(place / "one.json"), "--assist", "open", "--memory", "models:/x@y"]
+    unreached = {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": debug}
+    watched = watch(arguments, place / "plan.log", PLANTED | IMPATIENT | unreached)
+    assert watched.code == 1
+    assert "cannot be had from MLflow at http://***@127.0.0.1:9" in watched.output
+    assert ("Traceback" in watched.output) == (debug == "1")
+    assert watched.ports == set()
+    assert SECRET not in watched.output
+
+
+def assert_nowhere_in(folder: Path) -> None:
+    """Not in any file as it is, nor in what a table or a database holds compressed."""
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    assert files
+    for file in files:
+        try:
+            assert SECRET.encode() not in file.read_bytes(), file
+        except FileNotFoundError:  # a database's journal, by now a part of it
+            continue
+        if file.suffix == ".parquet":
+            table = pq.read_table(file)
+            assert SECRET not in repr((table.schema.metadata, table.to_pylist())), file
+        if file.suffix == ".db":
+            with closing(sqlite3.connect(file)) as database:
+                names = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
+                for (name,) in names:
+                    rows = database.execute(f'SELECT * FROM "{name}"').fetchall()
+                    assert SECRET not in repr(rows), (file, name)

@@ -1,0 +1,136 @@
+"""The command line: wrong use is told in one line on the error stream, with its exit code."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from flows.cli.main import app, call
+from flows.cli.run_options import worker_count
+
+COMMANDS = (
+    "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
+    "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
+    "serve-memory", "servers",
+    "retrain", "serve", "promote", "rollback",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "told"),
+    [
+        (["fly"], 2, 'Unknown command "fly"'),
+        (["run", "--preset", "huge"], 2, "Unknown preset 'huge'. Known: smoke, laptop, paper."),
+        (["run", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["run", "--seed", "x"], 2, "--seed"),
+        (["run", "--seed", "-3"], 2, "Seed -3 is negative"),
+        (["run", "--speed", "3"], 2, "--speed"),
+        (["run", "--data"], 2, "--data"),
+        (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
+        (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
+        (["train", "--objective", "luck"], 2, "Unknown objective 'luck'"),
+        (["train", "--epochs", "0"], 2, "0 epochs: give 1 or more."),
+        (["train", "--hidden", "64", "0"], 2, "give 1 or more."),
+        (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
+        (["collect", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'. Known: car, differential-drive"),
+        (["plan", "p.json", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),
+        (
+            ["run", "--hallucination", "dream"],
+            2,
+            "Unknown hallucination method 'dream'. Known: rearrange",
+        ),
+        (["hallucinate", "--hallucination", "minimal=0"], 2, "'minimal=0': give a weight above 0"),
+        (["solve"], 2, "--problems"),
+        (["plan", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
+        (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),
+        (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
+        (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
+        (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
+        (["plan", "p.json"], 1, "p.json does not exist"),
+        (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),
+        (["optimise", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
+        (["optimise", "p.json", "--clearance-weight", "-1"], 2, "Clearance weight -1.0"),
+        (["optimise", "p.json", "--picture", "p.bmp"], 2, "p.bmp is no picture's name"),
+        (["optimise", "p.json"], 1, "p.json does not exist"),
+        (["solve", "p.json", "--out", "rows.csv"], 2, "rows.csv does not end in .parquet"),
+        (["solve", "p.jsonl", "--out", "rows.parquet"], 1, "p.jsonl does not exist"),
+        (["solve", "p.jsonl", "--out", "rows.parquet", "--workers", "0"], 2, "0 workers: give 1 or more."),
+        (["retrain", "--learned", "monday"], 2, "--learned is not for retraining"),
+        (["retrain", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["serve", "--every", "9", "--cron", "0 3 * * *"], 2, "--every and --cron are given"),
+        (["serve", "--every", "0"], 2, "Every 0 seconds: give 1 or more."),
+        (["promote"], 1, "data is no data folder"),
+        (["rollback", "--data", "nowhere"], 1, "nowhere is no data folder"),
+        (["export", "nowhere", "--format", "xml", "--out", "a.csv"], 2, "Unknown format 'xml'. Known: ompl,"),
+        (["export", "nowhere", "--format", "csv", "--out", "a.db"], 2, "a.db does not end in .csv"),
+        (["export", "nowhere", "--format", "ompl", "--out", "."], 2, ". is there already; give a new folder"),
+        (["export", "nowhere", "--format", "csv", "--out", "a.csv"], 1, "nowhere is no run"),
+        (["verify", "nowhere"], 1, "nowhere is no data folder"),
+        (["verify", "nowhere", "--sample", "2"], 2, "Sample is 2.0"),
+        (["run", "--data", "s3://bucket/data"], 2, "s3://bucket/data can hold no MLflow database"),
+        (["run", "--scheduler", "tcp://10.0.0.5:8786"], 2, "set PREFECT_API_URL"),
+        (["run", "--preset", "smoke", "--data", "/proc/nowhere"], 1, "/proc/nowhere cannot be used"),
+    ],
+)
+def test_wrong_use_is_one_line_and_an_exit_code(
+    arguments: list[str],
+    code: int,
+    told: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call(arguments) == code
+    printed = capsys.readouterr()
+    assert told in printed.err
+    assert printed.err.count("\n") == 1
+    assert printed.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_data_folder_of_another_version_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "motion-memory.json").write_text('{"layout": 99}')
+    assert call(["run", "--preset", "smoke", "--data", str(tmp_path)]) == 1
+    assert "has data layout 99" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call([command, "--help"]) == 0
+    assert command in capsys.readouterr().out
+
+
+def test_the_commands_are_those_of_the_contract() -> None:
+    assert set(COMMANDS) <= {name for name in app if not name.startswith("-")}
+
+
+def test_help_is_quick() -> None:
+    began = time.monotonic()
+    script = "import sys; from flows.cli.main import call; call(['--help']); print('prefect' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert done.stdout.strip().endswith("False")
+    assert time.monotonic() - began < 3.0  # a third of a second on an idle machine
+
+
+def test_without_a_number_there_are_as_many_workers_as_this_process_may_use_cores() -> None:
+    code = "from flows.cli.run_options import worker_count; print(worker_count(None))"
+    command = [sys.executable, "-c", code]
+    core = min(os.sched_getaffinity(0))
+    told = subprocess.run(["taskset", "-c", str(core), *command], capture_output=True, text=True, check=True)
+    assert told.stdout == "1\n"
+    assert 1 <= worker_count(None) <= len(os.sched_getaffinity(0))
+    assert worker_count(7) == 7

@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+
+from planners.search.registry import PLANNERS, plan
+from planners.world.arrays import Floats
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.problem import Plan, obstacles_of, start_state
+from planners.world.randomness import generator
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, Vehicle
+from tests.planners.world.motions import exact_motion
+from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
+
+EMPTY = problem_with(obstacles_of([]))
+
+
+def straight(car: Vehicle, steps: int) -> Plan:
+    """Full speed ahead from the start: some 70 m in 190 steps."""
+    controls = np.zeros((steps, 2))
+    controls[: round(car.max_speed / car.max_acceleration / car.dt), 0] = car.max_acceleration
+    return Plan(simulate(start_state(EMPTY), controls, car), controls)
+
+
+def good_plan() -> Plan:
+    return straight(CAR, 185)
+
+
+def winding_plan(rng: np.random.Generator) -> Plan:
+    """Wheels turned to and fro as far as they go."""
+    controls = np.column_stack((rng.uniform(-0.5, 2.0, 60), np.repeat(rng.uniform(-1.6, 1.6, 12), 5)))
+    return Plan(simulate(start_state(EMPTY), controls, CAR), controls)
+
+
+def kinds(problem_faults: list[str]) -> list[str]:
+    assert all("\n" not in line for line in problem_faults)
+    return [line.split(":")[0] for line in problem_faults]
+
+
+def footprint(pose: Floats) -> Floats:
+    x, y, heading = pose[:3]
+    ahead = 0.5 * (CAR.front - CAR.rear)
+    return box_corners(
+        x + ahead * math.cos(heading), y + ahead * math.sin(heading), heading,
+        0.5 * (CAR.front + CAR.rear), 0.5 * CAR.width,
+    )  # fmt: skip
+
+
+def test_a_good_plan_has_no_faults() -> None:
+    assert faults(EMPTY, good_plan()) == []
+
+
+def test_a_teleport_is_found() -> None:
+    plan_ = good_plan()
+    plan_.states[100:, 0] += 1e-5
+    assert kinds(faults(EMPTY, plan_)) == ["Dynamics"]
+
+
+def test_too_fast_a_car_is_found() -> None:
+    assert kinds(faults(EMPTY, straight(CAR._replace(max_speed=4.5), 170))) == ["Speed"]
+
+
+def test_controls_beyond_the_limits_are_found() -> None:
+    assert kinds(faults(EMPTY, straight(CAR._replace(max_acceleration=4.0), 180))) == ["Acceleration"]
+
+
+def test_a_missed_goal_is_found() -> None:
+    assert kinds(faults(EMPTY, straight(CAR, 160))) == ["Goal"]
+
+
+def test_a_wrong_start_is_found() -> None:
+    states = good_plan().states.copy()
+    states[:, 1] += 0.5
+    assert kinds(faults(EMPTY, Plan(states, good_plan().controls))) == ["Start"]
+
+
+def test_another_time_step_is_found() -> None:
+    assert kinds(faults(EMPTY, replace(good_plan(), dt=0.2))) == ["Time step"]
+
+
+def test_leaving_the_bounds_is_found() -> None:
+    narrow = problem_with(obstacles_of([]), (-7.0, -7.0, 57.0, 50.0))
+    assert kinds(faults(narrow, good_plan())) == ["Bounds"]
+
+
+def test_driving_along_the_bounds_with_a_corner_outside_is_found() -> None:
+    narrow = problem_with(obstacles_of([]), (-7.0, -7.0, 57.0, good_plan().states[:, 1].max() + 0.2))
+    assert kinds(faults(narrow, good_plan())) == ["Bounds"]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_no_number_is_found(value: float) -> None:
+    broken = good_plan()
+    broken.states[50, 2] = value
+    assert kinds(faults(EMPTY, broken)) == ["Numbers"]
+
+
+def test_states_and_controls_that_do_not_fit_are_found() -> None:
+    assert kinds(faults(EMPTY, replace(good_plan(), controls=np.zeros((3, 2))))) == ["Shapes"]
+
+
+@settings(max_examples=20)
+@given(seeds)
+def test_a_thin_wall_across_the_way_is_found(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, y = good_plan().states[rng.integers(20, 185), :2] + rng.uniform(-0.2, 0.2, 2)
+    wall = box_corners(x, y, rng.uniform(-math.pi, math.pi), 5e-4, 0.5)
+    assert kinds(faults(problem_with(obstacles_of([[wall]])), good_plan())) == ["Collision"]
+
+
+@settings(max_examples=30)
+@given(seeds)
+def test_what_is_hit_only_between_two_states_is_found(seed: int) -> None:
+    """A splinter where the body passes, but stands at no state."""
+    rng = np.random.default_rng(seed)
+    winding = winding_plan(rng)
+    wide = (-100.0, -100.0, 100.0, 100.0)
+    bodies = shapely.union_all([shapely.Polygon(footprint(state)) for state in winding.states])
+    for i in rng.permutation(len(winding.controls)):
+        between = exact_motion(winding.states[i], winding.controls[i], np.array([0.5 * CAR.dt]), CAR)[0]
+        for corner in footprint(between):
+            splinter = box_corners(*corner, rng.uniform(-math.pi, math.pi), 1e-4, 1e-4)
+            if shapely.Polygon(splinter).disjoint(bodies):
+                problem = problem_with(obstacles_of([[splinter]]), wide)
+                assert "Collision" in kinds(faults(problem, winding))
+                return
+
+
+@settings(max_examples=50)
+@given(seeds)
+def test_what_the_kernel_calls_free_the_authority_calls_free(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = problem_with(clutter(rng, 12))
+    winding = winding_plan(rng)
+    free = count_free_prefix(winding.states, CAR, scene_of(problem))
+    begun = Plan(winding.states[: max(free, 1)], winding.controls[: max(free - 1, 0)])
+    if free:
+        assert {"Collision", "Bounds"}.isdisjoint(kinds(faults(problem, begun)))
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_plan_that_a_planner_finds_is_good(planner: str, name: str) -> None:
+    for index in range(5):
+        problem = problem_class(name).draw(3, index)
+        found = plan(planner, problem, generator(0, problem.id, planner)).plan
+        assert found is None or faults(problem, found) == []

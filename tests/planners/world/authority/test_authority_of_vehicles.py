@@ -1,0 +1,154 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+
+from planners.world.arrays import Floats
+from planners.world.authority.authority import faults
+from planners.world.authority.authority_equations import Body, bodies_of, simulate_again
+from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.problem import Plan, obstacles_of
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, VEHICLES, Vehicle, state_size
+from tests.planners.world.authority.test_authority import kinds
+from tests.planners.world.motions import exact_motion, gentle_controls, turning_limits
+from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
+
+EMPTY = problem_with(obstacles_of([]))
+WIDE = (-100.0, -100.0, 100.0, 100.0)
+each_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+
+
+def driven(vehicle: Vehicle, controls: Floats) -> Plan:
+    """What the controls make of a vehicle at rest at the canonical start."""
+    start = np.zeros(state_size(vehicle))
+    start[:3] = EMPTY.start
+    return Plan(simulate_again(start, controls, vehicle), controls)
+
+
+def straight(vehicle: Vehicle, steps: int = 185) -> Plan:
+    controls = np.zeros((steps, 2))
+    controls[: round(vehicle.max_speed / vehicle.max_acceleration / vehicle.dt), 0] = vehicle.max_acceleration
+    return driven(vehicle, controls)
+
+
+@each_vehicle
+def test_a_good_plan_has_no_faults(vehicle: Vehicle) -> None:
+    assert faults(EMPTY, straight(vehicle), vehicle) == []
+
+
+@each_vehicle
+def test_a_plan_of_another_vehicle_is_found(vehicle: Vehicle) -> None:
+    """Were it only because the car, turning its wheels, follows other equations than the others."""
+    for other in VEHICLES.values():
+        controls = straight(other).controls.copy()
+        controls[40:45, 1], controls[45:50, 1] = 0.2, -0.2
+        found = kinds(faults(EMPTY, driven(other, controls), vehicle))
+        assert ("Shapes" in found or "Dynamics" in found) == (other != vehicle)
+
+
+@each_vehicle
+def test_turning_too_far_or_too_fast_is_found(vehicle: Vehicle) -> None:
+    most, change = turning_limits(vehicle)
+    freer = {"max_turn_rate": 9.0} if "max_turn_rate" in vehicle._fields else {"max_steering": 1.2}
+    controls = np.zeros((20, 2))
+    controls[:, 1] = 1.3 * change
+    controls[round(1.1 * most / 0.13 / change) :] = 0.0
+    plan = driven(vehicle._replace(**freer), controls)
+    names = (
+        {"Turn rate", "Turn acceleration"}
+        if "max_turn_rate" in vehicle._fields
+        else {"Steering", "Steering rate"}
+    )
+    assert set(kinds(faults(EMPTY, plan, vehicle))) == names
+
+
+def test_a_jack_knifed_trailer_is_found() -> None:
+    plan = straight(CAR_1_TRAILER)
+    controls = plan.controls.copy()
+    controls[25:29, 1] = 1.6  # wheels as far as they go: no hitch angle within the limit keeps up
+    found = kinds(faults(EMPTY, driven(CAR_1_TRAILER, controls), CAR_1_TRAILER))
+    assert "Hitch 1" in found
+
+
+def test_a_trailer_that_does_not_begin_straight_behind_is_found() -> None:
+    plan = straight(CAR_2_TRAILERS)
+    start = plan.states[0].copy()
+    start[6] = 0.1
+    crooked = Plan(simulate_again(start, plan.controls, CAR_2_TRAILERS), plan.controls)
+    assert kinds(faults(EMPTY, crooked, CAR_2_TRAILERS)) == ["Start"]
+
+
+def test_a_trailer_that_does_not_follow_is_found() -> None:
+    plan = straight(CAR_2_TRAILERS)
+    plan.states[90:, 6] += 1e-5
+    assert kinds(faults(EMPTY, plan, CAR_2_TRAILERS)) == ["Dynamics"]
+
+
+def test_an_obstacle_behind_the_car_is_in_the_trailers_way_alone() -> None:
+    behind = box_corners(-1.5, -1.5, 0.0, 0.1, 0.1)
+    problem = problem_with(obstacles_of([[behind]]))
+    assert faults(problem, straight(CAR), CAR) == []
+    (found,) = faults(problem, straight(CAR_1_TRAILER), CAR_1_TRAILER)
+    assert found.startswith("Collision: the trailer 1's footprint")
+
+
+def test_a_trailer_that_stands_out_of_the_bounds_is_found() -> None:
+    problem = problem_with(obstacles_of([]), (-1.5, -1.5, 57.0, 57.0))
+    assert faults(problem, straight(CAR), CAR) == []
+    assert kinds(faults(problem, straight(CAR_1_TRAILER), CAR_1_TRAILER)) == ["Bounds"]
+
+
+@each_vehicle
+@pytest.mark.parametrize("seed", range(4))
+def test_what_any_body_hits_only_between_two_states_is_found(vehicle: Vehicle, seed: int) -> None:
+    """A splinter where a body passes, but none stands at any state."""
+    rng = np.random.default_rng(seed)
+    winding = driven(vehicle, gentle_controls(rng, 80, vehicle))
+    bodies = bodies_of(winding.states, winding.controls, vehicle)
+    standing = shapely.union_all([polygon for body in bodies for polygon in _polygons(body)])
+    met = set()
+    for i in rng.permutation(len(winding.controls)):
+        between = exact_motion(winding.states[i], winding.controls[i], np.array([0.5 * vehicle.dt]), vehicle)
+        for name, corners in _corners(between, vehicle):
+            if name in met:
+                continue
+            for corner in corners:
+                splinter = box_corners(*corner, rng.uniform(-3.0, 3.0), 1e-4, 1e-4)
+                if shapely.Polygon(splinter).disjoint(standing):
+                    problem = problem_with(obstacles_of([[splinter]]), WIDE)
+                    found = faults(problem, winding, vehicle)
+                    assert any(name in line for line in found if line.startswith("Collision"))
+                    met.add(name)
+                    break
+    assert "vehicle" in met
+
+
+@each_vehicle
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds)
+def test_what_the_kernel_calls_free_the_authority_calls_free(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    problem = problem_with(clutter(rng, 12))
+    winding = driven(vehicle, gentle_controls(rng, 120, vehicle))
+    free = count_free_prefix(winding.states, vehicle, scene_of(problem))
+    begun = Plan(winding.states[: max(free, 1)], winding.controls[: max(free - 1, 0)])
+    if free:
+        assert {"Collision", "Bounds"}.isdisjoint(kinds(faults(problem, begun, vehicle)))
+
+
+def _corners(states: Floats, vehicle: Vehicle) -> list[tuple[str, Floats]]:
+    return [
+        (body.name, np.array(polygon.exterior.coords[:4]))
+        for body in bodies_of(states, np.empty((len(states) - 1, 2)), vehicle)
+        for polygon in _polygons(body)
+    ]
+
+
+def _polygons(body: Body) -> list[shapely.Polygon]:
+    headings = np.arctan2(body.along[:, 1], body.along[:, 0])
+    return [
+        shapely.Polygon(box_corners(x, y, heading, body.half_length, body.half_width))
+        for (x, y), heading in zip(body.centres, headings, strict=True)
+    ]

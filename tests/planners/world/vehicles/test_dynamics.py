@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from planners.world.vehicles import dynamics
+from planners.world.vehicles.bodies import body_count, footprints
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle, state_size
+from tests.planners.world.kernels import admissible, step, swept_bodies
+from tests.planners.world.motions import (
+    exact_motion,
+    gentle_controls,
+    often_at,
+    random_controls,
+    random_state,
+    turning_limits,
+)
+from tests.planners.world.strategies import seeds
+
+each_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+
+
+@each_vehicle
+@settings(max_examples=100, deadline=None)
+@given(seed=seeds)
+def test_a_step_follows_the_differential_equations(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, vehicle)
+    controls = random_controls(rng, state, vehicle)
+    exact = exact_motion(state, controls, np.array([vehicle.dt]), vehicle)[0]
+    assert (
+        np.abs(np.array(step(tuple(state), *controls, vehicle)) - exact).max() < 5e-5
+    )  # m, rad: RK4's error
+
+
+@each_vehicle
+def test_many_steps_stay_with_the_differential_equations(vehicle: Vehicle) -> None:
+    state = np.zeros(state_size(vehicle))
+    controls = gentle_controls(np.random.default_rng(1), 200, vehicle)
+    states = simulate(state, controls, vehicle)
+    for i, control in enumerate(controls):
+        state = exact_motion(state, control, np.array([vehicle.dt]), vehicle)[0]
+        assert np.abs(states[i + 1] - state).max() < 1e-5
+    assert math.hypot(*state[:2]) > 20.0
+
+
+@each_vehicle
+def test_the_error_falls_with_the_fourth_power_of_the_time_step(vehicle: Vehicle) -> None:
+    state = np.zeros(state_size(vehicle))
+    state[3:5] = 1.0, 0.2
+    state[5:] = 0.3
+    controls = np.array([0.7, 0.3])
+    exact = exact_motion(state, controls, np.array([0.8]), vehicle)[0]
+    errors = []
+    for steps in (4, 8, 16):
+        finer = vehicle._replace(dt=0.8 / steps)
+        errors.append(np.abs(simulate(state, np.tile(controls, (steps, 1)), finer)[-1] - exact).max())
+    assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([4.0, 4.0], abs=0.35)
+
+
+@each_vehicle
+@settings(max_examples=100, deadline=None)
+@given(seed=seeds)
+def test_the_margin_bounds_half_the_way_of_every_point_of_each_body(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, vehicle)
+    controls = random_controls(rng, state, vehicle)
+    end = step(tuple(state), *controls, vehicle)
+    motion = exact_motion(state, controls, np.linspace(0.0, vehicle.dt, 21), vehicle)
+    ways = np.linalg.norm(np.diff(footprints(motion, vehicle), axis=0), axis=3).sum(axis=0).max(axis=1)
+    widths = [vehicle.width] + [getattr(vehicle, "trailer_width", 0.0)] * (body_count(vehicle) - 1)
+    for at in (tuple(state), end):
+        for box, width, way in zip(swept_bodies(at, vehicle), widths, ways, strict=True):
+            assert way <= 2.0 * (box[5] - 0.5 * width) + 1e-9
+
+
+@each_vehicle
+@settings(max_examples=100, deadline=None)
+@given(seed=seeds)
+def test_swept_bodies_lie_around_the_footprints(vehicle: Vehicle, seed: int) -> None:
+    state = random_state(np.random.default_rng(seed), vehicle)
+    for box, corners in zip(
+        swept_bodies(tuple(state), vehicle), footprints(state[np.newaxis], vehicle)[0], strict=True
+    ):
+        assert box[:2] == pytest.approx(corners.mean(axis=0), abs=1e-9)
+        along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
+        assert box[2:4] == pytest.approx(along, abs=1e-9)
+        assert box[4] - 0.5 * np.linalg.norm(corners[1] - corners[0]) == pytest.approx(
+            box[5] - 0.5 * np.linalg.norm(corners[2] - corners[1]), abs=1e-9
+        )
+
+
+@each_vehicle
+@settings(max_examples=100, deadline=None)
+@given(seed=seeds)
+def test_admissible_controls_lead_past_no_limit_and_are_otherwise_as_asked(
+    vehicle: Vehicle, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, vehicle)
+    most, change = turning_limits(vehicle)
+    asked = often_at(rng, -vehicle.max_acceleration, vehicle.max_acceleration), often_at(rng, -change, change)
+    first, second = admissible(tuple(state), *asked, vehicle)
+    speed, turning = state[3:5] + vehicle.dt * np.array([first, second])
+    assert vehicle.min_speed - 1e-12 <= speed <= vehicle.max_speed + 1e-12
+    assert abs(turning) <= most + 1e-12
+    if vehicle.min_speed <= state[3] + vehicle.dt * asked[0] <= vehicle.max_speed:
+        assert first == pytest.approx(asked[0], abs=1e-12)
+    if abs(state[4] + vehicle.dt * asked[1]) <= most:
+        assert second == pytest.approx(asked[1], abs=1e-12)
+
+
+@each_vehicle
+def test_simulating_is_stepping_again_and_again(vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(7)
+    start = random_state(rng, vehicle)
+    controls = np.array([random_controls(rng, start, vehicle) for _ in range(10)])
+    states = simulate(start, controls, vehicle)
+    assert states[0] == pytest.approx(start, abs=0.0)
+    for before, control, after in zip(states[:-1], controls, states[1:], strict=True):
+        assert tuple(after) == step(tuple(before), *control, vehicle)
+
+
+@each_vehicle
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds)
+def test_kernels_equal_their_python_functions(vehicle: Vehicle, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, vehicle)
+    controls = random_controls(rng, state, vehicle)
+    now = tuple(state)
+    assert step(now, *controls, vehicle) == pytest.approx(dynamics.step(now, *controls, vehicle), abs=1e-13)
+    for ours, theirs in zip(swept_bodies(now, vehicle), dynamics.swept_bodies(now, vehicle), strict=True):
+        assert ours == pytest.approx(theirs, abs=1e-13)

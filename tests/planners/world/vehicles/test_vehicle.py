@@ -1,0 +1,75 @@
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from planners.world.authority.authority_equations import bodies_of
+from planners.world.vehicles.vehicle import (
+    CAR,
+    CAR_1_TRAILER,
+    VEHICLES,
+    CarWithTrailers,
+    Vehicle,
+    control_names,
+    name_of,
+    state_names,
+    state_size,
+    vehicle_named,
+)
+from tests.planners.world.strategies import box_corners
+
+TRAILERS = [vehicle for vehicle in VEHICLES.values() if isinstance(vehicle, CarWithTrailers)]
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_a_vehicle_is_found_by_its_name_and_named(name: str) -> None:
+    assert name_of(vehicle_named(name)) == name
+
+
+def test_a_vehicle_with_settings_of_its_own_is_called_by_them() -> None:
+    assert "max_speed=9.0" in name_of(CAR._replace(max_speed=9.0))
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match="car, differential-drive, car-1-trailer, car-2-trailers"):
+        vehicle_named("tram")
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+def test_states_begin_with_the_leading_bodys_pose_and_speed(vehicle: Vehicle) -> None:
+    assert state_names(vehicle)[:4] == ("x", "y", "heading", "speed")
+    assert state_size(vehicle) == len(state_names(vehicle))
+    assert control_names(vehicle)[0] == "acceleration"
+
+
+@pytest.mark.parametrize("vehicle", TRAILERS, ids=name_of)
+def test_within_the_largest_hitch_angle_no_two_bodies_touch(vehicle: CarWithTrailers) -> None:
+    angles = np.linspace(-vehicle.max_hitch, vehicle.max_hitch, 41)
+    for hitches in itertools.product(angles, repeat=len(vehicle.hitch_lengths)):
+        state = np.array([[0.0, 0.0, 0.3, 0.0, 0.0, *hitches]])
+        polygons = [
+            shapely.Polygon(
+                box_corners(
+                    *body.centres[0], math.atan2(*body.along[0][::-1]), body.half_length, body.half_width
+                )
+            )
+            for body in bodies_of(state, np.empty((0, 2)), vehicle)
+        ]
+        gaps = [one.distance(other) for one, other in itertools.combinations(polygons, 2)]
+        assert min(gaps) > 0.05  # metres; between two states a hitch angle may swing out by a little more
+
+
+def test_jack_knifed_the_trailer_does_meet_the_car() -> None:
+    """So the largest hitch angle is needed."""
+    state = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 2.6]])
+    car, trailer = (
+        shapely.Polygon(
+            box_corners(*body.centres[0], math.atan2(*body.along[0][::-1]), body.half_length, body.half_width)
+        )
+        for body in bodies_of(state, np.empty((0, 2)), CAR_1_TRAILER)
+    )
+    assert car.intersects(trailer)

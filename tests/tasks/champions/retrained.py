@@ -1,0 +1,79 @@
+"""Retraining in this process, without Prefect and Dask: what ``flows.retrain`` does, chunk by chunk."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+from planners.solve import Attempt, solve
+from planners.world.classes.problem_classes import problem_class
+from planners.world.vehicles.vehicle import CAR
+from storage.places.data_folder import open_data_folder
+from tasks.champions.conclude import conclude
+from tasks.champions.new_experience import rounds
+from tasks.inputs.learned_on_the_job import Solved, remember
+from tasks.registry.champion_registry import Registry
+from tasks.reports.report import report_retrieval
+from tasks.settings.run_settings import Assist, RunSettings, for_preset
+from tasks.stages import judge
+from tasks.stages.build_memory import build_chunk, memory_chunks
+from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
+from tasks.stages.measure_recall import recall_chunk, recall_chunks
+from tasks.stages.train import train_chunk, train_chunks
+from tasks.tracking.logbook import log_memories, log_training, run_logged
+from tests.tasks.collected import collect
+
+CLASS: Final = "curves"
+SETTINGS: Final = replace(
+    for_preset("smoke", classes=[CLASS], seed=3, planners=["gust"]),
+    experiences=8,
+    candidates=8,  # so that the first champion is no good choice, and learning pays
+    problems_per_experience=40,
+    test_problems=50,
+    epochs=4,
+    assists=(Assist("closed", 5), Assist("closed", 1, "centroid")),
+    continual="none",
+)
+
+
+def make(data: str, settings: RunSettings) -> None:
+    """Every stage of a run up to what a judgement needs."""
+    collect(data, settings)
+    for chunk in hallucination_chunks(data, settings):
+        hallucinate_chunk(chunk)
+    training = train_chunks(data, settings)
+    log_training(data, settings, training, [train_chunk(chunk) for chunk in training])
+    built = memory_chunks(data, settings)
+    results = [build_chunk(chunk) for chunk in built]
+    for chunk in recall_chunks(data, settings):
+        recall_chunk(chunk)
+    log_memories(data, settings, built, results, report_retrieval(data, settings))
+    for chunk in judge.plan_chunks(data, settings):
+        judge.check_plans_chunk(chunk)
+    for chunk in judge.judge_chunks(data, settings):
+        if not judge.is_judged(chunk):
+            judge.judge_chunk(chunk)
+
+
+def retrain(data: str, settings: RunSettings = SETTINGS, approve: bool = False) -> list[RunSettings]:
+    """Retrain once; the settings of the runs that were made."""
+    folder = open_data_folder(data)
+    registry = Registry(folder)
+    made = rounds(folder, settings, registry)
+    for each in made:
+        with run_logged(data, each.settings):
+            make(data, each.settings)
+            conclude(data, each, registry, approve)
+    return [each.settings for each in made]
+
+
+def timed_by_work(*asked: Any, **named: Any) -> Attempt:
+    """An attempt whose time is what it did: a busy machine's clock would decide who is champion."""
+    attempt = solve(*asked, **named)
+    return replace(attempt, planning_seconds=1e-6 * (10 + attempt.collision_checks))
+
+
+def learn(data: str, seed: int, count: int) -> None:
+    """Solve problems of the class on the job."""
+    problems = [problem_class(CLASS).draw(seed, index) for index in range(count)]
+    remember(open_data_folder(data).path, [Solved(each, solve(each, "follow")) for each in problems], CAR)

@@ -1,0 +1,120 @@
+"""Champions in a real registry: who changes them, when, and who may not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from storage.archives.memories import save_memory
+from storage.places.data_folder import open_data_folder
+from tasks.champions.promote import promote, promote_awaiting, roll_back
+from tasks.registry.champion_registry import AWAITING, CHALLENGER, FIRST, PROMOTED, Registry, Version
+from tasks.settings.run_settings import RunError
+from tests.storage.samples import a_memory
+
+NAME = "motion-memory-trap"
+pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
+    "ignore:.*type hint:UserWarning",
+    "ignore:Operation with range",
+    "ignore::DeprecationWarning",
+    "ignore::FutureWarning",
+    "ignore::ResourceWarning",
+)
+
+
+class Registered:
+    """A data folder with one logged memory, of which any number of versions can be made."""
+
+    def __init__(self, place: Path) -> None:
+        from tasks.tracking.mlflow_runs import Tracker
+
+        self.data = place / "data"
+        folder = open_data_folder(self.data)
+        save_memory(place / "archive", a_memory(3))
+        tracker = Tracker(folder)
+        with tracker.run("r", "train trap", {}) as self.run_id:
+            self.model_id = tracker.memory(self.run_id, "memory", place / "archive", "car")
+        self.registry = Registry(folder)
+
+    def version(self, key: str, **tags: Any) -> Version:
+        tags = {"memory": "trap"} | tags
+        return self.registry.register(NAME, self.run_id, self.model_id, key, tags, "told")
+
+    @property
+    def champion(self) -> int | None:
+        found = self.registry.aliased(NAME)
+        return found and found.number
+
+
+@pytest.fixture
+def registered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Registered:
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    return Registered(tmp_path)
+
+
+def test_a_registry_that_is_not_there_holds_nothing_and_is_not_made(tmp_path: Path) -> None:
+    folder = open_data_folder(tmp_path / "data")
+    registry = Registry(folder)
+    assert (registry.names(), registry.versions(NAME), registry.aliased(NAME)) == ([], [], None)
+    assert not folder.mlflow_database.exists()
+
+
+def test_champions_change_by_promotion_and_back_and_no_other_way(
+    registered: Registered, capsys: pytest.CaptureFixture[str]
+) -> None:
+    registry, data = registered.registry, registered.data
+    first = registered.version("one", verdict=FIRST)
+    assert registered.champion is None
+    registry.point(first)
+    second = registered.version("two", against=1, retraining=1)
+    assert registered.version("two", against=1, retraining=1) == second  # the same again is no other
+    assert [each.number for each in registry.versions(NAME)] == [1, 2]
+    promote(registry, second)
+    promote(registry, second)
+    assert registered.champion == 2
+
+    late = registered.version("three", against=1, retraining=2)
+    with pytest.raises(RunError, match="judged against version 1, but the champion is version 2 now"):
+        promote(registry, late)
+    with pytest.raises(RunError, match="no challenger awaits approval"):
+        promote_awaiting(data, None)
+    waiting = registered.version("four", against=2, retraining=3, verdict=AWAITING)
+    registry.point(waiting, CHALLENGER)
+    assert registered.champion == 2
+    promote_awaiting(data, "trap")
+    assert registered.champion == 4
+    assert registry.aliased(NAME, CHALLENGER) is None
+    assert registry.versions(NAME)[-1].tag("verdict") == PROMOTED
+
+    roll_back(data, None)
+    assert registered.champion == 2
+    roll_back(data, NAME)
+    assert registered.champion == 1
+    for memory in (None, "trap"):
+        with pytest.raises(RunError, match="nothing to roll back to"):
+            roll_back(data, memory)
+    with pytest.raises(RunError, match=r"No memory 'curves' in the registry. Known: motion-memory-trap"):
+        roll_back(data, "curves")
+    assert registered.champion == 1
+    assert "version 1 is champion again, was 2" in capsys.readouterr().out
+
+
+def test_a_challenger_whose_champion_was_rolled_back_is_not_approved(registered: Registered) -> None:
+    registry = registered.registry
+    registry.point(registered.version("one", verdict=FIRST))
+    promote(registry, registered.version("two", against=1, retraining=1))
+    waiting = registered.version("three", against=2, retraining=2, verdict=AWAITING)
+    registry.point(waiting, CHALLENGER)
+    roll_back(registered.data, None)
+    with pytest.raises(RunError, match="judged against version 2, but the champion is version 1 now"):
+        promote_awaiting(registered.data, None)
+    assert registered.champion == 1
+
+
+def test_where_there_is_no_data_nothing_is_made(tmp_path: Path) -> None:
+    for change in (roll_back, promote_awaiting):
+        with pytest.raises(RunError, match="is no data folder"):
+            change(tmp_path / "nowhere", None)
+    assert not (tmp_path / "nowhere").exists()

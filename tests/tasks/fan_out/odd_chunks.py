@@ -1,0 +1,81 @@
+"""Chunks that misbehave, for the test of the fan-out; run as a script it prints what came of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from tasks.servers.prefect_server import local_server
+from tasks.settings.run_settings import ASSISTS, RunSettings
+
+SETTINGS = RunSettings(
+    "smoke", ("curves",), (), "standard", 1, "labels", 6, 20, 20, "rrt", ("rrt",), ASSISTS, 2, False
+)
+
+
+def odd_chunk(chunk: Any) -> dict[str, Any]:
+    """Do as the class name says; count how often each chunk was done."""
+    folder = Path(chunk.data)
+    if chunk.class_name == "failing" and chunk.index == 2:
+        raise ValueError("this is no chunk\nand here is more")
+    if chunk.class_name == "deadly" and chunk.index == 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if chunk.class_name == "killed" and chunk.index == 1 and not (folder / "once").exists():
+        (folder / "once").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if chunk.class_name == "environment":
+        return {
+            "index": {name: value for name, value in os.environ.items() if name.startswith(("MALLOC", "OMP"))}
+        }
+    time.sleep(0.05 * (4 - chunk.index % 4))  # later ones are ready earlier
+    with (folder / f"{chunk.class_name}-{chunk.index}").open("a") as done:
+        done.write("x")
+    return {"index": chunk.index}
+
+
+def main(data: Path) -> None:
+    """Print one JSON object: what each fan-out gave, or the error it ended with."""
+    with local_server(data) as server:
+        from prefect import flow
+
+        from tasks.fan_out import fan_out as engine
+        from tasks.fan_out.stage import Chunk, chunk_task, chunks_of
+
+        work = chunk_task(odd_chunk)
+
+        @flow(task_runner=engine.task_runner())
+        def go(name: str, is_done: Any) -> list[Any]:
+            chunks = chunks_of(str(data), SETTINGS, "odd", name, 8, 1, [])
+            return [result["index"] for result in engine.fan_out(work, chunks, f"{name} test", is_done)]
+
+        def is_there(chunk: Chunk) -> bool:
+            return (data / f"{chunk.class_name}-{chunk.index}").exists()
+
+        found: dict[str, Any] = {}
+        with engine.cluster(2):
+            if server is not None:
+                server.wait()
+            found["plain"] = go("plain", is_there)
+            found["again"] = go("plain", is_there)
+            (data / "plain-5").write_text("")
+            found["one lost"] = go("plain", lambda chunk: chunk.index != 5)
+            found["killed"] = go("killed", is_there)
+            found["environment"] = go("environment", is_there)
+            for name in ("failing", "deadly"):
+                try:
+                    go(name, is_there)
+                except engine.ChunkError as error:
+                    found[name] = str(error)
+        counts = [len((data / f"plain-{i}").read_text()) for i in range(8)]
+        print(json.dumps(found | {"counts": counts}))
+
+
+if __name__ == "__main__":
+    from storage.places.data_folder import open_data_folder
+
+    main(open_data_folder(sys.argv[1]).path)

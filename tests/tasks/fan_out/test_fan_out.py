@@ -1,0 +1,68 @@
+"""The fan-out: results in order, nothing done twice, killed workers replaced, failures in one line."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> dict[str, Any]:
+    """What ``odd_chunks.py`` prints; a process of its own, since Prefect reads its settings when imported.
+
+    Made once for all processes of the tests.
+    """
+    shared = tmp_path_factory.getbasetemp()
+    shared = shared if worker_id == "master" else shared.parent
+    with (shared / "odd-chunks.json").open("a+") as printed:
+        fcntl.flock(printed, fcntl.LOCK_EX)
+        printed.seek(0)
+        text = printed.read()
+        if not text:
+            data = shared / "odd-chunks"
+            data.mkdir()
+            environment = {
+                name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")
+            }
+            environment["PYTHONPATH"] = str(ROOT)
+            script = [sys.executable, str(Path(__file__).with_name("odd_chunks.py")), str(data)]
+            done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=200)
+            assert done.returncode == 0, done.stderr
+            text = done.stdout
+            printed.write(text)
+    result: dict[str, Any] = json.loads(text)
+    return result
+
+
+def test_results_come_in_the_order_of_the_chunks(found: dict[str, Any]) -> None:
+    assert found["plain"] == list(range(8))
+
+
+def test_what_is_done_is_not_done_again_unless_its_shard_is_gone(found: dict[str, Any]) -> None:
+    assert found["again"] == found["one lost"] == list(range(8))
+    assert found["counts"] == [1] * 8  # the fifth was emptied before it was done again
+
+
+def test_a_killed_worker_costs_no_chunk(found: dict[str, Any]) -> None:
+    assert found["killed"] == list(range(8))
+
+
+def test_workers_are_one_thread_and_keep_freed_memory_for_the_next_batch(found: dict[str, Any]) -> None:
+    assert found["environment"] == [{"OMP_NUM_THREADS": "1"}] * 8
+
+
+def test_a_failing_chunk_is_told_in_one_line(found: dict[str, Any]) -> None:
+    assert found["failing"] == "failing test: chunk 2 of failing failed: this is no chunk"
+
+
+def test_a_chunk_that_kills_three_workers_is_the_culprit(found: dict[str, Any]) -> None:
+    assert found["deadly"].startswith("deadly test: chunk 2 of deadly ended 3 worker processes")

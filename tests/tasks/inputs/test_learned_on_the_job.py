@@ -1,0 +1,78 @@
+"""What is learned on the job is among the candidates of who asks for it, and the same for equal settings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from planners.memory.plans.experience import Experience
+from planners.solve import solve
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR
+from storage.errors import StorageError
+from storage.tables.experiences import read_experiences
+from tasks.fan_out.stage import run_folder
+from tasks.inputs.learned_on_the_job import Solved, remember, with_learned
+from tasks.settings.run_settings import RunSettings, for_preset
+from tests.tasks.collected import collect
+
+SETTINGS = replace(
+    for_preset("smoke", classes=["curves"], difficulty="easy", seed=5),
+    experiences=3,
+    candidates=4,
+    test_problems=2,
+)
+
+
+def _solved(problem: Problem) -> Solved:
+    return Solved(problem, solve(problem, "gust"))
+
+
+@pytest.fixture(scope="module")
+def solved() -> list[Solved]:
+    return [_solved(problem_class("curves", "easy").draw(12, index)) for index in range(5)]
+
+
+def _candidates(data: Path, settings: RunSettings) -> list[Experience]:
+    run = run_folder(str(data), settings)
+    return [each for path in run.shards("learned", "curves") for each in read_experiences(path)]
+
+
+def test_what_was_learned_is_chosen_among(tmp_path: Path, solved: list[Solved]) -> None:
+    assert remember(tmp_path, solved, CAR) == len(solved)
+    settings = with_learned(SETTINGS, tmp_path, "monday")
+    assert settings.run_name != SETTINGS.run_name
+    collect(str(tmp_path), settings)
+    learned = _candidates(tmp_path, settings)
+    assert {each.problem.id for each in learned} == {problem.id for problem, _ in solved}
+    assert not any(fault for each in learned for fault in faults(each.problem, each.plan, CAR))
+    kept = read_experiences(run_folder(str(tmp_path), settings).experiences("curves"))
+    assert len(kept) == SETTINGS.experiences
+
+
+def test_a_name_means_the_same_after_more_was_learned(tmp_path: Path, solved: list[Solved]) -> None:
+    remember(tmp_path, solved[:2], CAR)
+    before = with_learned(SETTINGS, tmp_path, "monday")
+    remember(tmp_path, solved[2:], CAR)
+    assert with_learned(SETTINGS, tmp_path, "monday") == before
+    assert with_learned(SETTINGS, tmp_path, "tuesday").digest != before.digest
+    assert RunSettings.from_json(before.to_json()) == before
+
+
+def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, solved: list[Solved]) -> None:
+    asked = problem_class("curves", "easy").draw(2 * SETTINGS.seed + 1, 1)
+    remember(tmp_path, [*solved[:1], _solved(asked)], CAR)
+    settings = with_learned(SETTINGS, tmp_path, "now")
+    collect(str(tmp_path), settings)
+    assert [each.problem.id for each in _candidates(tmp_path, settings)] == [solved[0].problem.id]
+
+
+def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) -> None:
+    again = [Solved(problem, replace(attempt, source="recalled")) for problem, attempt in solved]
+    assert remember(tmp_path, again, CAR) == 0
+    with pytest.raises(StorageError, match="holds nothing that was learned"):
+        with_learned(SETTINGS, tmp_path, "now")

@@ -1,0 +1,88 @@
+"""Comparing folders of runs: what is told, what is written, what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from storage.errors import StorageError
+from storage.places.data_folder import RunFolder
+from storage.places.files import write_json
+from storage.tables.attempts import write_attempts
+from tasks.reports.compare import compare
+from tasks.settings.run_settings import RunSettings, UsageError, for_preset
+from tests.storage.tables.test_tables import ATTEMPT
+
+
+def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p") -> Path:
+    run = RunFolder(place)
+    write_json(run.settings, json.loads(settings.to_json()))
+    rows = [
+        {
+            **ATTEMPT,
+            "problem_id": f"{problem}-{i}",
+            "planning_seconds": seconds if assist == "closed" else 0.1,
+            "assist": assist,
+            "top_k": 5 if assist == "closed" else 0,
+            "recall": "centroid" if assist == "closed" else None,
+            "memory": "curves" if assist == "closed" else None,
+        }
+        for i in range(9)
+        for assist in ("none", "closed")
+    ]
+    write_attempts(run.shard("results", "curves", 0), rows)
+    return place
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> list[Path]:
+    labels = for_preset("smoke")
+    triplet = replace(labels, objective="triplet", learning=replace(labels.learning, margin=2.0))
+    return [_run(tmp_path / "one", labels, 0.02), _run(tmp_path / "two", triplet, 0.01)]
+
+
+def test_runs_are_compared_and_what_differs_is_said(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for ending in ("json", "md", "csv"):
+        compare(runs, tmp_path / f"c.{ending}")
+    said = capsys.readouterr().out
+    assert "two against one: 1 faster, 0 slower, 0 open of 1 configurations" in said
+    found = json.loads((tmp_path / "c.json").read_text())
+    assert found["settings"] == {
+        "objective": {"one": '"labels"', "two": '"triplet"'},
+        "learning.margin": {"one": "1.0", "two": "2.0"},
+    }
+    (closed,) = [row for row in found["runs"]["two"] if row["configuration"] == "closed 5 centroid"]
+    assert closed["reduction"] == pytest.approx(0.5)
+    assert closed["verdict"] == "faster"
+    assert "50 [  50,   50]" in (tmp_path / "c.md").read_text()
+    with (tmp_path / "c.csv").open(newline="") as text:
+        assert [(row["run"], row["first"]) for row in csv.DictReader(text)] == [("two", "one")] * 2
+
+
+def test_runs_of_one_name_are_told_apart_by_their_paths(
+    runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "other").mkdir()
+    runs[1].rename(tmp_path / "other" / "one")
+    compare([runs[0], tmp_path / "other" / "one"], None)
+    assert f"{tmp_path / 'other' / 'one'}" in capsys.readouterr().out.replace("\n", "")
+
+
+def test_what_cannot_be_compared_is_told_and_nothing_written(runs: list[Path], tmp_path: Path) -> None:
+    strange = _run(tmp_path / "three", for_preset("smoke"), 0.01, problem="q")
+    out = tmp_path / "c.md"
+    with pytest.raises(UsageError, match="1 run to compare"):
+        compare(runs[:1], out)
+    with pytest.raises(UsageError, match=r"ends in none of \.md, \.json, \.csv"):
+        compare(runs, tmp_path / "c.txt")
+    with pytest.raises(StorageError, match="is no run"):
+        compare([runs[0], tmp_path], out)
+    with pytest.raises(StorageError, match="three and one have no attempt at the same problem in common"):
+        compare([runs[0], strange], out)
+    assert not out.exists()

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+import pytest
+
+from storage.places.data_folder import open_data_folder
+from storage.places.files import write_json
+from storage.tables.attempts import read_attempts, write_attempts
+from tasks.fan_out.stage import keep_settings
+from tasks.reports.report import continual_rows
+from tasks.settings.run_settings import COMBINED, RunSettings, for_preset
+from tasks.stages.fewer_experiences import runs_of_continual
+from tests.storage.tables.test_tables import ATTEMPT
+
+SETTINGS: Final = for_preset("laptop", continual="paper")
+
+
+def measure(data: Path, settings: RunSettings, memories: Sequence[str] = ()) -> None:
+    """Leave a run with one attempt of each planner at each class with its memory, and with others."""
+    keep_settings(str(data), settings)
+    run = open_data_folder(data).run(settings.run_name)
+    for name in settings.classes:
+        rows = [
+            {**ATTEMPT, "problem_class": name, "planner": planner, "memory": memory}
+            for planner in settings.planners
+            for memory in (name, *memories)
+        ]
+        write_attempts(run.shard("results", name, 0), rows)
+
+
+def grown(data: Path, settings: RunSettings) -> pd.DataFrame:
+    own = open_data_folder(data).run(settings.run_name)
+    return continual_rows(str(data), settings, read_attempts(own.results))
+
+
+def test_growing_experience_is_that_of_the_planners_and_classes_that_several_runs_measured(
+    tmp_path: Path,
+) -> None:
+    for fewer in runs_of_continual(SETTINGS):
+        measure(tmp_path, fewer)
+    measure(tmp_path, SETTINGS, [COMBINED])
+    rows = grown(tmp_path, SETTINGS)
+    assert rows["experiences"].tolist() == [20, 40, 60, 80, 100]
+    assert set(rows["planner"]) == {"gust"}
+    assert set(rows["memory"]) == {"curves"}
+
+
+def test_growing_experience_of_all_that_a_run_measures(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, continual="all")
+    for each in [*runs_of_continual(settings), settings]:
+        measure(tmp_path, each)
+    rows = grown(tmp_path, settings)
+    assert (rows.groupby(["problem_class", "planner"])["experiences"].nunique() == 5).all()
+    assert len(rows) == 5 * 9
+
+
+@pytest.mark.parametrize("other", [{"seed": 2}, {"difficulty": "hard"}, {"objective": "triplet"}, {}])
+def test_runs_that_differ_in_more_are_not_compared(tmp_path: Path, other: dict[str, object]) -> None:
+    measure(tmp_path, SETTINGS)
+    if other:
+        measure(tmp_path, replace(SETTINGS, experiences=20, **other))  # type: ignore[arg-type]
+    old = open_data_folder(tmp_path).run("laptop-of-another-version")
+    write_json(old.settings, {"preset": "laptop", "gone": 1})
+    write_attempts(old.shard("results", "curves", 0), [ATTEMPT])
+    assert grown(tmp_path, SETTINGS).empty

@@ -1,0 +1,164 @@
+"""``route``: what is written can be driven in the map's frame, and bad input gets one line."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from flows.cli.main import call
+from planners.maps.cutting import cut_problems
+from planners.maps.surroundings import surroundings_of
+from planners.world.arrays import Floats
+from planners.world.authority.authority_equations import simulate_again
+from planners.world.vehicles.bodies import footprints
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.memories import save_memory
+from storage.exchange.plans import read_plan
+from storage.exchange.problems import write_problems
+from storage.worlds.importing import ImportSettings, load_map
+from storage.worlds.sources import source_at
+from tests.planners.maps.agreement import cells_shape
+from tests.planners.memories import memory_of
+from tests.storage.samples import problem_with
+from tests.storage.worlds.samples import town_cells, write_map, write_ros
+from tests.worlds import SHARED
+
+CELLS = town_cells(rows=200, columns=160)
+TURNED = [500.0, -40.0, 0.7]
+SCALE = 0.5
+
+
+def placed(x: float, y: float) -> tuple[float, float]:
+    """Grid metres in the frame of the turned map."""
+    cos, sin = math.cos(TURNED[2]), math.sin(TURNED[2])
+    return TURNED[0] + cos * x - sin * y, TURNED[1] + sin * x + cos * y
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("town")
+    write_ros(folder / "town.yaml", CELLS, origin=TURNED)
+    write_map(folder / "town.map", CELLS)
+    world = load_map(source_at(folder / "town.map"), ImportSettings())
+    cuts = cut_problems(world, surroundings_of(world, SCALE), "train", 30, 1)
+    for name, metadata in (("small", {"scales": [SCALE]}), ("unsaid", {})):
+        save_memory(folder / name, memory_of([cut.problem for cut in cuts], metadata=metadata))
+    return folder
+
+
+def in_free_cells(states: Floats) -> bool:
+    """By shapely: no footprint of a car half as large meets an occupied cell of the turned map."""
+    blocked = shapely.affinity.rotate(
+        cells_shape(CELLS[::-1], 1.0, 0.0, 0.0), TURNED[2], origin=(0, 0), use_radians=True
+    )
+    blocked = shapely.affinity.translate(blocked, *TURNED[:2])
+    own = states.copy()
+    own[:, :2] /= SCALE
+    return not any(
+        shapely.Polygon(SCALE * corners).intersects(blocked)
+        for corners in footprints(own, CAR).reshape(-1, 4, 2)[::5]
+    )
+
+
+def test_a_route_at_a_scale_over_a_turned_map_can_be_driven(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, picture = tmp_path / "plan.json", tmp_path / "route.png"
+    begin, end = placed(8.0, 6.0), placed(150.0, 190.0)
+    asked = ["route", str(town / "town.yaml"), "--memory", str(town / "small"), "--scale", str(SCALE)]
+    asked += ["--from", f"{begin[0]},{begin[1]},{0.3 + TURNED[2]}", "--to", f"{end[0]},{end[1]}"]
+    assert call([*asked, "--out", str(out), "--picture", str(picture)]) == 0
+    told = capsys.readouterr()
+    assert told.err == ""
+    record = read_plan(out)
+    assert record.scale == SCALE
+    plan = record.plan
+    assert plan is not None
+    np.testing.assert_allclose(plan.states[0, :3] * [SCALE, SCALE, 1.0], [*begin, 0.3 + TURNED[2]])
+    np.testing.assert_allclose(simulate_again(plan.states[0], plan.controls, CAR), plan.states, atol=1e-6)
+    own = plan.states.copy()
+    own[:, :2] *= SCALE
+    assert math.dist(own[-1, :2], end) <= 2.0 * SCALE
+    assert np.abs(plan.states[-1, 3:]).max() < 1e-9
+    assert in_free_cells(own)
+    metres = re.search(r"^(\d+) m in (\d+) s, (\d+) legs?, (\d+) from memory", told.out, re.MULTILINE)
+    assert metres is not None
+    assert float(metres[1]) == pytest.approx(SCALE * plan.length_m, abs=0.5)
+    rows = [line.split() for line in told.out.splitlines() if re.match(r" +\d+ +(rec|rep|sea)", line)]
+    assert len(rows) == int(metres[3])
+    assert sum(row[1] != "searched" for row in rows) == int(metres[4])
+    assert picture.stat().st_size > 10_000
+
+
+def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) -> None:
+    out = tmp_path / "plan.json"
+    asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", "150,190", "--to", "10,190"]
+    assert call([*asked, "--out", str(out)]) == 0
+    record = read_plan(out)
+    assert record.plan is not None
+    assert record.source == "searched"
+    for goal in ((150.0, 190.0), (10.0, 190.0)):
+        assert np.hypot(*(record.plan.states[:, :2] - goal).T).min() <= 2.0
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "told"),
+    [
+        (["--from", "8,6", "--to", "150,190"], 2, "--from '8,6': give x,y,heading"),
+        (["--from", "8,6,nan", "--to", "150,190"], 2, "--from '8,6,nan': give x,y,heading"),
+        (["--from", "8,6,0", "--to", "north"], 2, "--to 'north': give x,y"),
+        (["--from", "8,6,0"], 2, "--to"),
+        (["--from", "-8,6,0", "--to", "150,190"], 2, "at (-8.0, 6.0) the vehicle stands in an obstacle"),
+        (["--from", "8,6,0", "--to", "150,1900"], 2, "at (150.0, 1900.0) the goal is occupied"),
+        (["--from", "8,6,0", "--to", "150,190", "--scale", "0"], 2, "Scale is 0"),
+        (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide, at scale 1"),
+        (["--from", "8,6,0", "--to", "150,190", "--assist", "open"], 2, "needs --memory"),
+        (["--from", "8,6,0", "--to", "150,190", "--picture", "r.txt"], 2, "r.txt is no picture's name"),
+        (["--from", "8,6,0", "--to", "150,190", "--memory", "small"], 1, "of scale 0.5, asked was 1"),
+        (["--from", "8,6,0", "--to", "9,60", "--scale", "0.5", "--memory", "unsaid"], 1, "of scale 1, asked"),
+        (["--from", "8,6,0", "--to", "150,190", "--memory", "small", "--vehicle", "differential-drive"], 1,
+         "differential-drive"),
+    ],
+)  # fmt: skip
+def test_wrong_use_gets_one_line(
+    town: Path, options: list[str], code: int, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    places = [str(town / each) if each in ("small", "unsaid") else each for each in options]
+    assert call(["route", str(town / "town.map"), *places]) == code
+    error = capsys.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+
+
+def test_a_memory_is_refused_for_a_problem_of_another_scale(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_problems(tmp_path / "p.json", [problem_with()])
+    asked = ["plan", str(tmp_path / "p.json"), "--assist", "closed", "--memory", str(town / "small")]
+    assert call(asked) == 1
+    assert "was made of problems of scale 0.5, asked was 1" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
+@pytest.mark.parametrize(
+    ("name", "options", "metres"),
+    [
+        ("denver_ros.yaml", [
+            "--from", "-113,22,0", "--to", "104,107", "--to", "100,-68", "--to", "-98,-68"], 500),
+        ("Berlin_0_256.map", [
+            "--from", "15,240,0", "--to", "250,20", "--to", "120,30", "--to", "70,215"], 500),
+    ],
+)  # fmt: skip
+def test_half_a_kilometre_through_a_city(
+    name: str, options: list[str], metres: float, tmp_path: Path
+) -> None:
+    out = tmp_path / "plan.json"
+    assert call(["route", str(SHARED / "maps" / name), *options, "--out", str(out)]) == 0
+    plan = read_plan(out).plan
+    assert plan is not None
+    assert plan.length_m >= metres

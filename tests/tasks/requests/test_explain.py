@@ -1,0 +1,73 @@
+"""``plan --explain`` says of each recalled plan what is so."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flows.cli.main import call
+from planners.explanation import recollections
+from planners.memory.recall import Memory
+from planners.solve import solve, turned
+from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.memories import save_memory
+from storage.exchange.problems import write_problems
+from tests.planners.memories import memory_of
+from tests.worlds import box, problem_of, strewn
+
+WALL = problem_of([box(25, 0, 2.35, 9, 1), box(24, 34, 2.35, 26, 0.5)], "wall")
+
+
+@pytest.fixture(scope="module")
+def memory() -> Memory:
+    return memory_of([strewn(seed, 30) for seed in range(6)])
+
+
+@pytest.mark.parametrize("problem", [problem_of([]), WALL, strewn(40, 30)], ids=["empty", "wall", "strewn"])
+@pytest.mark.parametrize("assist", ["open", "repair"])
+def test_it_says_what_collides_where_and_what_was_used(memory: Memory, problem: Problem, assist: str) -> None:
+    attempt = solve(problem, "gust", assist, 4, memory)
+    looked_at = recollections(problem, attempt, memory)
+    assert [each.plan for each in looked_at] == list(attempt.recalled)
+    scene, bits = scene_of(problem), drawing_of(problem).occupied.copy()
+    for each in looked_at:
+        plan = turned(memory.plans[each.plan], problem.start[2])
+        free = count_free_prefix(plan.states, CAR, scene)
+        assert each.first_blocked == (None if free == len(plan.states) else free)
+        shared = memory.masks[each.plan] & bits
+        assert each.blocked_cells == sum(int(word).bit_count() for word in shared)
+        assert 1 <= each.encoder_rank <= len(memory.plans)
+    uses = [each.use for each in looked_at if each.use]
+    assert uses == {"recalled": ["answer"], "repaired": ["repaired"], "searched": ["guide"]}[attempt.source]
+    if attempt.source == "recalled":
+        answer = next(each for each in looked_at if each.use == "answer")
+        np.testing.assert_array_equal(attempt.plan.states, memory.plans[answer.plan].states)
+
+
+def test_the_command_tells_and_draws_it(
+    memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_memory(tmp_path / "memory", memory)
+    write_problems(tmp_path / "wall.json", [WALL])
+    plain, marked = tmp_path / "plain.png", tmp_path / "marked.png"
+    asked = ["plan", str(tmp_path / "wall.json"), "--assist", "open", "--memory", str(tmp_path / "memory")]
+    assert call([*asked, "--picture", str(plain)]) == 0
+    assert "recall" not in capsys.readouterr().out
+    assert call([*asked, "--picture", str(marked), "--explain"]) == 0
+    told = capsys.readouterr().out
+    attempt = solve(WALL, "gust", "open", 5, memory, seed=1)
+    assert f"{len(attempt.recalled)} of 6 plans of test, none of them free" in told
+    rows = [match for line in told.splitlines() if (match := re.match(r" \d+ +(\d+) .* of ", line))]
+    assert [int(row[1]) for row in rows] == list(attempt.recalled)
+    assert "guided the search" in told
+    assert f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions" in told
+    assert "in all" in told
+    assert marked.read_bytes() != plain.read_bytes()
+    assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
+    assert "no memory was asked" in capsys.readouterr().out

@@ -1,0 +1,129 @@
+"""The call for a robot's process: the same plans as the command's, without what a robot has not."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from planners.world.authority.authority import faults
+from planners.world.problem import obstacles_of
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.memories import load_memory, save_memory
+from storage.errors import StorageError
+from storage.exchange.problems import fields_of
+from tasks.requests.assistant import Assistant
+from tasks.requests.robot import Answer, RobotPlanner, load_planner
+from tasks.settings.run_settings import RunError, UsageError
+from tests.storage.samples import box
+from tests.tasks.served import problem, write_memory
+
+ROOT = Path(__file__).parents[3]
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_memory(tmp_path_factory.mktemp("robot") / "memory")
+
+
+@pytest.fixture(scope="module")
+def planner(memory: Path) -> RobotPlanner:
+    return load_planner(memory)
+
+
+def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> None:
+    assistant = Assistant("gust", "repair", 5, memory, 1)
+    for i in range(COUNT):
+        attempt, plan = assistant(problem(i))
+        answer = planner.plan(problem(i))
+        assert (answer.status, answer.source) == (attempt.status, attempt.source)
+        assert plan is not None
+        assert same(answer, planner.plan(fields_of(problem(i)) | {"id": answer.problem_id}))
+        assert same(answer, planner.plan(json.dumps(fields_of(problem(i)))))
+        assert answer.plan is not None
+        assert np.array_equal(answer.plan.states, plan.states)
+        assert faults(problem(i), answer.plan, CAR) == []
+
+
+def same(one: Answer, other: Answer) -> bool:
+    assert one.plan is not None
+    assert other.plan is not None
+    return np.array_equal(one.plan.states, other.plan.states) and one.problem_id == other.problem_id
+
+
+def test_no_plan_is_an_answer(planner: RobotPlanner) -> None:
+    walls = [box(48.0, y, 1.0) for y in np.arange(42.0, 58.0)] + [
+        box(x, 43.0, 1.0) for x in np.arange(48, 58)
+    ]
+    closed = replace(problem(0), obstacles=obstacles_of([[wall] for wall in walls]))
+    answer = planner.plan(closed)
+    assert (answer.plan, answer.source) == (None, None)
+    assert answer.status != "solved"
+    assert answer.planning_seconds > 0.0
+
+
+@pytest.mark.parametrize("bad", ["{", "[]", {}, 7, {"start": [float("nan")] * 3}, "[" * 100_000])
+def test_a_malformed_problem_is_one_line(planner: RobotPlanner, bad: object) -> None:
+    with pytest.raises(ValueError, match=r".+") as error:
+        planner.plan(bad)  # type: ignore[arg-type]
+    assert "\n" not in str(error.value)
+
+
+def test_threads_do_not_disturb_each_other(planner: RobotPlanner) -> None:
+    alone = [planner.plan(problem(i)) for i in range(COUNT)]
+    wrong: list[int] = []
+
+    def ask(i: int) -> None:
+        wrong.extend(i for _ in range(50) if not same(planner.plan(problem(i)), alone[i]))
+
+    threads = [Thread(target=ask, args=(i,)) for i in range(COUNT)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+def test_it_is_refused_what_it_is_not_for(memory: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="Unknown planner 'prm'"):
+        load_planner(memory, planner="prm")
+    with pytest.raises(StorageError, match="made for vehicle car, wanted was car-1-trailer"):
+        load_planner(memory, vehicle="car-1-trailer")
+    with pytest.raises(StorageError, match="holds no memory"):
+        load_planner(tmp_path)
+    for name in ("curves", "trap"):
+        save_memory(tmp_path / "memories" / name, load_memory(memory))
+    with pytest.raises(RunError, match=r"several memories; name one of its folders: curves, trap"):
+        load_planner(tmp_path)
+    save_memory(tmp_path / "memories" / "combined", load_memory(memory))
+    assert len(load_planner(tmp_path).memory.plans) == len(load_memory(memory).plans)
+
+
+def test_the_example_of_the_page_runs_without_what_a_robot_has_not(memory: Path, tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "serving.md").read_text()
+    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "problem.json").write_text(json.dumps(fields_of(problem(0))))
+    script = example.replace("data/runs/laptop-labels-…/memories/random", str(memory))
+    script += (
+        "import sys; print(sorted({'torch', 'prefect', 'mlflow', 'pandas', 'dask'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    lines = done.stdout.splitlines()
+    assert lines[-1] == "[]"
+    assert re.fullmatch(r"(recalled|repaired|searched): \d+ states in [0-9.]+ ms", lines[0])

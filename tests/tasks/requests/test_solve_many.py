@@ -1,0 +1,202 @@
+"""Many problems: the same rows however often the command is stopped, whoever works; nothing is done twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from planners.world.classes.problem_classes import problem_class
+from storage.errors import StorageError
+from storage.exchange.plans import read_plan
+from storage.exchange.problems import write_problems
+from storage.places.data_folder import DataFolder
+from storage.places.files import locked
+from storage.tables.attempts import read_attempts, write_attempts
+from storage.tables.learned_experiences import learned_shards
+from tasks.requests import problem_parts as parts
+from tasks.requests.assistant import Way
+from tasks.requests.solve_many import solve_many
+from tests.flows.same_rows import equal_but_for_seconds
+
+ROOT = Path(__file__).parents[3]
+WAY = Way("gust", "none", 5, None, 1)
+COUNT = 11
+SIZE = 3  # problems a part
+
+
+@pytest.fixture(autouse=True)
+def _small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parts, "PART_PROBLEMS", SIZE)
+
+
+@pytest.fixture(scope="module")
+def problems(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    drawn = [problem_class("curves", "easy").draw(11, index) for index in range(COUNT)]
+    path = tmp_path_factory.mktemp("asked") / "problems.jsonl"
+    write_problems(path, drawn)
+    write_problems(path.with_suffix(".parquet"), drawn)
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(problems: Path) -> pd.DataFrame:
+    out = problems.with_name("undisturbed.parquet")
+    solve_many(WAY, problems, out)
+    return read_attempts(out)
+
+
+class StoppedError(Exception):
+    """As by Ctrl-C."""
+
+
+class Counting:
+    """Writes rows until it has written enough; counts."""
+
+    def __init__(self, most: int = 1_000) -> None:
+        self.written = 0
+        self.most = most
+
+    def __call__(self, path: Path, rows: Sequence[dict[str, Any]], key: str = "") -> None:
+        if self.written == self.most:
+            raise StoppedError
+        self.written += 1
+        write_attempts(path, rows, key)
+
+
+def test_rows_come_in_the_order_of_the_problems(undisturbed: pd.DataFrame, problems: Path) -> None:
+    ids = [json.loads(line)["id"] for line in problems.read_text().splitlines()]
+    assert list(undisturbed["problem_id"]) == ids
+    assert undisturbed["solved"].all()
+    assert not problems.with_name("undisturbed.parquet.parts").exists()
+
+
+def test_both_formats_give_the_same_rows(undisturbed: pd.DataFrame, problems: Path, tmp_path: Path) -> None:
+    solve_many(WAY, problems.with_suffix(".parquet"), tmp_path / "rows.parquet")
+    assert equal_but_for_seconds(read_attempts(tmp_path / "rows.parquet"), undisturbed)
+
+
+def test_what_was_finished_before_an_interruption_is_not_done_again(
+    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "rows.parquet"
+    monkeypatch.setattr(parts, "write_attempts", Counting(most=2))
+    with pytest.raises(StoppedError):
+        solve_many(WAY, problems, out)
+    assert not out.exists()
+    counting = Counting()
+    monkeypatch.setattr(parts, "write_attempts", counting)
+    solve_many(WAY, problems, out)
+    assert counting.written == -(-COUNT // SIZE) - 2
+    assert equal_but_for_seconds(read_attempts(out), undisturbed)
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_another_question_never_takes_the_parts_of_this_one(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "rows.parquet"
+    monkeypatch.setattr(parts, "write_attempts", Counting(most=2))
+    with pytest.raises(StoppedError):
+        solve_many(WAY, problems, out)
+    monkeypatch.setattr(parts, "write_attempts", Counting())
+    solve_many(WAY._replace(seed=2), problems, out)
+    assert set(read_attempts(out)["seed"]) == {2}
+
+
+def test_a_malformed_line_is_named_and_only_its_part_is_left_to_do(
+    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
+    lines = problems.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), *lines[5:]]))
+    with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*field goal is missing.* All else is"):
+        solve_many(WAY, path, out)
+    assert not out.exists()
+    path.write_text("".join(lines))
+    counting = Counting()
+    monkeypatch.setattr(parts, "write_attempts", counting)
+    solve_many(WAY, path, out)
+    assert counting.written == 1
+    assert equal_but_for_seconds(read_attempts(out), undisturbed)
+
+
+def test_an_id_that_occurs_twice_is_named_with_both_lines(problems: Path, tmp_path: Path) -> None:
+    path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
+    lines = problems.read_text().splitlines(keepends=True)
+    path.write_text("".join(["\n", *lines[:9], lines[1]]))
+    with pytest.raises(StorageError, match=r'line 11: id ".*-1" is that of .*problems.jsonl line 3 too'):
+        solve_many(WAY, path, out)
+    assert not out.exists()
+
+
+def test_a_file_without_problems_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "p.jsonl").write_text("\n\n")
+    with pytest.raises(StorageError, match=r"p.jsonl holds no problems"):
+        solve_many(WAY, tmp_path / "p.jsonl", tmp_path / "rows.parquet")
+    (tmp_path / "q.jsonl").write_text("{}\n")
+    with pytest.raises(StorageError, match=r"line 1: field start is missing"):
+        solve_many(WAY, tmp_path / "q.jsonl", tmp_path / "rows.parquet")
+    assert {each.name for each in tmp_path.iterdir()} == {"p.jsonl", "q.jsonl"}
+
+
+def test_one_output_is_written_by_one_command(problems: Path, tmp_path: Path) -> None:
+    (tmp_path / "rows.parquet.parts").mkdir()
+    with (
+        locked(tmp_path / "rows.parquet.parts" / ".lock", "other"),
+        pytest.raises(StorageError, match=f"in use by another command .process {os.getpid()}."),
+    ):
+        solve_many(WAY, problems, tmp_path / "rows.parquet")
+
+
+def test_plans_lie_in_one_folder_and_very_many_in_one_a_part(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve_many(WAY, problems, tmp_path / "rows.parquet", tmp_path / "few")
+    files = sorted((tmp_path / "few").iterdir())
+    assert len(files) == COUNT
+    assert all(read_plan(file).problem_id == file.stem for file in files)
+    monkeypatch.setattr(parts, "FLAT", COUNT - 1)
+    solve_many(WAY, problems, tmp_path / "rows.parquet", tmp_path / "many")
+    assert sorted(each.name for each in (tmp_path / "many").rglob("*.json")) == [each.name for each in files]
+    assert len(list((tmp_path / "many").iterdir())) == -(-COUNT // SIZE)
+
+
+def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) -> None:
+    for out in ("one.parquet", "other.parquet"):
+        solve_many(WAY, problems, tmp_path / out, learn=tmp_path / "data")
+    shards = learned_shards(DataFolder(tmp_path / "data").learned("car"))
+    assert len(shards) == -(-COUNT // SIZE)
+
+
+@pytest.mark.timeout(600)
+def test_a_killed_command_goes_on_with_two_workers_to_the_same_rows(
+    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "rows.parquet"
+    script = "from tasks import parts; parts.PART_PROBLEMS = 1; from flows.cli.main import main; main()"
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+    command = [sys.executable, "-c", script, "solve", str(problems), "--out", str(out), "--workers", "2"]
+    begun = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.DEVNULL)
+    folder = tmp_path / "rows.parquet.parts"
+    while begun.poll() is None and len(list(folder.glob("[0-9]*.parquet"))) < 2:
+        time.sleep(0.05)
+    begun.kill()
+    begun.wait()
+    finished = {path: path.stat().st_mtime_ns for path in folder.glob("[0-9]*.parquet")}
+    assert finished
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert f"{COUNT} of {COUNT}" in done.stdout
+    assert equal_but_for_seconds(read_attempts(out), undisturbed)
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.parquet"]

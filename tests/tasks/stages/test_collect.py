@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planners.world.authority.authority import faults
+from storage.exchange.problems import write_problems
+from storage.tables.experiences import read_experiences
+from storage.tables.imported_problems import write_imported
+from tasks.fan_out.stage import Chunk, keep_settings, run_folder
+from tasks.settings.run_settings import RunError, RunSettings, for_preset
+from tasks.stages.collect import chunks_wanted, collect_chunk
+from tasks.stages.curate import (
+    curate_chunk,
+    curation_chunks,
+    improve_chunk,
+    improvement_chunks,
+    keep_experiences,
+)
+
+PLAIN = replace(
+    for_preset("smoke", classes=["random"], difficulty="easy"), experiences=4, candidates=30, combined=True
+)
+
+
+def collected(data: Path, settings: RunSettings, backwards: bool = False) -> list:
+    """What is kept when chunks are done in their order, or in the other."""
+    keep_settings(str(data), settings)
+    done: dict[Chunk, dict[str, int]] = {}
+    while chunks := chunks_wanted(str(data), settings, done):
+        done |= {chunk: collect_chunk(chunk) for chunk in (reversed(chunks) if backwards else chunks)}
+    curated = curation_chunks(str(data), settings, done)
+    improved = improvement_chunks(str(data), settings, curated)
+    for do, of_stage in ((curate_chunk, curated), (improve_chunk, improved)):
+        for chunk in of_stage:
+            do(chunk)
+    keep_experiences(str(data), settings, curated, improved)
+    run = run_folder(str(data), settings)
+    assert len(read_experiences(run.experiences("combined"))) == settings.experiences
+    return read_experiences(run.experiences(settings.class_names[0]))
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> list:
+    return collected(tmp_path_factory.mktemp("plain"), PLAIN)
+
+
+def test_as_many_are_kept_as_asked_for_chosen_and_lawful(plain: list) -> None:
+    assert len(plain) == 4
+    assert {int(each.problem.id.rsplit("-")[-1]) for each in plain} != {0, 1, 2, 3}
+    assert all(faults(each.problem, each.plan) == [] for each in plain)
+
+
+def test_the_order_of_work_changes_nothing(tmp_path: Path, plain: list) -> None:
+    again = collected(tmp_path, PLAIN, backwards=True)
+    assert [each.problem.id for each in again] == [each.problem.id for each in plain]
+    assert all(np.array_equal(a.plan.states, b.plan.states) for a, b in zip(plain, again, strict=True))
+
+
+def test_optimised_experiences_are_of_the_same_problems_shorter_and_lawful(
+    tmp_path: Path, plain: list
+) -> None:
+    better = collected(tmp_path, replace(PLAIN, optimised=True))
+    for old, new in zip(plain, better, strict=True):
+        assert old.problem.id == new.problem.id
+        assert new.plan.duration_s < old.plan.duration_s
+        assert faults(new.problem, new.plan) == []
+
+
+def test_without_more_candidates_the_first_are_kept(tmp_path: Path) -> None:
+    kept = collected(tmp_path, replace(PLAIN, candidates=0))
+    assert [int(each.problem.id.rsplit("-")[-1]) for each in kept] == [0, 1, 2, 3]
+
+
+def test_a_folder_with_fewer_worlds_than_candidates_makes_do(tmp_path: Path, plain: list) -> None:
+    for part in ("train", "test"):
+        write_problems(tmp_path / "few" / part / "problems.parquet", [each.problem for each in plain])
+    settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "few"),))
+    place = run_folder(str(tmp_path / "data"), settings).worlds("few", "train")
+    write_imported(place, [each.problem for each in plain])
+    assert len(collected(tmp_path / "data", settings)) == 4
+    wanting = replace(settings, experiences=5)
+    write_imported(
+        run_folder(str(tmp_path / "data"), wanting).worlds("few", "train"), [each.problem for each in plain]
+    )
+    with pytest.raises(RunError, match="Class few: 4 of 4 problems solved, 5 are wanted"):
+        collected(tmp_path / "data", wanting)

@@ -1,0 +1,102 @@
+"""Hallucinating: the same bytes whoever works, what was asked for, nothing that its plan does not solve."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planners.memory.hallucination.mixture import METHODS
+from storage.errors import StorageError
+from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, read_methods
+from tasks.fan_out.stage import run_folder
+from tasks.settings.run_settings import for_preset
+from tasks.stages import hallucinate
+from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
+from tasks.stages.learn_hallucination import is_learned, learn_chunk, learning_chunks
+from tests.tasks.collected import collect
+
+SETTINGS = replace(
+    for_preset("smoke", classes=["trap"], difficulty="easy", hallucination=METHODS),
+    experiences=6,
+    problems_per_experience=12,
+)
+
+
+@pytest.fixture(autouse=True)
+def _small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hallucinate, "CHUNK_PROBLEMS", 24)  # three chunks of two plans
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder with everything that hallucinating needs."""
+    data = tmp_path_factory.mktemp("data")
+    collect(str(data), SETTINGS)
+    for chunk in learning_chunks(str(data), SETTINGS):
+        assert not is_learned(chunk)
+        learn_chunk(chunk)
+        assert is_learned(chunk)
+    return data
+
+
+def _shards(data: Path) -> list[Path]:
+    return run_folder(str(data), SETTINGS).shards("hallucinated", "trap")
+
+
+@pytest.mark.slow  # a small run with one worker and with two says the same of every table
+def test_one_process_and_two_write_the_same_bytes(data: Path) -> None:
+    chunks = hallucination_chunks(str(data), SETTINGS)
+    assert len(chunks) == 3
+    for chunk in chunks:
+        hallucinate_chunk(chunk)
+    alone = [path.read_bytes() for path in _shards(data)]
+    for path in _shards(data):
+        path.unlink()
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        list(pool.map(hallucinate_chunk, reversed(chunks)))
+    assert [path.read_bytes() for path in _shards(data)] == alone
+
+
+def test_training_again_gives_the_same_bytes(data: Path) -> None:
+    place = run_folder(str(data), SETTINGS).hallucinator("trap")
+    before = {path.name: path.read_bytes() for path in place.iterdir()}
+    (chunk,) = learning_chunks(str(data), SETTINGS)
+    learn_chunk(chunk)
+    assert {path.name: path.read_bytes() for path in place.iterdir()} == before
+    assert {"hallucinator.json", "weights.safetensors"} == set(before)
+
+
+def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> None:
+    for chunk in hallucination_chunks(str(data), SETTINGS):
+        hallucinate_chunk(chunk)
+    shards = _shards(data)
+    labelled = read_labelled(shards)
+    methods = Counter(method for path in shards for method in read_methods(path))
+    assert methods["origin"] == 6
+    assert sum(methods[name] for name in METHODS) == 6 * 11
+    assert min(methods[name] for name in METHODS) > 6
+    made_for = labelled.plan_index
+    assert Counter(made_for[made_for >= 0].tolist()) == dict.fromkeys(range(6), 12)
+    free = np.unpackbits(labelled.labels, axis=1, count=6).astype(bool)
+    assert free[np.arange(len(free)), made_for][made_for >= 0].all()
+    ids = [problem.id for path in shards for problem in read_hallucinated_problems(path)]
+    assert len(set(ids)) >= len(ids) - 6  # a plain draw may be one of those that were collected
+    no_plan = [i for i, identity in enumerate(ids) if "no-plan" in identity]
+    assert len(no_plan) == methods["no-plan"] == round(0.05 * 6 * 12)
+    assert not free[no_plan].any()
+
+
+def test_a_network_is_trained_only_for_who_asks(data: Path) -> None:
+    assert learning_chunks(str(data), replace(SETTINGS, hallucination=(("rearrange", 1.0),))) == []
+
+
+def test_without_its_network_learned_hallucination_says_what_to_do(tmp_path: Path) -> None:
+    collect(str(tmp_path), SETTINGS)
+    with pytest.raises(StorageError, match="holds no hallucinator"):
+        hallucinate_chunk(hallucination_chunks(str(tmp_path), SETTINGS)[0])

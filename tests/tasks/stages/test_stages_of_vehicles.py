@@ -1,0 +1,117 @@
+"""The whole pipeline for a car with a trailer, tiny and in this process; and that nobody else may use it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planners.world.classes.problem_classes import problem_class
+from planners.world.vehicles.vehicle import CAR_1_TRAILER
+from storage.archives.memories import load_memory
+from storage.errors import StorageError
+from storage.exchange.plans import read_plan
+from storage.exchange.problems import write_problems
+from storage.places.data_folder import RunFolder
+from storage.tables.attempts import read_attempts
+from tasks.fan_out.stage import run_folder
+from tasks.requests.assistant import Assistant, Way, plan_one
+from tasks.requests.solve_many import solve_many
+from tasks.requests.verify_folder import verify_folder
+from tasks.settings.run_settings import ASSISTS, for_preset
+from tasks.stages.benchmark import benchmark_chunk, benchmark_chunks
+from tasks.stages.build_memory import build_chunk, memory_chunks
+from tasks.stages.draw_examples import draw_chunk, figure_chunks
+from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
+from tasks.stages.train import train_chunk, train_chunks
+from tests.tasks.collected import collect
+
+PLANNER = "follow"
+SETTINGS = replace(
+    for_preset("smoke", classes=["trap"], difficulty="easy", planners=[PLANNER], vehicle="car-1-trailer"),
+    experiences=3,
+    problems_per_experience=5,
+    test_problems=3,
+    collector=PLANNER,
+    epochs=1,
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    data = str(tmp_path_factory.mktemp("data"))
+    collect(data, SETTINGS)
+    for chunks_of_stage, do in (
+        (hallucination_chunks, hallucinate_chunk),
+        (train_chunks, train_chunk),
+        (memory_chunks, build_chunk),
+        (benchmark_chunks, benchmark_chunk),
+        (figure_chunks, draw_chunk),
+    ):
+        for chunk in chunks_of_stage(data, SETTINGS):
+            do(chunk)
+    return run_folder(data, SETTINGS)
+
+
+@pytest.fixture
+def problems(tmp_path: Path) -> Path:
+    drawn = [problem_class("trap", "easy", CAR_1_TRAILER).draw(4, index) for index in range(2)]
+    write_problems(tmp_path / "problems.jsonl", drawn)
+    return tmp_path / "problems.jsonl"
+
+
+def test_every_attempt_is_of_the_trailer_and_its_plan_was_judged(run: RunFolder) -> None:
+    rows = read_attempts(run.results)
+    assert set(rows["vehicle"]) == {"car-1-trailer"}
+    assert len(rows) == 3 * (1 + len(ASSISTS))
+    assert rows["solved"].all()
+    assert rows["verified"].all()
+
+
+def test_the_memory_holds_the_trailers_angles(run: RunFolder) -> None:
+    memory = load_memory(run.memory("trap"), CAR_1_TRAILER)
+    assert memory.vehicle == CAR_1_TRAILER
+    assert {plan.states.shape[1] for plan in memory.plans} == {6}
+    assert max(np.abs(plan.states[:, 5]).max() for plan in memory.plans) > 0.05
+
+
+def test_its_figures_are_drawn(run: RunFolder) -> None:
+    assert (run.figures / "problems-trap.png").stat().st_size > 10_000
+
+
+def test_verify_makes_the_same_attempts_again(run: RunFolder, capsys: pytest.CaptureFixture[str]) -> None:
+    verify_folder(run.path.parents[1], sample=1.0, workers=1)
+    told = capsys.readouterr().out
+    assert "No fault found." in told
+    assert f"{3 * (1 + len(ASSISTS))} attempts made again" in told
+
+
+def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, tmp_path: Path) -> None:
+    way = Way(PLANNER, "open", 3, str(run.path), 1, "car-1-trailer")
+    solve_many(way, problems, tmp_path / "rows.parquet", tmp_path / "plans")
+    assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
+    for path in (tmp_path / "plans").iterdir():
+        plan = read_plan(path, CAR_1_TRAILER).plan
+        assert plan is not None
+        assert plan.states.shape[1] == 6
+        with pytest.raises(StorageError, match="for vehicle car-1-trailer, wanted was car"):
+            read_plan(path)
+
+
+def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
+    way = Way(PLANNER, "open", 3, str(run.path), 1, "car")
+    with pytest.raises(
+        StorageError, match="made for vehicle car-1-trailer, wanted was car; ask for --vehicle"
+    ):
+        solve_many(way, problems, tmp_path / "rows.parquet", None)
+
+
+def test_a_picture_and_a_plan_are_written(run: RunFolder, problems: Path, tmp_path: Path) -> None:
+    one = tmp_path / "one.json"
+    one.write_text(problems.read_text().splitlines()[0])
+    assistant = Assistant(PLANNER, "closed", 3, run.path, 1, "car-1-trailer")
+    plan_one(assistant, one, tmp_path / "plan.json", tmp_path / "plan.png")
+    assert read_plan(tmp_path / "plan.json", CAR_1_TRAILER).plan is not None
+    assert (tmp_path / "plan.png").stat().st_size > 10_000

@@ -1,0 +1,223 @@
+"""A memory in MLflow, with a real SQLite database: logged, found again, asked, and never trusted blindly."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.sweeps import sweep_plans
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
+from storage.archives.memories import save_memory
+from storage.errors import StorageError
+from storage.exchange.plans import read_plan
+from storage.exchange.problems import fields_of, problem_of
+from storage.places.data_folder import open_data_folder
+from tasks.registry.model_uris import load_from
+from tasks.settings.run_settings import RunError
+from tests.storage.samples import a_memory
+
+ROOT = Path(__file__).parents[3]
+pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
+    "ignore:.*type hint:UserWarning",
+    "ignore:Operation with range",
+    "ignore::DeprecationWarning",
+    "ignore::FutureWarning",
+)
+EASY = problem_class("random", "easy")
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """A data folder with a memory of driveable plans, logged and registered; the URIs that name it."""
+    from mlflow import MlflowClient
+
+    from tasks.tracking.mlflow_runs import Tracker
+
+    data = tmp_path_factory.mktemp("mlflow") / "data"
+    found = [solve(EASY.draw(901, i), "follow").plan for i in range(12)]
+    plans = tuple(plan for plan in found if plan is not None)
+    sweeps = sweep_plans(plans)
+    memory = replace(a_memory(len(plans)), plans=plans, sweeps=sweeps, masks=masks_of(sweeps))
+    save_memory(data.parent / "archive", memory)
+    tracker = Tracker(open_data_folder(data))
+    with tracker.run("r", "train random", {}) as run_id:
+        model_id = tracker.memory(run_id, "memory", data.parent / "archive", "car")
+    client = MlflowClient(tracker.uri)
+    client.create_registered_model("mine")
+    with pytest.MonkeyPatch.context() as patch:  # the registry asks there what the model is
+        patch.setenv("MLFLOW_TRACKING_URI", tracker.uri)
+        version = client.create_model_version("mine", f"models:/{model_id}", run_id, model_id=model_id)
+    client.set_registered_model_alias("mine", "champion", version.version)
+    return {
+        "data": str(data),
+        "uri": tracker.uri,
+        "version": "models:/mine/1",
+        "alias": "models:/mine@champion",
+        "model": f"models:/{model_id}",
+        "run": f"runs:/{run_id}/memory",
+    }
+
+
+@pytest.fixture
+def at_home(logged: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    monkeypatch.setenv("MOTION_MEMORY_DATA", logged["data"])
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    return logged
+
+
+@pytest.mark.parametrize("place", ["version", "alias", "model", "run"])
+def test_a_logged_memory_is_found_by_any_of_its_names(at_home: dict[str, str], place: str) -> None:
+    memory = load_from(at_home[place], CAR)
+    original = load_from(str(Path(at_home["data"]).parent / "archive"), CAR)
+    assert np.array_equal(memory.masks, original.masks)
+    assert np.array_equal(memory.plans[0].states, original.plans[0].states)
+    with pytest.raises(StorageError, match="made for vehicle car, wanted was car-1-trailer"):
+        load_from(at_home[place], CAR_1_TRAILER)
+
+
+@pytest.mark.parametrize(
+    "uri", ["models:/mine/7", "models:/mine@nobody", "models:/none/1", "models:/", "runs:/x/memory"]
+)
+def test_a_name_that_mlflow_does_not_know_is_told_in_one_line(at_home: dict[str, str], uri: str) -> None:
+    with pytest.raises(RunError, match="cannot be had from MLflow at sqlite") as error:
+        load_from(uri, CAR)
+    assert "\n" not in str(error.value)
+
+
+def test_without_an_mlflow_the_line_says_how_to_name_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    monkeypatch.delenv("MOTION_MEMORY_DATA", raising=False)
+    with pytest.raises(RunError, match=r"mlflow.db does not exist. Set MLFLOW_TRACKING_URI"):
+        load_from("models:/mine/1", CAR)
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")  # where nobody answers
+    with pytest.raises(RunError, match=r"cannot be had from MLflow at http://127.0.0.1:9") as error:
+        load_from("models:/mine/1", CAR)
+    assert "\n" not in str(error.value)
+
+
+def test_a_logged_memory_that_was_damaged_is_refused(at_home: dict[str, str]) -> None:
+    (states,) = Path(at_home["data"]).rglob("states.npy")
+    good = states.read_bytes()
+    try:
+        states.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
+        with pytest.raises(StorageError, match=r"states\.npy is damaged"):
+            load_from(at_home["version"], CAR)
+    finally:
+        states.write_bytes(good)
+
+
+def test_nothing_of_a_logged_memory_is_pickled(logged: dict[str, str]) -> None:
+    endings = {file.suffix for file in Path(logged["data"], "mlartifacts").rglob("*") if file.is_file()}
+    assert endings <= {".npy", ".safetensors", ".onnx", ".json", ".py", ".txt", ".yaml", ""}
+    code = list(Path(logged["data"], "mlartifacts").rglob("*.py"))
+    assert [file.name for file in code] == ["memory_model_code.py"]
+
+
+ELSEWHERE = """
+import json, sys
+import mlflow
+import pandas as pd
+
+uri, problem = sys.argv[1:]
+model = mlflow.pyfunc.load_model(uri)
+assert model.metadata.signature is not None and model.input_example is not None
+assert len(model.predict(model.input_example)) == 5
+rows = model.predict(pd.DataFrame({"problem": [problem, problem]}), {"top_k": 7})
+print(json.dumps(rows.to_dict("records")))
+"""
+
+
+def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
+    logged: dict[str, str], tmp_path: Path
+) -> None:
+    problem = EASY.draw(901, 3)
+    moved = json.loads(json.dumps(fields_of(problem)))
+    moved["id"] = "moved"
+    for name in ("start", "goal"):
+        moved[name][:2] = [moved[name][0] + 100.0, moved[name][1] - 30.0]
+    moved["bounds"] = [value + (100.0, -30.0)[i % 2] for i, value in enumerate(moved["bounds"])]
+    moved["obstacles"] = [[[x + 100.0, y - 30.0] for x, y in polygon] for polygon in moved["obstacles"]]
+    environment = {
+        "PATH": "/usr/bin:/bin",
+        "HOME": str(tmp_path),
+        "PYTHONPATH": str(ROOT),
+        "MLFLOW_TRACKING_URI": logged["uri"],
+        "MLFLOW_ALLOW_PICKLE_DESERIALIZATION": "false",
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, logged["alias"], json.dumps(moved)],
+        env=environment,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=200,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    rows = pd.DataFrame(json.loads(done.stdout.splitlines()[-1]))
+    assert list(rows["problem_id"]) == ["moved"] * 14
+    assert list(rows["rank"]) == [*range(1, 8)] * 2
+    assert (np.diff(rows["score"][:7]) <= 0.0).all()
+    asked = problem_of(moved, "moved")
+    assert rows["free"].any()
+    for _, row in rows.iterrows():
+        plan = Plan(np.array(row["states"]), np.array(row["controls"]), row["dt"])
+        found = faults(asked, plan, CAR)
+        assert (found == []) or not row["free"]
+        assert plan.states[0, :2].tolist() == pytest.approx(asked.start[:2], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("{", "Problem 1: it is not valid JSON"),
+        ("[]", "Problem 1: is list, wanted was an object"),
+        ("{}", "Problem 1: field start is missing"),
+        (json.dumps(fields_of(EASY.draw(0, 0)) | {"goal": [9.0, 9.0]}), "cut a longer route"),
+    ],
+)
+def test_a_bad_problem_gets_one_clear_line(at_home: dict[str, str], text: str, reason: str) -> None:
+    import mlflow
+    from mlflow.exceptions import MlflowException
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MLFLOW_TRACKING_URI", at_home["uri"])
+        model = mlflow.pyfunc.load_model(at_home["model"])
+        with pytest.raises(MlflowException, match=reason) as error:
+            model.predict(pd.DataFrame({"problem": [text]}))
+        assert "\n" not in str(error.value)
+        with pytest.raises(MlflowException, match="missing inputs"):
+            model.predict(pd.DataFrame({"question": [text]}))
+
+
+def test_plan_takes_a_memory_from_mlflow(at_home: dict[str, str], tmp_path: Path) -> None:
+    from storage.tables.attempts import read_attempts
+    from tasks.requests.assistant import Assistant, Way, plan_one
+    from tasks.requests.solve_many import solve_many
+
+    place = tmp_path / "p.json"
+    place.write_text(json.dumps(fields_of(EASY.draw(901, 3))))
+    assistant = Assistant("gust", "closed", 12, at_home["alias"], 1)
+    plan_one(assistant, place, tmp_path / "plan.json", None)
+    record = read_plan(tmp_path / "plan.json")
+    assert record.source == "recalled"
+    assert record.plan is not None
+    assert faults(to_canonical(EASY.draw(901, 3))[0], record.plan, CAR) == []
+    solve_many(Way("gust", "closed", 12, at_home["alias"], 1), place, tmp_path / "rows.parquet")
+    assert list(read_attempts(tmp_path / "rows.parquet")["source"]) == ["recalled"]
