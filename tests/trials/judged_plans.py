@@ -29,12 +29,12 @@ from planners.memory.recall import Memory
 from planners.search.outcome import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
-from planners.world.authority import faults
-from planners.world.classes import CLASSES, DIFFICULTIES, problem_class
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
-from planners.world.vehicle import VEHICLES
-from storage.files import whole_file
+from planners.world.vehicles.vehicle import VEHICLES
+from storage.places.files import whole_file
 from tests.planners.memories import memory_of
 
 EXPERIENCES: Final = 100  # problems that a memory is made of

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
+from tests.planners.world.test_authority import EMPTY, good_plan, winding_plan
 
-from planners.world.authority import faults
+from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem, obstacles_of
-from planners.world.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR
 from tests.planners.world.motions import exact_motion
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
-from tests.planners.world.test_authority import EMPTY, good_plan, winding_plan
 from tests.trials.car_checker import corners, wrong_with
 from tests.trials.checked_plans import car_plans
 
