@@ -14,7 +14,7 @@ from tasks.fan_out.stage import Chunk
 from tasks.inputs.problem_sources import source_of
 from tasks.settings.run_settings import COMBINED, RunSettings
 
-READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/growth.md)
+READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/studies/growth.md)
 
 
 def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list[Experience]:

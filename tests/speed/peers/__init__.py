@@ -1,1 +1,1 @@
-"""Our planners from scratch beside those of OMPL (docs/peers.md)."""
+"""Our planners from scratch beside those of OMPL (docs/studies/peers.md)."""
