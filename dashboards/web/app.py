@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from pathlib import Path
@@ -35,6 +34,7 @@ from dashboards.web.query import Asked, link
 from dashboards.web.retrained import Retrainings
 from dashboards.web.site import Site
 from storage.errors import StorageError
+from storage.fields import parse_json
 from storage.places.data_folder import DataFolder
 
 LARGEST_BODY_BYTES: Final = 1 << 20
@@ -163,9 +163,9 @@ async def _content(request: Request) -> Any:
         if len(body) > LARGEST_BODY_BYTES:
             raise WrongQuestionError(f"A world takes at most {LARGEST_BODY_BYTES >> 20} MB; this is more.")
     try:
-        return json.loads(bytes(body).decode())
-    except (ValueError, RecursionError):
-        raise WrongQuestionError("This is no JSON; send an object as the documentation says.") from None
+        return parse_json(bytes(body), "The world")
+    except StorageError as error:
+        raise WrongQuestionError(str(error)) from None
 
 
 def _asked(request: Request) -> Asked:

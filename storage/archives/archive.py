@@ -19,7 +19,8 @@ from planners.world.geometry.occupancy import GRID
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.arrays import write_array
 from storage.errors import StorageError
-from storage.places.files import local_text, parse_json, whole_folder
+from storage.fields import parse_json
+from storage.places.files import local_text, whole_folder
 from storage.places.mirror import fetch_folder
 from storage.recorded_vehicle import fields_of, refuse_another
 from storage.tables.columns import Array

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
 from planners.world.alignment import scaled
+from planners.world.arrays import Floats
+from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
+from storage.fields import check_fields, number_of, scale_of, short, text_of
 from storage.places.files import read_json, write_json
 from storage.recorded_vehicle import other_vehicle
+
+FIELDS: Final = (
+    "problem_id", "status", "source", "planner", "assist", "vehicle", "scale", "dt", "states", "controls",
+    "planning_seconds", "length_m", "duration_s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,42 +68,77 @@ def write_plan(path: Path, record: PlanRecord) -> None:
 
 
 def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
-    """The plan of a file; a StorageError where a field is missing or misshapen, or for another vehicle."""
-    found = read_json(path)
+    """Read the plan contract's JSON.
+
+    Args:
+        path: the file.
+        vehicle: the vehicle that the plan must be for.
+
+    Returns:
+        The plan in the lengths of its problem, and where it came from.
+
+    Raises:
+        StorageError: the file is missing or no JSON, has an unknown field or lacks one, was made for another
+            vehicle, or holds what no vehicle could have driven.
+
+    """
+    fields = read_json(path)
     try:
-        made_for = str(found.get("vehicle", name_of(CAR)))  # files were once of the car alone
-        states = np.array(found["states"], float)
-        controls = np.array(found["controls"], float).reshape(-1, 2)
-        scale = float(found.get("scale", 1.0))
-        plan = Plan(states, controls, float(found["dt"])) if len(states) else None
-        record = PlanRecord(
-            str(found["problem_id"]),
-            str(found["status"]),
-            found["source"],
-            str(found["planner"]),
-            str(found["assist"]),
-            float(found["planning_seconds"]),
-            plan,
-            vehicle,
-            scale,
-        )
+        if not isinstance(fields, dict):
+            raise ValueError(f"holds {short(fields)}, wanted was the object of a plan")
+        check_fields(list(fields), FIELDS)
+        made_for = text_of(fields.get("vehicle", name_of(CAR)), "vehicle")  # files were once of the car alone
+        if made_for != name_of(vehicle):
+            raise other_vehicle(path, made_for, vehicle)
+        return _record(fields, vehicle)
     except KeyError as error:
         raise StorageError(f"{path} has no field {error}; is it a plan?") from None
-    except (AttributeError, TypeError, ValueError) as error:
-        raise StorageError(f"{path} is no plan: {error}.") from None
-    if made_for != name_of(vehicle):
-        raise other_vehicle(path, made_for, vehicle)
-    names = state_names(vehicle)
-    shapes = (len(controls) + 1, len(names))
-    if plan is not None and states.shape != shapes:
-        raise StorageError(
-            f"{path} has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
-            f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2]. Was it recorded for another vehicle?"
-        )
-    if plan is not None and not (np.isfinite(states).all() and np.isfinite(controls).all()):
-        raise StorageError(
-            f"{path} has a state or control that is not a finite number; write the plan again."
-        )
-    if not 0.0 < scale < np.inf:
-        raise StorageError(f"{path} has scale {scale}; wanted are metres a canonical metre.")
-    return record if plan is None else replace(record, plan=scaled(plan, 1.0 / scale))
+    except ValueError as error:
+        raise StorageError(f"{path}: {error}.") from None
+
+
+def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
+    scale = scale_of(fields.get("scale"))
+    states, controls = _rows(fields["states"], "states"), _rows(fields["controls"], "controls")
+    plan = None
+    if len(states):
+        names = state_names(vehicle)
+        if (states.shape, controls.shape) != ((len(states), len(names)), (len(states) - 1, 2)):
+            raise ValueError(
+                f"has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
+                f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2]. was it recorded for another vehicle"
+            )
+        if number_of(fields["dt"], "dt") != vehicle.dt:
+            raise ValueError(
+                f"has steps of dt {fields['dt']} s; those of {name_of(vehicle)} are {vehicle.dt} s"
+            )
+        plan = scaled(Plan(states, controls, vehicle.dt), 1.0 / scale)
+        if not max(np.abs(plan.states).max(), np.abs(plan.controls).max(initial=0.0)) <= LARGEST_COORDINATE_M:
+            raise ValueError(
+                f"has a state or control that is not a finite number up to {LARGEST_COORDINATE_M:.0f}; "
+                "write the plan again"
+            )
+    return PlanRecord(
+        text_of(fields["problem_id"], "problem_id"),
+        text_of(fields["status"], "status"),
+        None if fields["source"] is None else text_of(fields["source"], "source"),
+        text_of(fields["planner"], "planner"),
+        text_of(fields["assist"], "assist"),
+        number_of(fields["planning_seconds"], "planning_seconds"),
+        plan,
+        vehicle,
+        scale,
+    )
+
+
+def _rows(rows: object, name: str) -> Floats:
+    """Numbers ``[T, n]``; no control is ``[0, 2]``."""
+    try:
+        array = np.array(rows)
+    except ValueError:  # rows of different lengths, or lists without end
+        array = np.array(None)
+    if array.shape == (0,):
+        return np.empty((0, 2))
+    if array.dtype.kind not in "if" or array.ndim != 2:
+        raise ValueError(f"has {name} that are no rows of numbers; write the plan again")
+    return array.astype(float)

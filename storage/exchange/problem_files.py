@@ -12,11 +12,12 @@ from typing import Any, Final
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from storage.errors import StorageError
-from storage.places.files import parse_json, read_text
+from storage.errors import StorageError, sentence
+from storage.fields import check_fields, parse_json
+from storage.places.files import read_text
 
 FORMATS: Final = (".json", ".jsonl", ".parquet")
-COLUMNS: Final = ("id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale")
+FIELDS: Final = ("id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale")
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
 SLICES_A_GROUP: Final = 16  # who wants the last rows of a row group has to decode those before
 BUFFER_BYTES: Final = 1 << 20
@@ -52,7 +53,7 @@ def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
         case ".jsonl":
             for number, line in enumerate(_lines(path), start=1):
                 if line.strip():
-                    yield number, _parsed(path, number, line)
+                    yield number, parse_json(line, f"{path} line {number}")
         case _:
             yield from enumerate(_rows(path), start=1)
 
@@ -82,7 +83,7 @@ def raw_slice(piece: ProblemSlice) -> Iterator[tuple[int, Any]]:
             found = 0
             for number, line in enumerate(_lines(piece.path, piece.place), start=piece.first):
                 if line.strip():
-                    yield number, _parsed(piece.path, number, line)
+                    yield number, parse_json(line, f"{piece.path} line {number}")
                     found += 1
                 if found == piece.count:
                     break
@@ -100,13 +101,6 @@ def _lines(path: Path, place: int = 0) -> Iterator[bytes]:
         raise StorageError(f"{path} does not exist; check the name.") from None
     except OSError as error:
         raise StorageError(f"{path} cannot be read: {error.strerror}.") from None
-
-
-def _parsed(path: Path, number: int, line: bytes) -> Any:
-    try:
-        return parse_json(line.decode(), f"{path} line {number}")
-    except UnicodeDecodeError:
-        raise StorageError(f"{path} line {number} is not text in UTF-8; is it the right file?") from None
 
 
 def _slices_of_lines(path: Path, size: int) -> list[ProblemSlice]:
@@ -156,9 +150,8 @@ def _rows(
     """Rows of all row groups, or ``count`` from row ``first`` of some."""
     last = None if count is None else first + count
     with _opened(path) as file:
-        names = [name for name in file.schema_arrow.names if name in COLUMNS]
         at = 0
-        for batch in file.iter_batches(BATCH_ROWS, row_groups=groups, columns=names):
+        for batch in file.iter_batches(BATCH_ROWS, row_groups=groups):
             begin, end = max(first - at, 0), len(batch) if last is None else min(last - at, len(batch))
             if begin < end:
                 yield from batch.slice(begin, end - begin).to_pylist()
@@ -171,9 +164,12 @@ def _rows(
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
     try:
         with pq.ParquetFile(path, buffer_size=BUFFER_BYTES) as file:
+            check_fields(file.schema_arrow.names, FIELDS)
             yield file
     except FileNotFoundError:
         raise StorageError(f"{path} does not exist; check the name.") from None
     except (pa.ArrowException, OSError) as error:
         reason = str(error).partition("\n")[0].rstrip(".")
         raise StorageError(f"{path} is no whole Parquet file ({reason}); write it again.") from None
+    except ValueError as error:
+        raise StorageError(sentence(path, error)) from None

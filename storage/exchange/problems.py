@@ -15,13 +15,12 @@ from planners.world.problem import Obstacles, Problem, obstacles_of
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
-from storage.exchange.problem_files import ProblemSlice, format_of, raw_problems, raw_slice
+from storage.exchange.problem_files import FIELDS, ProblemSlice, format_of, raw_problems, raw_slice
+from storage.fields import check_fields, number_of, scale_of, short, text_of
 from storage.places.files import whole_file, write_json
 from storage.tables.schemas import PROBLEMS
 from storage.tables.shards import table_of, write_table
 
-SMALLEST_SCALE: Final = 0.01  # a robot of 2 cm
-LARGEST_SCALE: Final = 100.0
 UNKNOWN_CLASS: Final = "unknown"
 _REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
 
@@ -63,7 +62,7 @@ def _checked(
     for number, fields in raw:
         place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
         identity = fields.get("id") if isinstance(fields, Mapping) else None
-        named = f"{place} (id {_short(identity)})" if isinstance(identity, str) and identity else place
+        named = f"{place} (id {short(identity)})" if isinstance(identity, str) and identity else place
         try:
             name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
             problem = problem_of(fields, name, vehicle)
@@ -101,18 +100,19 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     """The problem that a contract's object describes, checked; ValueError says what is wrong with it."""
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
+    check_fields(list(fields), FIELDS)
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; wanted are {', '.join(_REQUIRED)}")
     start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
     bounds = _numbers(fields, "bounds", 4)
-    scale = _scale(fields.get("scale"))
+    scale = scale_of(fields.get("scale"))
     problem = Problem(
         id=_text(fields, "id", default_id),
         class_name=_text(fields, "class", UNKNOWN_CLASS),
         start=(start[0] / scale, start[1] / scale, start[2]),
         goal=(goal[0] / scale, goal[1] / scale),
-        goal_radius=_number(fields["goal_radius"], "goal_radius") / scale,
+        goal_radius=number_of(fields["goal_radius"], "goal_radius") / scale,
         bounds=(bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
         obstacles=_obstacles(fields["obstacles"], fields.get("groups"), scale),
         scale=scale,
@@ -154,47 +154,19 @@ def _points(points: object) -> Floats:
         isinstance(point, list) and len(point) == 2 for point in points
     ):
         raise PolygonError("must be a list of points [x, y] in metres; correct it")
-    return np.array([[_number(x, "a point"), _number(y, "a point")] for x, y in points]).reshape(-1, 2)
+    return np.array([[number_of(x, "a point"), number_of(y, "a point")] for x, y in points]).reshape(-1, 2)
 
 
 def _numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
     values = fields[name]
     if not isinstance(values, list) or len(values) != count:
-        raise ValueError(f"{name} must be a list of {count} numbers, got {_short(values)}")
-    return [_number(value, name) for value in values]
-
-
-def _number(value: object, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{name} must hold numbers, got {_short(value)}")
-    try:
-        return float(value)
-    except OverflowError:
-        return float("inf")  # which the checks refuse
-
-
-def _scale(value: object) -> float:
-    scale = 1.0 if value is None else _number(value, "scale")
-    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
-        raise ValueError(
-            f"scale is {scale:g}; wanted are metres a canonical metre, "
-            f"from {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}"
-        )
-    return scale
+        raise ValueError(f"{name} must be a list of {count} numbers, got {short(values)}")
+    return [number_of(value, name) for value in values]
 
 
 def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
     value = fields.get(name)
-    if value is None or value == "":
-        return default
-    if not isinstance(value, str) or not value.isprintable():
-        raise ValueError(f"{name} must be a printable text, got {_short(value)}")
-    return value
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return default if value is None or value == "" else text_of(value, name)
 
 
 def fields_of(problem: Problem) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from storage.errors import InUseError, StorageError
+from storage.fields import parse_json
 from storage.places.mirror import PARTIAL, fetch, publish, publish_folder
 
 REMOVALS: Final = 10
@@ -135,7 +136,7 @@ def read_text(path: Path) -> str:
 
 
 def local_text(path: Path) -> str:
-    """The same of a file that is here, such as one of a folder that was fetched."""
+    """Like ``read_text``, of a file that is here, such as one of a folder that was fetched."""
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -144,14 +145,6 @@ def local_text(path: Path) -> str:
         raise StorageError(f"{path} is not a text file in UTF-8; is it the right file?") from None
     except OSError as error:
         raise StorageError(f"{path} cannot be read: {error.strerror}.") from None
-
-
-def parse_json(text: str, where: str) -> Any:
-    """The value that a JSON text holds; ``where`` names it in the StorageError when it is none."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise StorageError(f"{where} is not valid JSON ({error}); was it cut off?") from None
 
 
 @contextmanager

@@ -15,7 +15,8 @@ from rich.table import Table
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
-from storage.exchange.problems import LARGEST_SCALE, SMALLEST_SCALE, write_problems
+from storage.exchange.problems import write_problems
+from storage.fields import LARGEST_SCALE, SMALLEST_SCALE
 from storage.places.files import whole_file, whole_folder
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at

@@ -23,7 +23,7 @@ from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
-from storage.places.files import parse_json
+from storage.fields import parse_json
 from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.compile_assists import EMPTY, compile_assists
 from tasks.registry.memory_at import one_memory

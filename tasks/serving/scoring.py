@@ -17,6 +17,8 @@ from mlflow.exceptions import MlflowException
 from mlflow.pyfunc import PyFuncModel, scoring_server
 from starlette.types import Receive, Scope, Send
 
+from storage.errors import StorageError
+from storage.fields import check_fields, parse_json, short
 from tasks.tracking.memory_model import TOP_K
 
 PATH: Final = "/invocations"
@@ -74,10 +76,15 @@ class Scoring:
     def _asked(self, body: bytes) -> tuple[pd.DataFrame, int]:
         """The table of problems, and how many plans each is to get."""
         try:
-            asked = orjson.loads(body)
-        except orjson.JSONDecodeError as error:
-            raise RefusedError(400, f"The body is no valid JSON ({error}).") from None
-        given = [name for name in FORMATS if name in asked] if isinstance(asked, dict) else []
+            asked = parse_json(body, "The body")
+            if not isinstance(asked, dict):
+                raise ValueError(f"is {short(asked)}, wanted was an object with one of {', '.join(FORMATS)}")
+            check_fields(list(asked), (*FORMATS, "params"))
+        except StorageError as error:
+            raise RefusedError(400, str(error)) from None
+        except ValueError as error:
+            raise RefusedError(400, f"The body {error}.") from None
+        given = [name for name in FORMATS if name in asked]
         if len(given) != 1:
             told = ", ".join(given) or "none of them"
             raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {told}.")
@@ -87,6 +94,7 @@ class Scoring:
             table = scoring_server.infer_and_parse_data({given[0]: asked[given[0]]}, schema)
             if not isinstance(table, pd.DataFrame):
                 table = pd.DataFrame(table)
+            check_fields(table.columns.tolist(), ("problem",))
         except Exception as error:  # MLflow and pandas have one of their own for each kind of nonsense
             raise RefusedError(400, f"{given[0]} is no table of problems: {error}") from None
         if len(table) * top_k > MOST_PLANS:

@@ -35,7 +35,7 @@ from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of, problem_of
-from storage.places.files import parse_json
+from storage.fields import parse_json
 
 CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context

@@ -23,8 +23,10 @@ from planners.world.problem import Problem, start_state
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.problems import fields_of, problem_of
+from storage.fields import check_fields, text_of
 
 ASSISTS: Final = ("repair", "open", "closed")
+CHOICES: Final = ("planner", "assist", "memory")  # that come with a world
 MOST_OBSTACLES: Final = 300
 MOST_CORNERS: Final = 4_000
 LIMITS: Final = Limits(seconds=0.4)  # for each of the two attempts
@@ -96,13 +98,16 @@ def plan_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
     run = site.run(asked.run)
     vehicle = site.vehicle(run)
     if not isinstance(content, dict):
-        raise WrongQuestionError("Send an object with world, planner, assist and memory.")
-    said = Asked(
-        asked.path, {key: value for key, value in content.items() if isinstance(value, str)}, asked.run
-    )
-    planner = said.one_of("planner", tuple(PLANNERS), "gust")
-    assist = said.one_of("assist", ASSISTS, "repair")
-    name = said.text("memory")
+        raise WrongQuestionError(f"Send an object with {', '.join(CHOICES)} and world.")
+    try:
+        check_fields(list(content), (*CHOICES, "world"))
+        said = {name: text_of(content[name], name) for name in CHOICES if name in content}
+    except ValueError as error:
+        raise WrongQuestionError(f"What was sent: {error}.") from None
+    choices = Asked(asked.path, said, asked.run)
+    planner = choices.one_of("planner", tuple(PLANNERS), "gust")
+    assist = choices.one_of("assist", ASSISTS, "repair")
+    name = choices.text("memory")
     known = site.memory(run, name) if name else None
     with site.planning():
         found = _problem(content.get("world"), vehicle)

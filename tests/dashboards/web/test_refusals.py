@@ -147,6 +147,9 @@ WORLD = {
         {"world": WORLD, "planner": "nobody"},
         {"world": WORLD, "memory": "../trap"},
         {"world": WORLD, "assist": "x"},
+        {"world": WORLD, "assist": 7},
+        {"world": WORLD, "planer": "gust"},
+        {"world": WORLD | {"start_speed": 1.0}},
     ],
 )
 def test_a_world_that_makes_no_sense_is_told_why(client: httpx.Client, content: object) -> None:
@@ -155,6 +158,25 @@ def test_a_world_that_makes_no_sense_is_told_why(client: httpx.Client, content: 
     )
     assert answer.status_code in (400, 404)
     assert len(answer.json()["error"]) > 10
+
+
+@pytest.mark.parametrize("place", ["/runs/first/plan", "/runs/first/check"])
+def test_a_field_that_is_there_twice_is_refused(client: httpx.Client, place: str) -> None:
+    world = json.dumps(WORLD)[:-1] + ', "obstacles": []}'
+    content = f'{{"world": {world}}}' if place.endswith("plan") else world
+    answer = client.post(place, content=content, headers={"content-type": "application/json"})
+    assert answer.status_code == 400
+    assert "'obstacles' more than once" in answer.json()["error"]
+
+
+def test_a_misspelt_field_is_told_with_the_nearest_name(client: httpx.Client) -> None:
+    for place, content in (
+        ("/runs/first/check", WORLD | {"obstacels": []}),
+        ("/runs/first/plan", {"world": WORLD | {"obstacels": []}}),
+    ):
+        answer = client.post(place, json=content)
+        assert answer.status_code == 400
+        assert "'obstacles'" in answer.json()["error"]
 
 
 def test_a_world_of_megabytes_is_refused(client: httpx.Client) -> None:

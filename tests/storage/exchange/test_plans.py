@@ -6,12 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, VEHICLES
 from storage.errors import StorageError
-from storage.exchange.plans import PlanRecord, read_plan, write_plan
-from tests.storage.samples import plan, same_plan
+from storage.exchange.plans import FIELDS, PlanRecord, read_plan, write_plan
+from tests.storage.samples import plan, quick, same_plan
 
 RECORD = PlanRecord("p-1", "solved", "repaired", "gust", "open", 0.012, plan(20))
 
@@ -50,9 +53,9 @@ def test_a_file_holds_the_lengths_outside_and_says_the_scale(tmp_path: Path) -> 
     assert read.plan is not None
     assert read.scale == 0.5
     assert same_plan(read.plan, RECORD.plan)
-    for scale in (0.0, -1.0, math.nan):
+    for scale in (0.0, -1.0, 1e-320, 1e308, math.nan, 10**400):
         path.write_text(json.dumps(found | {"scale": scale}))
-        with pytest.raises(StorageError, match="has scale"):
+        with pytest.raises(StorageError, match="scale is"):
             read_plan(path)
 
 
@@ -93,10 +96,16 @@ def test_an_attempt_without_a_plan_can_be_written(tmp_path: Path) -> None:
     [
         ({"states": [[1, 2, 3], [1, 2, 3]], "controls": [[0, 0]]}, r"states \[2, 3\].*another vehicle"),
         ({"states": [[1, 2, 3, 4, 5]]}, "another vehicle"),
-        ({"states": [[1, 2, 3, 4, 5], [1, 2]]}, "is no plan"),
-        ({"states": "none"}, "is no plan"),
-        ({"dt": None}, "is no plan"),
+        ({"states": [[1, 2, 3, 4, 5], [1, 2]]}, "no rows of numbers"),
+        ({"states": "none"}, "no rows of numbers"),
+        ({"states": [["1", "2", "3", "4", "5"]], "controls": []}, "no rows of numbers"),
+        ({"states": [[1, 2, 3, 4, 10**400]], "controls": []}, "no rows of numbers"),
         ({"states": [[1, 2, 3, 4, float("nan")]], "controls": []}, "not a finite number"),
+        ({"states": [[1e300, 2, 3, 4, 5]], "controls": []}, "not a finite number"),
+        *[({"dt": dt}, "dt") for dt in (None, "0.1", 0.0, -0.1, 1e-320, math.nan, math.inf, 0.2)],
+        ({"problem_id": 7}, "problem_id must be a printable text"),
+        ({"source": ["searched"]}, "source must be a printable text"),
+        ({"planning_seconds": None}, "planning_seconds must hold numbers"),
     ],
 )
 def test_a_file_that_is_no_plan_is_refused_in_one_line(
@@ -108,6 +117,37 @@ def test_a_file_that_is_no_plan_is_refused_in_one_line(
     with pytest.raises(StorageError, match=reason) as error:
         read_plan(path)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["[]", "7", "null", '"plan"', "[[0.0]]", "", "{", "[" * 100_000, "\ufeff{}"])
+def test_what_is_no_object_is_no_plan(tmp_path: Path, text: str) -> None:
+    (tmp_path / "plan.json").write_text(text)
+    with pytest.raises(StorageError, match=r"plan\.json") as error:
+        read_plan(tmp_path / "plan.json")
+    assert "\n" not in str(error.value)
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+    max_leaves=12,
+)
+
+
+@quick
+@given(name=st.sampled_from(FIELDS), value=VALUES)
+def test_whatever_a_field_holds_it_is_a_plan_or_one_line(
+    tmp_path_factory: pytest.TempPathFactory, name: str, value: object
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "plan.json"
+    write_plan(path, RECORD)
+    path.write_text(json.dumps({**json.loads(path.read_text()), name: value}))
+    try:
+        read = read_plan(path)
+    except StorageError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+    else:
+        assert read.plan is None or np.isfinite(read.plan.states).all()
 
 
 def test_a_missing_field_is_named(tmp_path: Path) -> None:

@@ -229,7 +229,7 @@ def test_a_file_that_is_missing_cut_off_or_of_another_kind_is_refused(tmp_path: 
         ("deep.json", "not valid JSON"),
         ("picture.json", "not a text file"),
         ("cut.parquet", "no whole Parquet file"),
-        ("other.parquet", "field start is missing"),
+        ("other.parquet", "unknown field 'x'"),
         ("folder.json", "cannot be read"),
     ]:
         with pytest.raises(StorageError) as error:

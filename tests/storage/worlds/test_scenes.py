@@ -87,7 +87,7 @@ def test_problem_files_keep_their_problems_and_list_the_bad_ones(tmp_path: Path)
     assert [p.id for p in train.problems] == ["p-0", "p-2"]
     assert [p.id for p in test.problems] == ["p-1", "p-3", "p-5"]
     assert all(same_problem(a, b) for a, b in zip(train.problems, problems[::2], strict=False))
-    assert ["field goal is missing" in reason for _, reason in train.skipped] == [True, False]
+    assert ["nearest is 'goal'" in reason for _, reason in train.skipped] == [True, False]
     assert "occurs twice" in train.skipped[1][1]
     assert "field start is missing" in test.skipped[0][1]
 

@@ -77,6 +77,16 @@ def test_a_malformed_problem_is_one_line(planner: RobotPlanner, bad: object) -> 
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("as_text", [False, True])
+def test_a_field_that_is_not_understood_is_refused(planner: RobotPlanner, as_text: bool) -> None:
+    for name, nearest in (("obstacels", "'obstacles'"), ("start_speed", "'start'"), ("moving", "supported")):
+        fields = {**fields_of(problem(0)), name: []}
+        with pytest.raises(ValueError, match=f"unknown field '{name}'.*{nearest}"):
+            planner.plan(json.dumps(fields) if as_text else fields)
+    with pytest.raises(ValueError, match="'obstacles' more than once"):
+        planner.plan(json.dumps(fields_of(problem(0)))[:-1] + ', "obstacles": []}')
+
+
 def test_threads_do_not_disturb_each_other(planner: RobotPlanner) -> None:
     alone = [planner.plan(problem(i)) for i in range(COUNT)]
     wrong: list[int] = []

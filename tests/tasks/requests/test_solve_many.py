@@ -118,7 +118,7 @@ def test_a_malformed_line_is_named_and_only_its_part_is_left_to_do(
     path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), *lines[5:]]))
-    with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*field goal is missing.* All else is"):
+    with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All else is"):
         solve_many(WAY, path, out)
     assert not out.exists()
     path.write_text("".join(lines))
