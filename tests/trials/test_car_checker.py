@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
-from tests.planners.world.test_authority import EMPTY, good_plan, winding_plan
 
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR
+from tests.planners.world.authority.test_authority import EMPTY, good_plan, winding_plan
 from tests.planners.world.motions import exact_motion
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
 from tests.trials.car_checker import corners, wrong_with
