@@ -15,7 +15,7 @@ from storage.places.data_folder import DataFolder
 from storage.tables.learned_experiences import read_learned, snapshot_ids
 from tasks.fan_out.stage import run_folder
 from tasks.inputs.learned_on_the_job import with_learned
-from tasks.registry.champion_registry import AWAITING, Registry, Version, registered_name
+from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version, registered_name
 from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import Champion, Retraining
 from tasks.settings.run_settings import COMBINED, RunSettings, world_class
@@ -87,6 +87,8 @@ def rounds(folder: DataFolder, settings: RunSettings, registry: Registry) -> lis
     What was learned is frozen under the retraining's number, and champions are copied into the run's folder;
     a retraining that was interrupted finds both again.
     """
+    for name in (registered_name(memory, settings.vehicle) for memory in memory_names(settings)):
+        _note_verdict(registry, registry.aliased(name))
     found = news(folder, settings, registry)
     made = [] if found.first is None else [Round(found.first, found.without, {})]
     for memory, champion in found.champions.items():
@@ -94,6 +96,12 @@ def rounds(folder: DataFolder, settings: RunSettings, registry: Registry) -> lis
     if found.fresh:
         made.append(_retraining(folder, settings, registry, found))
     return made
+
+
+def _note_verdict(registry: Registry, champion: Version | None) -> None:
+    """Note the verdict on a champion if a kill came between its promotion and that."""
+    if champion is not None and champion.tag("key") and not champion.tag("verdict"):
+        registry.tagged(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
 
 
 def _retraining(folder: DataFolder, settings: RunSettings, registry: Registry, found: News) -> Round:

@@ -79,8 +79,8 @@ def roll_back(data: Path, memory: str | None) -> None:
                 f"{champion.name}: version {champion.tag('previous')}, the champion before, is not in the "
                 f"registry any more; version {champion.number} stays."
             )
-        registry.point(before)
         registry.tagged(champion, {"verdict": ROLLED_BACK})
+        registry.point(before)  # last: who is killed before it goes back by one when told again, not by two
         print(f"{champion.name}: version {before.number} is champion again, was {champion.number}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,18 @@ import pytest
 
 from storage.archives.memories import save_memory
 from storage.places.data_folder import open_data_folder
+from tasks.champions.new_experience import rounds
 from tasks.champions.promote import promote, promote_awaiting, roll_back
-from tasks.registry.champion_registry import AWAITING, CHALLENGER, FIRST, PROMOTED, Registry, Version
-from tasks.settings.run_settings import RunError
+from tasks.registry.champion_registry import (
+    AWAITING,
+    CHALLENGER,
+    FIRST,
+    PROMOTED,
+    ROLLED_BACK,
+    Registry,
+    Version,
+)
+from tasks.settings.run_settings import RunError, for_preset
 from tests.storage.samples import a_memory
 
 NAME = "motion-memory-trap"
@@ -111,6 +121,47 @@ def test_a_challenger_whose_champion_was_rolled_back_is_not_approved(registered:
     with pytest.raises(RunError, match="judged against version 2, but the champion is version 1 now"):
         promote_awaiting(registered.data, None)
     assert registered.champion == 1
+
+
+def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_again(
+    registered: Registered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry = registered.registry
+    registry.point(registered.version("one", verdict=FIRST))
+    for against in (1, 2):
+        promote(registry, registered.version(str(against), against=against, retraining=against))
+    written: list[bool] = []
+
+    def killed_after_one(write: Callable[..., Any]) -> Callable[..., Any]:
+        def wrapped(*arguments: Any) -> Any:
+            if written:
+                raise KeyboardInterrupt
+            written.append(True)
+            return write(*arguments)
+
+        return wrapped
+
+    with monkeypatch.context() as patch:
+        for name in ("point", "tagged"):
+            patch.setattr(Registry, name, killed_after_one(getattr(Registry, name)))
+        with pytest.raises(KeyboardInterrupt):
+            roll_back(registered.data, None)
+    roll_back(registered.data, None)
+    assert registered.champion == 2
+    assert registry.versions(NAME)[-1].tag("verdict") == ROLLED_BACK
+
+
+def test_a_champion_whose_promotion_was_killed_gets_its_verdict_by_the_next_retraining(
+    registered: Registered,
+) -> None:
+    registry = registered.registry
+    registry.point(registered.version("one"))
+    settings = for_preset("smoke", classes=["trap"])
+    assert rounds(open_data_folder(registered.data), settings, registry) == []
+    assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST]
+    promote(registry, registered.version("two", against=1, retraining=1))
+    assert rounds(open_data_folder(registered.data), settings, registry) == []
+    assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST, PROMOTED]
 
 
 def test_where_there_is_no_data_nothing_is_made(tmp_path: Path) -> None:
