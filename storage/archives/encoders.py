@@ -7,50 +7,76 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
-from planners.memory.encoder.encoder import Architecture
+from planners.memory.encoder.encoder import Architecture, weight_shapes
 from planners.memory.encoder.training import Epoch, TrainedEncoder, TrainingSettings
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import read_archive, write_archive
+from storage.archives.tensors import check_floats, packed, unpacked
 from storage.errors import StorageError
+from storage.fields import short
 
 _KIND: Final = "encoder"
 _TENSORS: Final = "tensors.safetensors"
 _WEIGHT: Final = "weights."  # before the names of the network's own tensors
-_ARRAYS: Final = ("centroids", "vectors", "biases", "popularity", "held_out")
+_FLOATS: Final = ("centroids", "vectors", "biases", "popularity")
 
 
 def save_encoder(folder: Path, trained: TrainedEncoder, vehicle: Vehicle = CAR) -> None:
     """Write a trained encoder as a folder, whole or not at all; the same one gives the same bytes."""
     tensors = {_WEIGHT + name: tensor for name, tensor in trained.weights.items()}
-    tensors |= {name: getattr(trained, name) for name in _ARRAYS}
+    tensors |= {name: getattr(trained, name) for name in (*_FLOATS, "held_out")}
     history = np.array(trained.history, np.float64).reshape(-1, len(Epoch._fields))
-    arrays = {**tensors, "history": history}
-    data = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
+    data = packed({**tensors, "history": history})
     write_archive(folder, _KIND, vehicle, {"settings": asdict(trained.settings)}, {_TENSORS: data})
 
 
 def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
     """The trained encoder in a folder.
 
-    StorageError: missing, damaged, of a newer version, for another vehicle or another grid.
+    Raises:
+        StorageError: it is missing, damaged, does not hold what it says, or is of another version, for
+            another vehicle or grid.
+
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
-        tensors = load(bytes(files[_TENSORS]))
-        sizes = header["settings"].pop("architecture")
-        architecture = Architecture(tuple(sizes["channels"]), tuple(sizes["hidden"]), sizes["dimensions"])
+        tensors = unpacked(files[_TENSORS])
+        settings = _settings(header["settings"])
+        history, held_out = tensors.pop("history"), tensors.pop("held_out")
+        if held_out.dtype != np.int32 or held_out.ndim != 1 or (held_out < 0).any():
+            raise ValueError("held_out are no numbers of problems")
+        if (
+            history.shape != (max(1, len(history)), len(Epoch._fields))
+            or not np.isfinite(history[:, 2:]).all()
+        ):
+            raise ValueError("history is none of epochs")
+        shapes = {_WEIGHT + name: shape for name, shape in weight_shapes(settings.architecture).items()}
+        rows = (len(tensors["biases"]), settings.architecture.dimensions)
+        readout = {"centroids": rows, "vectors": rows, "biases": rows[:1], "popularity": (rows[0] - 1,)}
+        check_floats(tensors, shapes | readout)
         return TrainedEncoder(
-            settings=TrainingSettings(**header["settings"], architecture=architecture),
-            weights={
-                name.removeprefix(_WEIGHT): tensor
-                for name, tensor in tensors.items()
-                if name.startswith(_WEIGHT)
-            },
-            **{name: tensors[name] for name in _ARRAYS},
-            history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in tensors["history"].tolist()),
+            settings=settings,
+            weights={name.removeprefix(_WEIGHT): tensors[name] for name in shapes},
+            **{name: tensors[name] for name in _FLOATS},
+            history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in history.tolist()),
+            held_out=held_out,
         )
-    except (KeyError, TypeError, ValueError, SafetensorError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise StorageError(f"{folder} is no whole encoder ({error}); train it again.") from None
+
+
+def _settings(described: object) -> TrainingSettings:
+    """The settings that a header describes; ValueError or TypeError where no training had them."""
+    if not isinstance(described, dict):
+        raise ValueError(f"its settings are {short(described)}, wanted was an object")
+    sizes, others = (
+        described["architecture"],
+        {name: described[name] for name in described.keys() - {"architecture"}},
+    )
+    for name, usual in asdict(TrainingSettings()).items():
+        value = others.get(name, usual)
+        if not (type(value) is type(usual) or (type(value) is int and type(usual) is float)):
+            raise ValueError(f"its setting {name} is {short(value)}")
+    architecture = Architecture(tuple(sizes["channels"]), tuple(sizes["hidden"]), sizes["dimensions"])
+    return TrainingSettings(**others, architecture=architecture)

@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
-
 from planners.memory.encoder.encoder import Weights
 from planners.memory.hallucination.learned_obstacles import weight_shapes
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import read_archive, write_archive
+from storage.archives.tensors import check_floats, packed, unpacked
 from storage.errors import StorageError
 
 _KIND: Final = "hallucinator"
@@ -21,8 +18,7 @@ _WEIGHTS: Final = "weights.safetensors"
 
 def save_hallucinator(folder: Path, weights: Weights, vehicle: Vehicle = CAR) -> None:
     """Write the weights as a folder, whole or not at all; the same ones give the same bytes."""
-    data = save({name: np.ascontiguousarray(tensor) for name, tensor in weights.items()})
-    write_archive(folder, _KIND, vehicle, {}, {_WEIGHTS: data})
+    write_archive(folder, _KIND, vehicle, {}, {_WEIGHTS: packed(weights)})
 
 
 def load_hallucinator(folder: Path, vehicle: Vehicle = CAR) -> Weights:
@@ -32,9 +28,8 @@ def load_hallucinator(folder: Path, vehicle: Vehicle = CAR) -> Weights:
     """
     _, files = read_archive(folder, _KIND, vehicle)
     try:
-        weights: Weights = load(bytes(files[_WEIGHTS]))
-    except (KeyError, SafetensorError) as error:
+        weights = unpacked(files[_WEIGHTS])
+        check_floats(weights, weight_shapes())
+    except (KeyError, ValueError) as error:
         raise StorageError(f"{folder} is no whole hallucinator ({error}); run hallucinate again.") from None
-    if {name: weight.shape for name, weight in weights.items()} != weight_shapes():
-        raise StorageError(f"{folder} holds another network than this program's; run hallucinate again.")
     return weights

@@ -12,22 +12,24 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
-from planners.memory.encoder.encoder import Architecture, architecture_of, to_onnx
+from planners.memory.encoder.encoder import Architecture, architecture_of, to_onnx, weight_shapes
+from planners.memory.encoder.training import OBJECTIVES
+from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.stored_plans import StoredPlans, store_plans
-from planners.memory.plans.sweeps import PlanSweeps, sweeps_with
+from planners.memory.plans.sweeps import PlanSweeps, sweep_plans, sweeps_with
 from planners.memory.ranking.inverted_lists import lists_with
 from planners.memory.recall import Memory
-from planners.world.arrays import Floats32
-from planners.world.geometry.occupancy import GRID
-from planners.world.vehicles.bodies import body_count
+from planners.world.arrays import Floats
+from planners.world.geometry.occupancy import GRID, Bits
+from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from storage.archives.archive import Contents, Files, read_archive, write_archive
 from storage.archives.arrays import array_of
+from storage.archives.tensors import check_floats, packed, unpacked
 from storage.errors import StorageError
-from storage.tables.columns import Array
+from storage.fields import scale_of, short, text_of
+from storage.places.data_folder import checked_name
 
 _KIND: Final = "memory"
 _WEIGHTS: Final = "encoder.safetensors"
@@ -37,6 +39,7 @@ _FILES: Final = {
     _WEIGHTS, _ONNX, _READOUT,
     "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy", "boxes.npy",
 }  # fmt: skip
+SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes are 10 MB
 _LISTS: Final = "lists.safetensors"  # of very many plans only
 
 
@@ -50,11 +53,9 @@ def save_memory(folder: Path, memory: Memory) -> None:
         "metadata": memory.metadata,
     }
     files: Files = {
-        _WEIGHTS: _tensors(memory.weights),
+        _WEIGHTS: packed(memory.weights),
         _ONNX: to_onnx(memory.weights),
-        _READOUT: _tensors(
-            {"centroids": memory.centroids, "vectors": memory.vectors, "biases": memory.biases}
-        ),
+        _READOUT: packed({"centroids": memory.centroids, "vectors": memory.vectors, "biases": memory.biases}),
         "states.npy": plans.states,
         "controls.npy": plans.controls,
         "plan_starts.npy": plans.starts,
@@ -64,85 +65,117 @@ def save_memory(folder: Path, memory: Memory) -> None:
     }
     if memory.lists is not None:
         kept = {name: getattr(memory.lists, name) for name in ("centres", "starts", "plans")}
-        files = {**files, _LISTS: _tensors(kept)}
+        files = {**files, _LISTS: packed(kept)}
     write_archive(folder, _KIND, memory.vehicle, header, files)
 
 
 def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
-    """The memory in a folder; its plans and masks are read from the disk as they are used.
+    """The memory in a folder; its plans and boxes are read from the disk as they are used.
 
-    StorageError: missing, damaged, not as long as it says, of another version, for another vehicle or grid.
+    Checksums say that files are as they were written, not that they are true. So every plan is swept again,
+    and boxes and masks must be the plan's to the last bit (kernels give the same bits everywhere): no plan
+    is called free for boxes that are not its own, also where an older program left smaller ones. All plans,
+    not a sample: of 100 that takes 4 ms, of 10,000 a quarter of a second (hashing the files: a sixth). They
+    are compared and not replaced, so that processes go on sharing the files' memory.
+
+    Args:
+        folder: where it lies.
+        vehicle: the vehicle that it must be of.
+
+    Returns:
+        The memory.
+
+    Raises:
+        StorageError: it is missing, damaged, does not hold what it says, or is of another version, for
+            another vehicle or grid.
+
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
         if files.keys() - {_LISTS} != _FILES:
             odd = ", ".join(sorted((files.keys() - {_LISTS}) ^ _FILES))
             raise ValueError(f"it lacks or has too much of: {odd}")
-        weights, readout = load(bytes(files[_WEIGHTS])), load(bytes(files[_READOUT]))
-        sizes = _sizes(architecture_of(weights))
-        plans = _plans(files, state_size(vehicle))
-        rows = (len(plans) + 1, sizes["dimensions"])
-        shapes = {"centroids": rows, "vectors": rows, "biases": rows[:1]}
-        fitting = {name: tensor.shape for name, tensor in readout.items()} == shapes
-        if header["architecture"] != sizes or not fitting:
-            raise ValueError("its encoder, readout and plans do not fit each other")
-        _check_numbers(weights | readout)
+        weights, readout = unpacked(files[_WEIGHTS]), unpacked(files[_READOUT])
+        architecture = architecture_of(weights)
+        if header["architecture"] != _sizes(architecture):
+            raise ValueError("its encoder is of another architecture than it says")
+        plans = _plans(files, vehicle)
+        rows = (len(plans) + 1, architecture.dimensions)
+        check_floats(weights, weight_shapes(architecture))
+        check_floats(readout, {"centroids": rows, "vectors": rows, "biases": rows[:1]})
+        masks = array_of(files["masks.npy"], "<u8", (GRID,))
         return Memory(
-            class_name=_text(header["class"]),
+            class_name=checked_name(text_of(header["class"], "class")),
             vehicle=vehicle,
             plans=plans,
-            sweeps=_sweeps(files, plans, vehicle),
-            masks=array_of(files["masks.npy"], "<u8", (GRID,)),
+            sweeps=_sweeps(array_of(files["boxes.npy"], "<f8", (6,)), masks, plans, vehicle),
+            masks=masks,
             centroids=readout["centroids"],
             vectors=readout["vectors"],
             biases=readout["biases"],
-            objective=_text(header["objective"]),
+            objective=_objective(header["objective"]),
             weights=weights,
-            metadata=dict(header["metadata"]),
+            metadata=_metadata(header["metadata"]),
             lists=(
-                lists_with(**load(bytes(files[_LISTS])), vectors=readout["vectors"], biases=readout["biases"])
+                lists_with(**unpacked(files[_LISTS]), vectors=readout["vectors"], biases=readout["biases"])
                 if _LISTS in files
                 else None
             ),
         )
-    except (KeyError, TypeError, ValueError, SafetensorError) as error:
-        raise StorageError(f"{folder} is no whole memory ({error}); build it again.") from None
+    except (KeyError, TypeError, ValueError, StorageError) as error:
+        raise StorageError(
+            f"{folder} is no whole memory ({str(error).rstrip('.')}); build it again."
+        ) from None
 
 
-def _plans(files: Mapping[str, Contents], size: int) -> StoredPlans:
+def _plans(files: Mapping[str, Contents], vehicle: Vehicle) -> StoredPlans:
     plans = StoredPlans(
-        array_of(files["states.npy"], "<f8", (size,)),
+        array_of(files["states.npy"], "<f8", (state_size(vehicle),)),
         array_of(files["controls.npy"], "<f8", (2,)),
         array_of(files["plan_starts.npy"], "<i8"),
         array_of(files["dt.npy"], "<f8"),
     )
-    for numbers in (plans.states, plans.controls, plans.dt):
-        _check_finite(numbers)
+    for numbers in (plans.states, plans.controls):
+        if (
+            not -LARGEST_COORDINATE_M
+            <= numbers.min(initial=0.0)
+            <= numbers.max(initial=0.0)
+            <= LARGEST_COORDINATE_M
+        ):
+            raise ValueError(
+                f"its plans have numbers that are not finite or beyond {LARGEST_COORDINATE_M:.0f}"
+            )
+    if (plans.dt != vehicle.dt).any():
+        raise ValueError(f"its plans have other steps than the vehicle's, {vehicle.dt} s")
     return plans
 
 
-def _sweeps(files: Mapping[str, Contents], plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
-    boxes = array_of(files["boxes.npy"], "<f8", (6,))
-    if len(boxes) != body_count(vehicle) * len(plans.states):
-        raise ValueError(f"it has {len(boxes)} swept boxes of {len(plans.states)} states")
-    _check_finite(boxes)
-    return sweeps_with(boxes, plans)
+def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
+    """The sweeps whose boxes were stored; ValueError unless these and the masks are those of the plans."""
+    sweeps = sweeps_with(boxes, plans)
+    for first in range(0, len(plans), SWEPT_AT_ONCE):
+        some = slice(first, first + SWEPT_AT_ONCE)
+        again = sweep_plans(plans[some], vehicle)
+        begin = sweeps.starts[first]
+        same = np.array_equal(boxes[begin : begin + len(again.boxes)], again.boxes)
+        if not (same and np.array_equal(masks[some], masks_of(again))):
+            raise ValueError("its swept boxes or cells are not those of its plans")
+    return sweeps
 
 
-def _check_finite(numbers: Array) -> None:
-    if not (np.isfinite(numbers.min(initial=0.0)) and np.isfinite(numbers.max(initial=0.0))):
-        raise ValueError("its plans have numbers that are not finite")
+def _objective(value: object) -> str:
+    if value not in OBJECTIVES:
+        raise ValueError(f"its objective is {short(value)}, wanted is one of {', '.join(OBJECTIVES)}")
+    return str(value)
 
 
-def _check_numbers(tensors: Mapping[str, Floats32]) -> None:
-    """Infinitely far centroids and impossible rows are fine; what is no number would compare as anything."""
-    for name, tensor in tensors.items():
-        if tensor.dtype != np.float32 or np.isnan(tensor).any():
-            raise ValueError(f"{name} is no array of float32 numbers")
-
-
-def _tensors(tensors: Mapping[str, Array]) -> bytes:
-    return save({name: np.ascontiguousarray(tensor) for name, tensor in tensors.items()})
+def _metadata(value: object) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"its metadata are {short(value)}, wanted was an object")
+    scales = value.get("scales", [1.0])
+    if not isinstance(scales, list) or not scales or len({scale_of(scale) for scale in scales}) < len(scales):
+        raise ValueError(f"its scales are {short(scales)}, wanted were some different numbers")
+    return value
 
 
 def _sizes(architecture: Architecture) -> dict[str, Any]:
@@ -150,9 +183,3 @@ def _sizes(architecture: Architecture) -> dict[str, Any]:
     return {
         name: list(size) if isinstance(size, tuple) else size for name, size in asdict(architecture).items()
     }
-
-
-def _text(value: object) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"{value!r:.40} is no text")
-    return value

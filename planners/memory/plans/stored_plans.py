@@ -43,10 +43,19 @@ class StoredPlans(Sequence[Plan]):
     @overload
     def __getitem__(self, index: int) -> Plan: ...
     @overload
-    def __getitem__(self, index: slice) -> tuple[Plan, ...]: ...
-    def __getitem__(self, index: int | slice) -> Plan | tuple[Plan, ...]:
+    def __getitem__(self, index: slice) -> StoredPlans: ...
+    def __getitem__(self, index: int | slice) -> Plan | StoredPlans:
         if isinstance(index, slice):
-            return tuple(self[i] for i in range(*index.indices(len(self))))
+            first, last, step = index.indices(len(self))
+            if step != 1:
+                raise ValueError(f"Every {step} plans: only plans that follow one another are a view.")
+            starts = self.starts[first : max(first, last) + 1]
+            return StoredPlans(
+                self.states[starts[0] : starts[-1]],
+                self.controls[starts[0] - first : starts[-1] - max(first, last)],
+                starts - starts[0],
+                self.dt[first:last],
+            )
         i = range(len(self))[index]  # counts from the end, and refuses what is beyond
         first, last = int(self.starts[i]), int(self.starts[i + 1])
         return Plan(self.states[first:last], self.controls[first - i : last - i - 1], float(self.dt[i]))

@@ -11,7 +11,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from hashlib import sha256
 from itertools import combinations
 from pathlib import Path
 
@@ -21,10 +20,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from planners.memory.ranking.inverted_lists import list_readout
-from storage.archives.archive import _signed
 from storage.archives.arrays import HEADER_BYTES, array_of, write_array
 from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
+from tests.storage.archives.signing import sign
 from tests.storage.samples import a_memory
 
 FILES = (
@@ -65,18 +64,6 @@ def refusal(folder: Path) -> str:
     assert str(folder) in text
     assert "\n" not in text
     return text
-
-
-def sign(folder: Path, **change: object) -> None:
-    """Make the header fit the files, as somebody who wants to be believed would."""
-    header = json.loads((folder / "memory.json").read_text())
-    del header["sha256"]
-    header["files"] = {
-        file.name: {"bytes": file.stat().st_size, "sha256": sha256(file.read_bytes()).hexdigest()}
-        for file in sorted(folder.iterdir())
-        if file.name != "memory.json"
-    }
-    (folder / "memory.json").write_text(_signed({**header, **change}))
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -178,9 +165,9 @@ def test_a_name_that_reaches_out_of_the_folder_is_never_opened(archive: Path, na
         ({"files": {"dt.npy": "x"}}, "damaged"),
         ({"files": {"dt.npy": {"bytes": -1, "sha256": ""}}}, "damaged"),
         ({"files": {"dt.npy": {"bytes": 2**80, "sha256": ""}}}, "damaged"),
-        ({"architecture": {"channels": [2], "hidden": [8], "dimensions": 4}}, "do not fit each other"),
-        ({"class": 7}, "no text"),
-        ({"objective": ["labels"]}, "no text"),
+        ({"architecture": {"channels": [2], "hidden": [8], "dimensions": 4}}, "another architecture"),
+        ({"class": 7}, "class must be a printable text"),
+        ({"objective": ["labels"]}, "objective is ['labels']"),
         ({"metadata": 3}, "no whole memory"),
     ],
 )

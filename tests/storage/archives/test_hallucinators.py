@@ -32,7 +32,7 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path: Path) -> None:
     file.write_bytes(file.read_bytes()[:-1] + b"!")
     for name, told in (
         ("trailer", "car-1-trailer"),
-        ("narrow", "another network"),
+        ("narrow", "linear.bias is float32"),
         ("damaged", "damaged"),
         ("missing", "holds no hallucinator"),
     ):

@@ -51,11 +51,21 @@ def test_a_plan_is_a_view():
     assert store_plans(stored, 5) is stored
 
 
+@given(first=st.integers(-6, 6) | st.none(), last=st.integers(-6, 6) | st.none())
+def test_a_slice_is_a_view_of_the_plans_of_a_slice(first, last):
+    plans = some_plans(5, [4, 1, 5, 2])
+    stored = store_plans(plans, 5)
+    part = stored[first:last]
+    for lazily, eagerly in zip(part, plans[first:last], strict=True):
+        assert_same(lazily, eagerly)
+    assert len(part) == 0 or np.shares_memory(part.states, stored.states)
+
+
 def test_no_plan_is_beyond_the_last():
     stored = store_plans(some_plans(3, [4]), 5)
     with pytest.raises(IndexError):
         stored[1]
-    assert stored[5:] == ()
+    assert not stored[5:]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,314 @@
+"""Archives whose checksums are right and whose contents are not: refused in one line when they are loaded."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from safetensors.numpy import load_file, save_file
+
+from planners.memory.encoder.training import Epoch, TrainedEncoder, TrainingSettings
+from planners.memory.hallucination.learned_obstacles import weight_shapes
+from planners.memory.plans.sweeps import sweep_plans
+from planners.world.vehicles.vehicle import CAR_2_TRAILERS, DIFFERENTIAL_DRIVE
+from storage.archives.arrays import write_array
+from storage.archives.encoders import load_encoder, save_encoder
+from storage.archives.hallucinators import load_hallucinator, save_hallucinator
+from storage.archives.memories import load_memory, save_memory
+from storage.errors import StorageError
+from tests.storage.archives.signing import sign
+from tests.storage.samples import ARCHITECTURE, WEIGHTS, a_memory
+
+many = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+ROWS = (4, ARCHITECTURE.dimensions)
+TRAINED = TrainedEncoder(
+    settings=TrainingSettings(architecture=ARCHITECTURE),
+    weights=WEIGHTS,
+    centroids=np.zeros(ROWS, np.float32),
+    vectors=np.ones(ROWS, np.float32),
+    biases=np.array([-np.inf, 0.0, 1.0, 2.0], np.float32),
+    popularity=np.array([0.1, 0.2, 0.3], np.float32),
+    history=(Epoch(1, float("nan"), 0.25, 0.5, 0.75, 1.5),),
+    held_out=np.array([1, 5, 9], np.int32),
+)
+LEARNED = {name: np.zeros(shape, np.float32) for name, shape in weight_shapes().items()}
+LOADERS: dict[str, Callable[[Path], object]] = {
+    "memory": load_memory,
+    "encoder": load_encoder,
+    "hallucinator": load_hallucinator,
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    save_memory(folder / "memory", a_memory(3))
+    save_encoder(folder / "encoder", TRAINED)
+    save_hallucinator(folder / "hallucinator", LEARNED)
+    return folder
+
+
+@pytest.fixture
+def archives(whole: Path, tmp_path: Path) -> Path:
+    shutil.copytree(whole, tmp_path / "copy")
+    return tmp_path / "copy"
+
+
+def refusal(folder: Path) -> str:
+    with pytest.raises(StorageError) as error:
+        LOADERS[folder.name](folder)
+    text = str(error.value)
+    assert str(folder) in text
+    assert "\n" not in text
+    return text
+
+
+def change_array(folder: Path, name: str, change: Callable[[np.ndarray], object]) -> None:
+    array = np.load(folder / name).copy()
+    change(array)
+    with (folder / name).open("wb") as file:
+        write_array(file, array)
+    sign(folder)
+
+
+def change_tensors(folder: Path, name: str, tensors: Mapping[str, np.ndarray | None]) -> None:
+    changed = {**load_file(folder / name), **tensors}
+    save_file({key: tensor for key, tensor in changed.items() if tensor is not None}, folder / name)
+    sign(folder, folder.name)
+
+
+def moved(array: np.ndarray) -> None:
+    array[0, 0] += 3.0
+
+
+def nudged(array: np.ndarray) -> None:
+    array[-1, -1] = np.nextafter(array[-1, -1], 9.0)
+
+
+def emptied(array: np.ndarray) -> None:
+    array[1] = 0
+
+
+def lessened(array: np.ndarray) -> None:
+    row = array[2].nonzero()[0][0]
+    array[2, row] &= array[2, row] - np.uint64(1)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("boxes.npy", moved),
+        ("boxes.npy", nudged),
+        ("boxes.npy", emptied),
+        ("masks.npy", emptied),
+        ("masks.npy", lessened),
+        ("states.npy", moved),
+    ],
+)
+def test_sweeps_and_masks_that_are_not_those_of_the_plans_are_refused(
+    archives: Path, name: str, change: Callable[[np.ndarray], object]
+) -> None:
+    change_array(archives / "memory", name, change)
+    assert "are not those of its plans" in refusal(archives / "memory")
+
+
+def test_the_sweeps_of_another_memory_are_refused(archives: Path, tmp_path: Path) -> None:
+    save_memory(tmp_path / "other", a_memory(3, seed=7))
+    for names in (["boxes.npy"], ["masks.npy"], ["boxes.npy", "masks.npy"]):
+        folder = archives / "memory"
+        for name in names:
+            shutil.copy(tmp_path / "other" / name, folder / name)
+        sign(folder)
+        assert "are not those of its plans" in refusal(folder)
+
+
+@pytest.mark.parametrize("vehicle", [DIFFERENTIAL_DRIVE, CAR_2_TRAILERS])
+def test_the_sweeps_of_every_vehicle_are_its_own(tmp_path: Path, vehicle: Any) -> None:
+    memory = a_memory(3, vehicle=vehicle)
+    save_memory(tmp_path / "good", memory)
+    load_memory(tmp_path / "good", vehicle)
+    narrower = vehicle._replace(width=0.5 * vehicle.width)
+    save_memory(tmp_path / "bad", replace(memory, sweeps=sweep_plans(memory.plans, narrower)))
+    with pytest.raises(StorageError, match="are not those of its plans"):
+        load_memory(tmp_path / "bad", vehicle)
+
+
+@pytest.mark.parametrize("name", ["states.npy", "controls.npy", "dt.npy"])
+@pytest.mark.parametrize("value", [1e300, -1e9, np.nan, np.inf, 1e-320, 0.05])
+def test_plans_of_senseless_numbers_are_refused(archives: Path, name: str, value: float) -> None:
+    def change(array: np.ndarray) -> None:
+        array.reshape(-1)[0] = value
+
+    change_array(archives / "memory", name, change)
+    if name == "controls.npy" and abs(value) < 1.0:
+        load_memory(archives / "memory")
+    else:
+        refusal(archives / "memory")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"class": "../x"},
+        {"class": ""},
+        {"class": "a/b"},
+        {"class": "line\nline"},
+        {"objective": "x"},
+        {"objective": ""},
+        *[
+            {"metadata": {"scales": scales}}
+            for scales in (
+                5,
+                "1",
+                None,
+                [],
+                [0],
+                [-1.0],
+                [1e-320],
+                [1e9],
+                ["1"],
+                [True],
+                [[1.0]],
+                {},
+                [1.0, 1.0],
+            )
+        ],
+        {"metadata": []},
+        {"metadata": [["scales", [1.0]]]},
+    ],
+)
+def test_a_header_that_claims_what_cannot_be_is_refused(archives: Path, change: dict[str, Any]) -> None:
+    sign(archives / "memory", **change)
+    refusal(archives / "memory")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"epochs": "x"},
+        {"epochs": 1e9},
+        {"threads": True},
+        {"learning_rate": "0.1"},
+        {"objective": "x"},
+        {"objective": ["labels"]},
+        {"semi_hard": 1},
+        {"held_out_share": None},
+        {"seed": 0.5},
+        {"unknown": 1},
+        {"architecture": {}},
+        {"architecture": {"channels": 2, "hidden": [8], "dimensions": 4}},
+        {"architecture": {"channels": [2, 3], "hidden": [8], "dimensions": 5}},
+        {"architecture": {"channels": [2, 3], "hidden": [8], "dimensions": "4"}},
+    ],
+)
+def test_settings_that_no_training_had_are_refused(archives: Path, change: dict[str, Any]) -> None:
+    claimed = json.loads(json.dumps(asdict(TRAINED.settings))) | change
+    sign(archives / "encoder", "encoder", settings=claimed if change else [])
+    refusal(archives / "encoder")
+
+
+@pytest.mark.parametrize(
+    "tensors",
+    [
+        {"centroids": np.zeros((3, 4), np.float32)},
+        {"centroids": np.zeros((4, 4), np.float64)},
+        {"vectors": np.full((4, 4), np.nan, np.float32)},
+        {"biases": np.zeros(5, np.float32)},
+        {"popularity": np.zeros(4, np.float32)},
+        {"held_out": np.array([-1], np.int32)},
+        {"held_out": np.array([0.5], np.float32)},
+        {"held_out": np.zeros((2, 2), np.int32)},
+        {"history": np.zeros((0, 6))},
+        {"history": np.zeros((1, 5))},
+        {"history": np.full((1, 6), np.nan)},
+        {"history": None},
+        {"extra": np.zeros(3, np.float32)},
+        {"weights.linear.0.bias": np.zeros(3, np.float32)},
+        {"weights.linear.0.bias": np.full(8, np.nan, np.float32)},
+    ],
+)
+def test_an_encoder_whose_arrays_do_not_fit_is_refused(
+    archives: Path, tensors: dict[str, np.ndarray | None]
+) -> None:
+    change_tensors(archives / "encoder", "tensors.safetensors", tensors)
+    refusal(archives / "encoder")
+
+
+@pytest.mark.parametrize(
+    "tensors",
+    [
+        {"linear.bias": np.full(LEARNED["linear.bias"].shape, np.nan, np.float32)},
+        {"linear.bias": LEARNED["linear.bias"].astype(np.float64)},
+        {"linear.bias": None},
+        {"more": np.zeros(3, np.float32)},
+    ],
+)
+def test_a_hallucinator_whose_arrays_do_not_fit_is_refused(
+    archives: Path, tensors: dict[str, np.ndarray | None]
+) -> None:
+    change_tensors(archives / "hallucinator", "weights.safetensors", tensors)
+    refusal(archives / "hallucinator")
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=6,
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"),
+    [
+        ("memory", "class"),
+        ("memory", "objective"),
+        ("memory", "metadata"),
+        ("memory", "architecture"),
+        ("memory", "vehicle"),
+        ("encoder", "settings"),
+        ("encoder", "grid"),
+        ("hallucinator", "version"),
+    ],
+)
+@given(value=VALUES)
+@many
+def test_whatever_a_header_claims_it_is_loaded_or_refused_in_one_line(
+    whole: Path, kind: str, field: str, value: object
+) -> None:
+    header = whole / kind / f"{kind}.json"
+    good = header.read_bytes()
+    try:
+        sign(whole / kind, kind, **{field: value})
+        LOADERS[kind](whole / kind)
+    except StorageError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+    finally:
+        header.write_bytes(good)
+
+
+@pytest.mark.parametrize(("kind", "name"), [("encoder", "tensors"), ("hallucinator", "weights")])
+@given(where=st.integers(0, 2_000), value=st.integers(0, 255))
+@many
+def test_whatever_a_signed_archive_holds_it_is_loaded_or_refused(
+    whole: Path, kind: str, name: str, where: int, value: int
+) -> None:
+    file, header = whole / kind / f"{name}.safetensors", whole / kind / f"{kind}.json"
+    good, signed = file.read_bytes(), header.read_bytes()
+    try:
+        file.write_bytes(good[:where] + bytes([value]) + good[where + 1 :])
+        sign(whole / kind, kind)
+        LOADERS[kind](whole / kind)
+    except StorageError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+    finally:
+        file.write_bytes(good)
+        header.write_bytes(signed)
