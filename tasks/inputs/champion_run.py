@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from storage.errors import StorageError
 from storage.places.data_folder import RunFolder, open_data_folder
-from storage.places.files import read_text
 from tasks.fan_out.stage import Chunk
+from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings
 
 
@@ -19,13 +19,13 @@ class ChampionRun(NamedTuple):
 
 
 def champion_run(data: str, name: str) -> ChampionRun | None:
-    """The run of that name; None where it has none, is gone, or of another version."""
+    """The run of that name; None where it has none, is gone, of another version or edited."""
     if not name:
         return None
     folder = open_data_folder(data).run(name)
     try:
-        return ChampionRun(folder, RunSettings.from_json(read_text(folder.settings)))
-    except (StorageError, ValueError):
+        return ChampionRun(folder, recorded_settings(folder))
+    except StorageError:
         return None
 
 

@@ -14,9 +14,10 @@ from dashboards.cells import markdown_table, rich_table
 from dashboards.verdicts.comparison import compare_runs, comparison_markdown, comparison_table, verdict
 from storage.errors import StorageError
 from storage.places.data_folder import open_run
-from storage.places.files import read_text, whole_file
+from storage.places.files import whole_file
 from storage.tables.attempts import read_attempts
 from tasks.reports.report import NOT_NEEDED, console
+from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings, UsageError
 
 ENDINGS: Final = (".md", ".json", ".csv")
@@ -26,14 +27,15 @@ def compare(runs: Sequence[Path], out: Path | None) -> None:
     """Print what differs in the settings of runs, and how much faster each is than the first.
 
     UsageError for fewer than two runs or another ending of ``out``; StorageError where a folder is no run,
-    has no attempts, or has none at the first one's problems with the same planners and configurations.
+    has edited settings, has no attempts, or has none at the first one's problems with the same planners and
+    configurations.
     """
     if len(runs) < 2:
         raise UsageError(f"{len(runs)} run to compare: give two or more, folders in DATA/runs.")
     if out is not None and out.suffix not in ENDINGS:
         raise UsageError(f"{out} ends in none of {', '.join(ENDINGS)}.")
     names = _names(runs)
-    different = _different([_settings(run) for run in runs])
+    different = _different([recorded_settings(open_run(run)) for run in runs])
     first = _attempts(runs[0])
     tables: dict[str, pd.DataFrame] = {}
     for name, run in zip(names[1:], runs[1:], strict=True):
@@ -74,14 +76,6 @@ def _names(runs: Sequence[Path]) -> list[str]:
     """What the runs are called: their folders' names, with more of their paths where these are the same."""
     short = [run.resolve().name for run in runs]
     return short if len(set(short)) == len(runs) else [str(run) for run in runs]
-
-
-def _settings(run: Path) -> RunSettings:
-    place = open_run(run).settings
-    try:
-        return RunSettings.from_json(read_text(place))
-    except ValueError as error:
-        raise StorageError(f"{place}: {error}") from None
 
 
 def _attempts(run: Path) -> pd.DataFrame:

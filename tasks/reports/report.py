@@ -32,14 +32,16 @@ from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_ret
 from dashboards.verdicts.claim_rules import Claim
 from dashboards.verdicts.claims import claims
 from dashboards.verdicts.evidence import Evidence
+from storage.errors import StorageError
 from storage.places.data_folder import RunFolder, open_data_folder
-from storage.places.files import read_text, whole_file
+from storage.places.files import whole_file
 from storage.places.mirror import is_there
 from storage.tables.attempts import distinct_values, read_attempts
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.stage import Chunk, run_folder
 from tasks.reports.report_details import page_of
 from tasks.reports.stage_times import stage_cells, stages_of
+from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.measure_recall import recall_chunks
 from tasks.stages.sweep import sweep_rows
@@ -115,8 +117,8 @@ def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> 
         if run.path == own.path or not (is_there(run.settings) and is_there(run.results)):
             continue
         try:
-            asked = RunSettings.from_json(read_text(run.settings))
-        except ValueError:  # of another version
+            asked = recorded_settings(run)
+        except StorageError:  # of another version, or edited
             continue
         may_differ = {name: getattr(settings, name) for name in (*MEASURED, "experiences")}
         if replace(asked, **may_differ) == settings and asked.experiences != settings.experiences:

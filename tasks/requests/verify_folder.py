@@ -28,7 +28,6 @@ from storage.archives.hallucinators import load_hallucinator
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import RunFolder, Table, open_data_folder
-from storage.places.files import read_text
 from storage.places.mirror import is_there
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences
@@ -38,6 +37,7 @@ from storage.tables.recalls import read_recalls
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt, same_outcome
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
+from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunError, RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
@@ -84,10 +84,7 @@ def _do(job: Job) -> Findings:
 
 
 def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
-    try:
-        settings = RunSettings.from_json(read_text(run.settings))
-    except ValueError as error:
-        raise RunError(f"{run.settings}: {error}") from None
+    settings = recorded_settings(run)
     vehicle = vehicle_named(settings.vehicle)
     for name in memory_names(settings):
         shards = [path for table in COLLECTED for path in run.shards(table, name)]

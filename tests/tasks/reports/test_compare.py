@@ -24,6 +24,7 @@ def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p")
     rows = [
         {
             **ATTEMPT,
+            "run_id": settings.run_name,
             "problem_id": f"{problem}-{i}",
             "planning_seconds": seconds if assist == "closed" else 0.1,
             "assist": assist,
