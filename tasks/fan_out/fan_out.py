@@ -23,7 +23,7 @@ from tasks.fan_out.progress_artifact import progress_artifact
 from tasks.fan_out.stage import AnyPiece, Piece, kept_result
 from tasks.fan_out.workload import WORK, note
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import RunError, default_scheduler
+from tasks.settings.run_settings import RunError, UsageError, default_scheduler
 
 SETTINGS: Final = Path(__file__).with_name("dask.yaml")
 CONNECT_SECONDS: Final = 5
@@ -37,8 +37,9 @@ LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which rea
 
 Client: Any = distributed.Client  # Dask has no types
 LocalCluster: Any = distributed.LocalCluster
+Security: Any = distributed.Security
 
-_shared: ContextVar[str | None] = ContextVar("scheduler", default=None)
+_shared: ContextVar[Any] = ContextVar("scheduler", default=None)
 
 
 class ChunkError(RunError):
@@ -46,23 +47,30 @@ class ChunkError(RunError):
 
 
 @contextmanager
-def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[str]:
-    """Address of the scheduler that every flow inside shares: the one around it, the given one, or a new one.
+def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[Any]:
+    """Yield what a ``Client`` connects to: the cluster around this call, the given scheduler, or a new one.
 
-    Without one given it is $MOTION_MEMORY_SCHEDULER.
+    Every flow inside shares it. A new cluster is local, and only this process and its workers can use it:
+    they alone have its certificate.
 
-    A new one is local: ``workers`` processes (default: one a core) of one thread, reachable on loopback only.
-    RuntimeError with one line when nobody answers at ``scheduler``.
+    Args:
+        workers: processes of one thread in a new cluster; by default one a core.
+        scheduler: address of a scheduler; by default $MOTION_MEMORY_SCHEDULER.
+
+    Raises:
+        RuntimeError: no scheduler answers at the address, or it does not accept this client's certificate.
+        UsageError: the address and Dask's settings disagree on encryption.
+
     """
     around = _shared.get()
     if around is not None:
         yield around
         return
     given = scheduler or default_scheduler()
-    with _connected(given) if given else _local(workers or int(CPU_COUNT)) as address:
-        token = _shared.set(address)
+    with _connected(given) if given else _local(workers or int(CPU_COUNT)) as shared:
+        token = _shared.set(shared)
         try:
-            yield address
+            yield shared
         finally:
             _shared.reset(token)
 
@@ -75,28 +83,47 @@ def task_runner() -> Any:
 
 @contextmanager
 def _connected(address: str) -> Iterator[str]:
+    _check_encryption(address)
     try:
         with Client(address, timeout=CONNECT_SECONDS, set_as_default=False):
             yield address
     except (OSError, ValueError) as error:
         raise RuntimeError(
-            redacted(f"No Dask scheduler answers at {address}; start one with `dask scheduler`.")
+            redacted(
+                f"No Dask scheduler answers at {address}; start one with `dask scheduler`, or give this "
+                "machine the certificate that it asks for (docs/runbook.md)."
+            )
         ) from error
 
 
+def _check_encryption(address: str) -> None:
+    security = Security()  # what Dask's settings say
+    encrypted = address.startswith("tls://")
+    if encrypted and not security.tls_client_cert:
+        raise UsageError(
+            redacted(f"{address} needs a certificate: name it in Dask's settings (docs/runbook.md).")
+        )
+    if security.require_encryption and not encrypted:
+        raise UsageError(
+            redacted(f"Dask's settings require encryption, but {address} does not begin with tls://.")
+        )
+
+
 @contextmanager
-def _local(workers: int) -> Iterator[str]:
+def _local(workers: int) -> Iterator[Any]:
     with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(_settings()):
         local = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             host="127.0.0.1",
+            security=True,  # a certificate for this cluster alone, kept in memory
             dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
             local_directory=scratch,
             silence_logs="CRITICAL",
         )
         try:
-            yield local.scheduler_address
+            yield local
         finally:
             _kill(local)  # what was wanted of them is written; leaving politely takes seconds
             _close(local)

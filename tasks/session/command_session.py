@@ -60,9 +60,9 @@ def _workers_for(
     with ExitStack() as stack:
         if name not in ("collect", "hallucinate", "benchmark"):
             tracker(folder.place)
-        address = stack.enter_context(cluster(workers, scheduler))
+        shared = stack.enter_context(cluster(workers, scheduler))
         local = scheduler is None and name != "report"
-        stack.enter_context(warm_up(address, vehicle) if local else nullcontext())
+        stack.enter_context(warm_up(shared, vehicle) if local else nullcontext())
         if server is not None:
             print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
             server.wait()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -26,9 +26,15 @@ from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
 
 
 @contextmanager
-def warm_up(scheduler: str, vehicle: str) -> Iterator[None]:
-    """Have the workers behind ``scheduler`` compile for a vehicle, beside other work, in this context."""
-    with Client(scheduler, set_as_default=False) as client:
+def warm_up(cluster: Any, vehicle: str) -> Iterator[None]:
+    """Have the workers of a cluster compile for a vehicle, beside other work, in this context.
+
+    Args:
+        cluster: what ``tasks.fan_out.fan_out.cluster`` yields.
+        vehicle: its name.
+
+    """
+    with Client(cluster, set_as_default=False) as client:
         work = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
         yield
         client.cancel(work)

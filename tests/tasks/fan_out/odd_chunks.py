@@ -12,6 +12,7 @@ from typing import Any
 
 from tasks.servers.prefect_server import local_server
 from tasks.settings.run_settings import ASSISTS, RunSettings
+from tests.tasks.fan_out.strangers import given_to_strangers
 
 SETTINGS = RunSettings(
     "smoke", ("curves",), (), "standard", 1, "labels", 6, 20, 20, "rrt", ("rrt",), ASSISTS, 2, False
@@ -71,6 +72,7 @@ def main(data: Path) -> None:
                     go(name, is_there)
                 except engine.ChunkError as error:
                     found[name] = str(error)
+            found["strangers"] = given_to_strangers()
         counts = [len((data / f"plain-{i}").read_text()) for i in range(8)]
         print(json.dumps(found | {"counts": counts}))
 

@@ -10,7 +10,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import dask
 import pytest
+
+from tasks.fan_out import fan_out
+from tasks.settings.run_settings import UsageError
 
 ROOT = Path(__file__).parents[3]
 
@@ -66,3 +70,25 @@ def test_a_failing_chunk_is_told_in_one_line(found: dict[str, Any]) -> None:
 
 def test_a_chunk_that_kills_three_workers_is_the_culprit(found: dict[str, Any]) -> None:
     assert found["deadly"].startswith("deadly test: chunk 2 of deadly ended 3 worker processes")
+
+
+def test_a_stranger_on_this_machine_gets_nothing_from_a_local_cluster(found: dict[str, Any]) -> None:
+    assert found["strangers"] == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "address", "told"),
+    [
+        ({}, "tls://127.0.0.1:9", "needs a certificate"),
+        ({"require-encryption": True}, "tcp://127.0.0.1:9", "does not begin with tls://"),
+    ],
+)
+def test_a_scheduler_that_cannot_be_reached_safely_is_wrong_use(
+    settings: dict[str, Any], address: str, told: str
+) -> None:
+    with (
+        dask.config.set({f"distributed.comm.{name}": value for name, value in settings.items()}),
+        pytest.raises(UsageError, match=told),
+        fan_out.cluster(scheduler=address),
+    ):
+        pass
