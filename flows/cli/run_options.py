@@ -39,7 +39,7 @@ class Options:
     workers
         Worker processes; default one a core.
     scheduler
-        Address of a Dask scheduler to use instead, like tcp://host:8786; default $MOTION_MEMORY_SCHEDULER.
+        Address of a Dask scheduler to use instead, like tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
     strict
         Stop at a bad world instead of skipping it.
     continual
