@@ -11,10 +11,11 @@ import os
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -174,19 +175,20 @@ def prepare(place: Path, command: Command, log: Path) -> None:
 
 
 def start(
-    arguments: list[str], place: Path, log: Path, script: str = PLAIN, scheduler: str = ""
+    arguments: list[str],
+    place: Path,
+    log: Path,
+    script: str = PLAIN,
+    environment: Mapping[str, str] = MappingProxyType({}),
 ) -> subprocess.Popen[bytes]:
     """Give a command in a folder, its output into a log."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    environment = inherited | {"PYTHONPATH": str(ROOT)}
-    if scheduler:
-        environment |= {"MOTION_MEMORY_SCHEDULER": scheduler}
     with log.open("ab") as sink:
         sink.write(f"\n$ {' '.join(arguments)}\n".encode())
         return subprocess.Popen(
             [sys.executable, "-c", script, *arguments],
             cwd=place,
-            env=environment,
+            env={**inherited, "PYTHONPATH": str(ROOT), **environment},
             stdout=sink,
             stderr=sink,
             start_new_session=True,

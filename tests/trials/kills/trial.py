@@ -9,9 +9,10 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import psutil
@@ -54,9 +55,9 @@ class Trial:
         shutil.rmtree(self.place, ignore_errors=True)
         shutil.copytree(self._ready, self.place, symlinks=True)
 
-    def start(self, scheduler: str = "") -> subprocess.Popen[bytes]:
+    def start(self, environment: Mapping[str, str] = MappingProxyType({})) -> subprocess.Popen[bytes]:
         """Give the command."""
-        return start(self.command.arguments, self.place, self.log, self.command.script, scheduler)
+        return start(self.command.arguments, self.place, self.log, self.command.script, environment)
 
     def end(self, running: subprocess.Popen[bytes]) -> int | None:
         """The exit code of a command, None where it hangs; one that serves is ended once it has retrained."""
@@ -95,8 +96,8 @@ def killed(trial: Trial, victim: str, chance: random.Random) -> dict[str, Any] |
     trial.renew()
     old = champions(trial.place)
     moment = chance.uniform(0.0, trial.seconds)
-    with _striking(victim, chance, trial.log.parent) as (scheduler, strike):
-        running = trial.start(scheduler)
+    with _striking(victim, chance, trial.log.parent) as (environment, strike):
+        running = trial.start(environment)
         time.sleep(moment)
         while not strike(running):
             if running.poll() is not None:
@@ -110,7 +111,7 @@ def killed(trial: Trial, victim: str, chance: random.Random) -> dict[str, Any] |
             fault = "a traceback"
         done = code == 0 or (trial.command.repeated and champions(trial.place) != old)
         if not done and not fault:
-            fault = _again(trial, scheduler)
+            fault = _again(trial, environment)
     return {
         "moment": round(moment, 1),
         "ended": round(ended, 1),
@@ -128,11 +129,11 @@ def _in_doubt(trial: Trial, old: list[int]) -> str:
     return "" if len(now) == 1 or (not now and not old) else f"champions {now}, before {old}"
 
 
-def _again(trial: Trial, scheduler: str) -> str:
+def _again(trial: Trial, environment: Mapping[str, str]) -> str:
     """Give the same command again; what is wrong if it does not end well."""
     deadline = time.monotonic() + HELD_SECONDS
     while True:
-        code = trial.end(trial.start(scheduler))
+        code = trial.end(trial.start(environment))
         if code == 0 or (code is not None and not trial.difference()):
             return ""
         if code is None or IN_USE not in trial.told() or time.monotonic() > deadline:
@@ -141,10 +142,10 @@ def _again(trial: Trial, scheduler: str) -> str:
 
 
 @contextmanager
-def _striking(victim: str, chance: random.Random, folder: Path) -> Iterator[tuple[str, Strike]]:
-    """The address of a scheduler beside the command, if that is the victim, and what kills."""
+def _striking(victim: str, chance: random.Random, folder: Path) -> Iterator[tuple[dict[str, str], Strike]]:
+    """The environment of a command, with a scheduler beside it if that is the victim, and what kills."""
     if victim != "scheduler":
-        yield "", lambda running: _kill_one(_victims(running, victim), chance)
+        yield {}, lambda running: _kill_one(_victims(running, victim), chance)
         return
     port = free_port()
     log = folder / "machines.log"
@@ -163,7 +164,7 @@ def _striking(victim: str, chance: random.Random, folder: Path) -> Iterator[tupl
         return True
 
     try:
-        yield address, strike
+        yield {"MOTION_MEMORY_SCHEDULER": address}, strike
     finally:
         for process in (*workers, *schedulers):
             process.kill()
