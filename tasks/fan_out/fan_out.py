@@ -168,8 +168,8 @@ def fan_out(
     ``partly_done`` tells those of chunks still at work. A scheduler that goes away and comes back is given
     anew what it had not finished. ChunkError at the first failure of a chunk, RunError without a scheduler.
     """
-    began = time.time()
     results: dict[int, dict[str, Any]] = {}
+    kept: set[int] = set()  # of these, what was done before
     sizes = [units(chunk) for chunk in chunks]
     with (
         progress(description, sum(sizes)) as bar,
@@ -181,11 +181,12 @@ def fan_out(
         looked = time.monotonic()
         while len(results) < len(chunks):
             for i in [waiting.popleft() for _ in range(min(len(waiting), AHEAD - len(pending)))]:
-                kept = kept_result(chunks[i]) if is_done(chunks[i]) else None
-                if kept is None:
+                known = kept_result(chunks[i]) if is_done(chunks[i]) else None
+                if known is None:
                     pending[i] = task.submit(chunks[i])
                 else:
-                    results[i] = kept
+                    results[i] = known
+                    kept.add(i)
                     done += sizes[i]
             ended = [i for i, future in pending.items() if future.wrapped_future.done()]
             lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
@@ -204,7 +205,7 @@ def fan_out(
             show(max(done, min(begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
     ordered = [results[i] for i in range(len(chunks))]
-    note(description, ordered, began)
+    note(description, [result for i, result in enumerate(ordered) if i not in kept])
     return [{name: value for name, value in result.items() if name != WORK} for result in ordered]
 
 

@@ -20,7 +20,7 @@ class Work(NamedTuple):
     """One chunk, as the worker saw it."""
 
     worker: str  # host and process
-    began: float  # seconds since the epoch
+    began: float  # seconds on a clock of that machine that nobody sets
     ended: float
     memory_bytes: int  # that the worker held then
 
@@ -47,10 +47,11 @@ def measured(function: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[
 
     @functools.wraps(function)
     def wrapped(chunk: Any) -> dict[str, Any]:
-        began = time.time()
+        began = time.monotonic()
         result = function(chunk)
         worker = f"{platform.node()}-{os.getpid()}"
-        return result | {WORK: Work(worker, began, time.time(), psutil.Process().memory_info().rss)._asdict()}
+        work = Work(worker, began, time.monotonic(), psutil.Process().memory_info().rss)
+        return result | {WORK: work._asdict()}
 
     return wrapped
 
@@ -100,10 +101,9 @@ def loads() -> Iterator[list[Load]]:
         _noted.reset(token)
 
 
-def note(what: str, results: Sequence[dict[str, Any]], since: float) -> None:
-    """Add a fan-out to the list around it, if any; results from before ``since`` came from a cache."""
+def note(what: str, results: Sequence[dict[str, Any]]) -> None:
+    """Add a fan-out to the list around it, if any: what the chunks that were done now told."""
     around = _noted.get()
     works = [Work(**result[WORK]) for result in results if WORK in result]
-    fresh = [work for work in works if work.ended >= since]
-    if around is not None and fresh:
-        around.append(load_of(what, fresh))
+    if around is not None and works:
+        around.append(load_of(what, works))

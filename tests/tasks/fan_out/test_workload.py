@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 
 import pytest
 from hypothesis import given
@@ -44,17 +45,24 @@ def test_a_chunk_says_who_did_it_and_when() -> None:
     assert work.memory_bytes > 1_000_000
 
 
-def test_what_came_from_a_cache_is_not_counted() -> None:
+def test_what_says_nothing_of_its_work_is_not_counted() -> None:
     results = [{WORK: Work("a", 1.0, 2.0, 5)._asdict()}, {WORK: Work("a", 10.0, 12.0, 6)._asdict()}, {}]
     with loads() as found:
-        note("half", results, 5.0)
-        note("all", results, 0.0)
-        note("none", results, 20.0)
-    assert [(load.what, load.chunks, load.busy_seconds) for load in found] == [
-        ("half", 1, 2.0),
-        ("all", 2, 3.0),
-    ]
-    assert found[1].orchestration == pytest.approx(1.0 - 3.0 / 11.0)
+        note("all", results)
+        note("none", [{}])
+    ((what, chunks, _, busy, *_),) = found
+    assert (what, chunks, busy) == ("all", 2, 3.0)
+    assert found[0].orchestration == pytest.approx(1.0 - 3.0 / 11.0)
+
+
+def test_a_clock_that_is_set_back_meanwhile_changes_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = iter(range(10**9, 0, -3600))
+    monkeypatch.setattr(time, "time", lambda: float(next(now)))
+    with loads() as found:
+        note("work", [measured(lambda chunk: {"rows": chunk})(i) for i in range(3)])
+    (load,) = found
+    assert load.chunks == 3
+    assert 0.0 <= load.busy_seconds <= load.span_seconds
 
 
 def test_several_fan_outs_add_up() -> None:
