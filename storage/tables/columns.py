@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from planners.world.problem import Obstacles, Problem
+from storage.fields import scale_of, short, text_of
 
 Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
@@ -32,33 +34,64 @@ def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
 
 
 def problems_of(table: pa.Table) -> list[Problem]:
-    """The problems of a table that has the columns of ``problem_columns``."""
+    """The problems of a table that has the columns of ``problem_columns``.
+
+    Raises KeyError where a column is missing, TypeError or ValueError where a row is no problem: kernels
+    would follow starts that point elsewhere.
+    """
     rows = zip(
         table["id"].to_pylist(),
         table["class"].to_pylist(),
-        table["start"].to_pylist(),
-        table["goal"].to_pylist(),
+        map(tuple, table["start"].to_pylist()),
+        map(tuple, table["goal"].to_pylist()),
         table["goal_radius"].to_pylist(),
-        table["bounds"].to_pylist(),
+        map(tuple, table["bounds"].to_pylist()),
         lists_of(table["vertices"]),
         lists_of(table["piece_starts"]),
         lists_of(table["obstacle_starts"]),
         table["scale"].to_pylist() if "scale" in table.column_names else [1.0] * len(table),
         strict=True,
     )
-    return [
-        Problem(
-            identity,
-            class_name,
-            tuple(start),
-            tuple(goal),
-            radius,
-            tuple(bounds),
-            Obstacles(vertices.astype(np.float64).reshape(-1, 2), pieces.copy(), obstacles.copy()),
-            scale,
-        )
-        for identity, class_name, start, goal, radius, bounds, vertices, pieces, obstacles, scale in rows
-    ]
+    return [_problem(*row) for row in rows]
+
+
+def _problem(
+    identity: str,
+    class_name: str,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    radius: float,
+    bounds: tuple[float, float, float, float],
+    vertices: Array,
+    pieces: Array,
+    obstacles: Array,
+    scale: float | None,
+) -> Problem:
+    whole = (
+        (len(start), len(goal), len(bounds), len(vertices) % 2) == (3, 2, 4, 0)
+        and all(map(math.isfinite, (*start, *goal, radius, *bounds)))
+        and bool(np.isfinite(vertices).all())
+        and _are_starts(pieces, len(vertices) // 2)
+        and _are_starts(obstacles, len(pieces) - 1)
+    )
+    if not whole:
+        raise ValueError(f"the row of problem {short(identity)} is none")
+    corners = vertices.astype(np.float64).reshape(-1, 2)
+    return Problem(
+        text_of(identity, "id"),
+        text_of(class_name, "class"),
+        start,
+        goal,
+        radius,
+        bounds,
+        Obstacles(corners, pieces.copy(), obstacles.copy()),
+        scale_of(scale),
+    )
+
+
+def _are_starts(starts: Array, count: int) -> bool:
+    """Whether ``starts [n + 1]`` divide ``count`` things among n, each of which has some."""
+    return len(starts) > 0 and starts[0] == 0 and starts[-1] == count and bool((np.diff(starts) > 0).all())
 
 
 def list_column(lists: Iterable[Any], dtype: type[np.generic]) -> pa.Array:

@@ -11,13 +11,14 @@ import numpy as np
 import pyarrow as pa
 
 from planners.memory.plans.experience import Experience
-from planners.world.problem import Plan
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from storage.errors import StorageError
+from storage.fields import parse_json, short
 from storage.recorded_vehicle import fields_of, refuse_another
-from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
+from storage.tables.columns import Array, list_column, lists_of, problem_columns, problems_of
 from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import metadata_of, read_table, write_table
+from storage.tables.shards import metadata_of, read_table, sound, write_table
 
 _CONTROL = 2
 _VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
@@ -51,18 +52,15 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
 
     StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
     """
-    return experiences_of(read_experience_table(path, vehicle).slice(0, count), vehicle)
+    table = read_experience_table(path, vehicle)
+    with sound(path):
+        return experiences_of(table.slice(0, count), vehicle)
 
 
 def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
-    """The experiences in a table of a vehicle."""
-    size = state_size(vehicle)
+    """The experiences in a table of a vehicle; KeyError, TypeError or ValueError where a row is none."""
     return [
-        Experience(
-            problem,
-            Plan(states.reshape(-1, size).copy(), controls.reshape(-1, _CONTROL).copy(), dt),
-            vehicle,
-        )
+        Experience(problem, _plan(problem, states, controls, dt, vehicle), vehicle)
         for problem, states, controls, dt in zip(
             problems_of(table),
             lists_of(table["states"]),
@@ -73,8 +71,16 @@ def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
     ]
 
 
+def _plan(problem: Problem, states: Array, controls: Array, dt: float, vehicle: Vehicle) -> Plan:
+    plan = Plan(states.reshape(-1, state_size(vehicle)).copy(), controls.reshape(-1, _CONTROL).copy(), dt)
+    finite = np.isfinite(states).all() and np.isfinite(controls).all()
+    if len(plan.states) != len(plan.controls) + 1 or not finite or dt != vehicle.dt:
+        raise ValueError(f"the plan of problem {short(problem.id)} is none of the vehicle's")
+    return plan
+
+
 def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
-    """The same as a table."""
+    """Like ``read_experiences``, as a table whose rows are not looked at."""
     table = read_table(path, EXPERIENCES)
     refuse_another(path, _recorded(path), vehicle)
     return table
@@ -126,4 +132,4 @@ def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:
 
 def _recorded(path: Path) -> Any:
     """The vehicle's settings that a file was written with."""
-    return json.loads(metadata_of(path).get(_VEHICLE, b"null"))
+    return parse_json(metadata_of(path).get(_VEHICLE, b"null"), f"the vehicle of {path}")

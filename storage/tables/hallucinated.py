@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -13,9 +13,12 @@ from planners.memory.plans.sweeps import Flags
 from planners.world.arrays import Integers
 from planners.world.problem import Problem
 from storage.errors import StorageError
+from storage.fields import short
 from storage.tables.columns import Bits, bits_column, bits_of, problem_columns, problems_of
 from storage.tables.schemas import hallucinated
-from storage.tables.shards import metadata_of, read_table, write_table
+from storage.tables.shards import metadata_of, read_table, sound, write_table
+
+MOST_DIGITS: Final = 8  # of a number of plans
 
 
 class Labelled(NamedTuple):
@@ -74,7 +77,15 @@ def read_labelled(paths: Sequence[Path]) -> Labelled:
                 "run hallucinate again."
             )
         table = read_table(path, hallucinated(plans), ["grid", "plan_index", "labels"])
-        parts.append((bits_of(table["grid"]), table["plan_index"].to_numpy(), bits_of(table["labels"])))
+        with sound(path):
+            made_for = table["plan_index"].to_numpy()
+            if (
+                made_for.dtype != np.int32
+                or made_for.min(initial=-1) < -1
+                or made_for.max(initial=-1) >= plans
+            ):
+                raise ValueError(f"plan_index has other values than -1 to {plans - 1}")
+            parts.append((bits_of(table["grid"]), made_for, bits_of(table["labels"])))
     grids, indices, labels = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Labelled(grids, indices, labels, plans)
 
@@ -82,7 +93,8 @@ def read_labelled(paths: Sequence[Path]) -> Labelled:
 def read_hallucinated_problems(path: Path) -> list[Problem]:
     """The problems of one shard, without their labels."""
     table = read_table(path, hallucinated(plans_of(path)))
-    return problems_of(table)
+    with sound(path):
+        return problems_of(table)
 
 
 def read_methods(path: Path) -> list[str]:
@@ -93,4 +105,7 @@ def read_methods(path: Path) -> list[str]:
 
 def plans_of(path: Path) -> int:
     """For how many stored plans a shard is labelled."""
-    return int(metadata_of(path).get(b"plans", b"0"))
+    plans = metadata_of(path).get(b"plans", b"0")
+    if not plans.isdigit() or len(plans) > MOST_DIGITS:
+        raise StorageError(f"{path} is labelled for {short(plans)} plans; delete it and run its stage again.")
+    return int(plans)

@@ -10,7 +10,7 @@ import pyarrow as pa
 from planners.world.problem import Problem
 from storage.tables.columns import problem_columns, problems_of
 from storage.tables.schemas import IMPORTED
-from storage.tables.shards import read_table, write_table
+from storage.tables.shards import read_table, sound, write_table
 
 
 def write_imported(path: Path, problems: Sequence[Problem], key: str = "") -> None:
@@ -19,5 +19,7 @@ def write_imported(path: Path, problems: Sequence[Problem], key: str = "") -> No
 
 
 def read_imported(path: Path) -> list[Problem]:
-    """The problems of ``write_imported``, exactly, without checking them again."""
-    return problems_of(read_table(path, IMPORTED))
+    """The problems of ``write_imported``, exactly, without asking again whether they can be planned for."""
+    table = read_table(path, IMPORTED)
+    with sound(path):
+        return problems_of(table)

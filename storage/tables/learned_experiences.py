@@ -27,7 +27,7 @@ from storage.places.mirror import files_in, remove
 from storage.tables.columns import lists_of
 from storage.tables.experiences import experiences_of, read_experience_table, write_experiences
 from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import read_table, write_table
+from storage.tables.shards import read_table, sound, write_table
 
 MOST: Final = 5_000  # experiences a class: five times what a memory is chosen from by default
 SHARDS: Final = 16  # more are merged
@@ -101,8 +101,13 @@ def read_learned(folder: Path, vehicle: Vehicle) -> list[Experience]:
     """What is learned by now, as a snapshot taken now would hold it; nothing is written."""
     for _ in range(READINGS):
         with suppress(StorageError):  # somebody merged the shards meanwhile
-            return experiences_of(_kept(folder, vehicle)[1], vehicle)
-    return experiences_of(_kept(folder, vehicle)[1], vehicle)
+            return _experiences(folder, vehicle)
+    return _experiences(folder, vehicle)
+
+
+def _experiences(folder: Path, vehicle: Vehicle) -> list[Experience]:
+    with sound(folder):
+        return experiences_of(_kept(folder, vehicle)[1], vehicle)
 
 
 def extract_class(snapshot: Path, class_name: str, without: Set[str], path: Path, key: str) -> int:

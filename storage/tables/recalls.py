@@ -13,7 +13,7 @@ import pyarrow as pa
 from storage.tables.columns import bits_column, bits_of, list_column, lists_of
 from storage.tables.hallucinated import plans_of
 from storage.tables.schemas import recalls
-from storage.tables.shards import read_table, write_table
+from storage.tables.shards import read_table, sound, write_table
 
 
 def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key: str = "") -> None:
@@ -40,6 +40,10 @@ def read_recalls(paths: Sequence[Path]) -> pd.DataFrame:
 def _read(path: Path) -> pd.DataFrame:
     plans = plans_of(path)
     table = read_table(path, recalls(plans))
-    frame: pd.DataFrame = table.drop_columns(["order", "free"]).to_pandas()
-    free = np.unpackbits(bits_of(table["free"]), axis=1, count=plans).astype(bool)
-    return frame.assign(order=pd.Series(lists_of(table["order"]), dtype=object), free=list(free))
+    with sound(path):
+        orders = lists_of(table["order"])
+        if any(order.min(initial=0) < 0 or order.max(initial=0) >= plans for order in orders):
+            raise ValueError(f"order has other plans than 0 to {plans - 1}")
+        frame: pd.DataFrame = table.drop_columns(["order", "free"]).to_pandas()
+        free = np.unpackbits(bits_of(table["free"]), axis=1, count=plans).astype(bool)
+        return frame.assign(order=pd.Series(orders, dtype=object), free=list(free))

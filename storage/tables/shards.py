@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
@@ -45,41 +46,56 @@ def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key:
 def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:
     """The rows of a file that was written with ``schema`` (``schemas.py``), or some columns of it.
 
-    StorageError: the file is missing, damaged, or of another kind or version.
+    Columns that a file of an earlier version did not have are left out.
+
+    StorageError: the file is missing, damaged, of another kind or version, or a column is of another type.
     """
     wanted = schema.metadata[SCHEMA_KEY].decode()
-    found = metadata_of(path).get(SCHEMA_KEY, b"").decode() or "an unknown one"
+    found = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
     if found != wanted:
         raise StorageError(
             f"{path} holds table {found}, wanted was {wanted}; is it the right file, written by this version?"
         )
-    try:
-        return pq.read_table(
+    with sound(path):
+        table = pq.read_table(
             fetch(path),
             columns=None if columns is None else list(columns),
             partitioning=None,
             page_checksum_verification=True,
         )
-    except (pa.ArrowException, OSError) as error:
-        raise _damaged(path, error) from None
+        for field in table.schema:
+            if field.name in schema.names and field.type != schema.field(field.name).type:
+                raise ValueError(
+                    f"column {field.name} holds {field.type}, wanted was {schema.field(field.name).type}"
+                )
+        return table
+
+
+@contextmanager
+def sound(path: Path) -> Iterator[None]:
+    """StorageError in place of whatever is raised by rows that are none of their table's kind."""
+    try:
+        yield
+    except (pa.ArrowException, OSError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise StorageError(
+            f"{path} is no whole Parquet file of its kind ({_first_line(error)}); delete it and run its "
+            "stage again."
+        ) from None
 
 
 def metadata_of(path: Path) -> dict[bytes, bytes]:
     """The key/value metadata of a Parquet file; a StorageError where it is missing or damaged."""
-    try:
-        return dict(pq.read_schema(fetch(path)).metadata or {})
-    except FileNotFoundError:
-        raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
-    except (pa.ArrowException, OSError) as error:
-        raise _damaged(path, error) from None
+    with sound(path):
+        try:
+            return dict(pq.read_schema(fetch(path)).metadata or {})
+        except FileNotFoundError:
+            raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
 
 
 def columns_of(path: Path) -> list[str]:
     """The columns of a Parquet file; a StorageError where it is missing or damaged."""
-    try:
+    with sound(path):
         return list(pq.read_schema(fetch(path)).names)
-    except (pa.ArrowException, OSError) as error:
-        raise _damaged(path, error) from None
 
 
 def shard_is_done(path: Path, key: str) -> bool:
@@ -111,12 +127,6 @@ def table_of(rows: Sequence[dict[str, Any]], schema: pa.Schema, what: str) -> pa
         return pa.Table.from_pylist(list(rows), schema=schema)
     except (pa.ArrowException, TypeError, ValueError, OverflowError) as error:
         raise StorageError(f"{what} rows have a value of the wrong type: {_first_line(error)}.") from None
-
-
-def _damaged(path: Path, error: Exception) -> StorageError:
-    return StorageError(
-        f"{path} is no whole Parquet file ({_first_line(error)}); delete it and run its stage again."
-    )
 
 
 def _first_line(error: Exception) -> str:

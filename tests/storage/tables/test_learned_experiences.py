@@ -99,7 +99,7 @@ def test_nothing_learned_and_another_vehicle_are_told_in_a_line(tmp_path: Path) 
 
 def test_many_processes_at_once_lose_and_repeat_nothing(tmp_path: Path) -> None:
     script = (
-        "import sys; from pathlib import Path; from storage import learned;"
+        "import sys; from pathlib import Path; from storage.tables import learned_experiences as learned;"
         "from tests.storage.tables.test_learned_experiences import add, experience; learned.SHARDS = 4\n"
         "for i in range(40): add(Path(sys.argv[1]), [experience(int(sys.argv[2]) * 20 + i)])"
     )  # each shares half of what it learns with the next
