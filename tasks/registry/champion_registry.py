@@ -1,7 +1,7 @@
-"""The champions: versions of each memory in MLflow's registry, told apart by tags, pointed at by aliases.
+"""Versions of each memory in MLflow's registry, with our tags, and the aliases that point at them.
 
-A memory is in use while the alias ``champion`` points at its version. That alias is written once, last, and
-in one step: until then, and whatever happens, the champion is who it was.
+The alias ``champion`` says which version is in use. It is written last and in one step, so whatever happens
+before that leaves the champion as it was.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
-from unittest.mock import patch
 
 from storage.places.data_folder import DataFolder
 from tasks.registry.model_uris import download, set_mlflow_environment
+from tasks.settings.environment import environment
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import DEFAULT_VEHICLE, RunError
 from tasks.tracking.mlflow_runs import tracking_uri
 
 PREFIX: Final = "motion-memory-"
 CHAMPION: Final = "champion"
-CHALLENGER: Final = "challenger"  # better, and awaiting a human's approval
+CHALLENGER: Final = "challenger"  # a better version that waits for approval
 _TAG: Final = "motion_memory."
 
 FIRST: Final = "first champion"
@@ -36,112 +36,125 @@ class Version(NamedTuple):
 
     name: str
     number: int
-    tags: Mapping[str, str]  # ours, without their prefix
+    tags: Mapping[str, str]  # ours, without the prefix that they have in MLflow
 
     @property
     def uri(self) -> str:
-        """What ``--memory`` takes."""
+        """The address that ``--memory`` takes."""
         return f"models:/{self.name}/{self.number}"
 
     @property
     def memory(self) -> str:
-        """The class whose memory it is, or the combined one's name."""
+        """The class of the memory, or ``combined``."""
         return self.tags.get("memory", self.name.removeprefix(PREFIX))
 
     def tag(self, name: str) -> str:
-        """One of our tags; empty where it has none."""
+        """The value of one of our tags; empty if the version has no such tag."""
         return self.tags.get(name, "")
 
     @property
     def retraining(self) -> int:
-        """The number of the retraining that made it; 0 where none did."""
+        """The number of the retraining that made this version; 0 if none did."""
         number = self.tag("retraining")
         return int(number) if number.isdecimal() else 0
 
 
 def registered_name(memory: str, vehicle: str) -> str:
-    """The name of a memory in the registry; of another vehicle than the car it says the vehicle's, too."""
+    """The name of a memory in the registry; unless the vehicle is the car, the name ends with the vehicle."""
     return PREFIX + memory + ("" if vehicle == DEFAULT_VEHICLE else f"-{vehicle}")
 
 
 class Registry:
-    """MLflow's registry, as a data folder's settings name it.
+    """The memories in MLflow's registry, at MLFLOW_TRACKING_URI or in a data folder.
 
-    Every method: RunError with one line where it cannot be reached.
+    Every method raises RunError with one line if the registry cannot be reached.
     """
 
     def __init__(self, data: DataFolder) -> None:
-        """Nothing is connected to, or made, before something is asked."""
+        """Remember where the registry is; nothing is opened or made yet."""
         self.uri = tracking_uri(data)
         self._missing = not os.environ.get("MLFLOW_TRACKING_URI") and not data.mlflow_database.is_file()
 
     def names(self) -> list[str]:
-        """All memories that are registered."""
+        """The names of all registered memories, sorted."""
         if self._missing:
             return []
-        with self._asked() as client:
-            found = client.search_registered_models(f"name LIKE '{PREFIX}%'", max_results=1000)
-            return sorted(model.name for model in found)
+        with self._client() as client:
+            models = client.search_registered_models(f"name LIKE '{PREFIX}%'", max_results=1000)
+            return sorted(model.name for model in models)
 
     def versions(self, name: str) -> list[Version]:
         """All versions of a memory, oldest first."""
         if self._missing:
             return []
-        with self._asked() as client:
-            found = client.search_model_versions(f"name = '{name}'", max_results=10_000)
-        return sorted((_version(each) for each in found), key=lambda version: version.number)
+        with self._client() as client:
+            entries = client.search_model_versions(f"name = '{name}'", max_results=10_000)
+        return sorted((_version(entry) for entry in entries), key=lambda version: version.number)
 
     def aliased(self, name: str, alias: str = CHAMPION) -> Version | None:
-        """The version that an alias points at; None where there is none."""
+        """The version that an alias points at, or None."""
         if self._missing:
             return None
-        with self._asked() as client:
-            found = client.search_registered_models(f"name = '{name}'")
-            number = found[0].aliases.get(alias) if found else None
+        with self._client() as client:
+            models = client.search_registered_models(f"name = '{name}'")
+            number = models[0].aliases.get(alias) if models else None
             return None if number is None else _version(client.get_model_version(name, str(number)))
 
     def register(
-        self, name: str, run_id: str, model_id: str, key: str, tags: Mapping[str, Any], told: str
+        self, name: str, run_id: str, model_id: str, key: str, tags: Mapping[str, Any], description: str
     ) -> Version:
-        """The version of a logged model, found again by ``key`` or made, with these tags and description."""
+        """Register a logged model as a version, once however often this is called.
+
+        Parameters
+        ----------
+        name
+            The memory's name in the registry.
+        run_id, model_id
+            The MLflow run and the logged model that the version is made of.
+        key
+            What the version was made from; a version with the same key is taken again.
+        tags, description
+            Written to the version, whether it is new or not.
+
+        """
         self._missing = False
-        found = next((each for each in self.versions(name) if each.tag("key") == key), None)
-        with self._asked() as client, patch.dict(os.environ, {"MLFLOW_TRACKING_URI": self.uri}):
+        version = next((each for each in self.versions(name) if each.tag("key") == key), None)
+        with self._client() as client, environment(MLFLOW_TRACKING_URI=self.uri):
             if not client.search_registered_models(f"name = '{name}'"):
                 client.create_registered_model(name, description="Recalls plans; docs/operations.md")
-            if found is None:
+            if version is None:
                 first = {_TAG + "key": key, _TAG + "memory": tags["memory"]}
-                made = client.create_model_version(
+                entry = client.create_model_version(
                     name, f"models:/{model_id}", run_id, tags=first, model_id=model_id
                 )
-                found = _version(made)
-            client.update_model_version(name, str(found.number), told)
-        return self.tagged(found, tags)
+                version = _version(entry)
+            client.update_model_version(name, str(version.number), description)
+        return self.tagged(version, tags)
 
     def tagged(self, version: Version, tags: Mapping[str, Any]) -> Version:
-        """The version with more tags, or others."""
+        """Write tags to a version; return the version with them."""
         texts = {tag: str(value) for tag, value in tags.items()}
-        with self._asked() as client:
+        with self._client() as client:
             for tag, text in texts.items():
                 client.set_model_version_tag(version.name, str(version.number), _TAG + tag, text)
         return version._replace(tags={**version.tags, **texts})
 
     def point(self, version: Version, alias: str = CHAMPION) -> None:
-        """Let an alias point at a version: the one step by which a champion changes."""
-        with self._asked() as client:
+        """Point an alias at a version. This is the one step by which a champion changes."""
+        with self._client() as client:
             client.set_registered_model_alias(version.name, alias, str(version.number))
 
     def drop(self, name: str, alias: str) -> None:
         """Remove an alias."""
-        with self._asked() as client:
+        with self._client() as client:
             client.delete_registered_model_alias(name, alias)
 
     def fetch(self, version: Version, scratch: str) -> Path:
-        """The folder of a version's memory, downloaded into ``scratch``."""
+        """Download a version's memory into the folder ``scratch``; return the memory's folder in it."""
         return download(version.uri, scratch, self.uri)
 
     @contextmanager
-    def _asked(self) -> Iterator[Any]:
+    def _client(self) -> Iterator[Any]:
         set_mlflow_environment()
         from mlflow import MlflowClient
 
@@ -153,13 +166,14 @@ class Registry:
             reason = " ".join(str(error).split())[:300] or type(error).__name__
             raise RunError(
                 redacted(
-                    f"MLflow's registry at {self.uri} cannot be used, champions are as they were; give the "
-                    f"same command again later: {reason}"
+                    f"MLflow's registry at {self.uri} cannot be used, and the champions are as they were; "
+                    f"give the same command again later: {reason}"
                 )
             ) from error
 
 
-def _version(found: Any) -> Version:
-    tags = {str(key): str(value) for key, value in (found.tags or {}).items()}
+def _version(entry: Any) -> Version:
+    """Our value for MLflow's ``ModelVersion``."""
+    tags = {str(key): str(value) for key, value in (entry.tags or {}).items()}
     ours = {key.removeprefix(_TAG): value for key, value in tags.items() if key.startswith(_TAG)}
-    return Version(str(found.name), int(found.version), ours)
+    return Version(str(entry.name), int(entry.version), ours)

@@ -1,4 +1,4 @@
-"""The one memory that a place holds: for who plans with it, whatever the class of a problem."""
+"""The one memory at an address, used for problems of whatever class."""
 
 from __future__ import annotations
 
@@ -11,22 +11,31 @@ from tasks.settings.run_settings import COMBINED, RunError
 
 
 @contextmanager
-def one_memory(place: str) -> Iterator[Path]:
-    """The archive at a place, for as long as this lasts: a folder of it, or of a run, or a model in MLflow.
+def memory_at(address: str) -> Iterator[Path]:
+    """The folder of a memory, kept for as long as the context lasts.
 
-    Of a run it is the combined memory, or the only one. RunError: there are several, or MLflow has none.
+    Parameters
+    ----------
+    address
+        The folder of a memory; or of a run, for its combined memory or its only one; or a model in MLflow.
+
+    Raises
+    ------
+    RunError
+        The run has several memories, or MLflow has none at this address.
+
     """
-    with memory_folder(place) as folder:
-        assert folder is not None  # there is a place
+    with memory_folder(address) as folder:
+        assert folder is not None  # only an address of None has no folder
         yield _archive(folder)
 
 
 def _archive(folder: Path) -> Path:
-    found = sorted(header.parent for header in folder.glob("memories/[!.]*/memory.json"))
-    if (folder / "memory.json").is_file() or not found:
+    memories = sorted(header.parent for header in folder.glob("memories/[!.]*/memory.json"))
+    if (folder / "memory.json").is_file() or not memories:
         return folder
-    chosen = [each for each in found if each.name == COMBINED] or found
+    chosen = [memory for memory in memories if memory.name == COMBINED] or memories
     if len(chosen) > 1:
-        names = ", ".join(each.name for each in found)
+        names = ", ".join(memory.name for memory in memories)
         raise RunError(f"{folder / 'memories'} holds several memories; name one of its folders: {names}.")
     return chosen[0]

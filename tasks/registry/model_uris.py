@@ -1,6 +1,7 @@
-"""Memories that MLflow keeps: ``models:/name/1``, ``models:/name@alias``, ``runs:/<run>/<model>``.
+"""Memories by their address in MLflow: ``models:/name/1``, ``models:/name@alias``, ``runs:/<run>/<model>``.
 
-They are downloaded, and then checked and read as any other archive; no code of theirs runs.
+A memory is downloaded, and then checked and read like any other archive. None of the code that MLflow keeps
+beside it runs.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from storage.places.data_folder import DataFolder
 from storage.places.mirror import folders_here
 from tasks.servers.access import auth_environment
 from tasks.servers.prefect_server import ENVIRONMENT
+from tasks.settings.environment import environment
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import RunError, default_data
 from tasks.tracking.mlflow_runs import tracking_uri
@@ -29,37 +31,37 @@ URI: Final = re.compile(r"(models|runs|mlflow-artifacts):/.*")
 _SETTINGS: Final = {
     **{name: value for name, value in ENVIRONMENT.items() if name.startswith("MLFLOW_")},
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
-    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",  # somebody waits
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",  # a user waits
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
 }
 
 
 def set_mlflow_environment() -> None:
-    """Quiet and impatient defaults of MLflow and its password, where the user has not decided otherwise."""
+    """Set quiet and impatient defaults for MLflow, and its password, unless the user has set them."""
     for name, value in (_SETTINGS | auth_environment()).items():
         os.environ.setdefault(name, value)
 
 
-def is_model_uri(place: str) -> bool:
-    """Whether a place is MLflow's to find rather than a folder."""
-    return URI.fullmatch(place) is not None
+def is_model_uri(address: str) -> bool:
+    """Whether an address is one of MLflow rather than a folder."""
+    return URI.fullmatch(address) is not None
 
 
 @contextmanager
-def memory_folder(place: str | None) -> Iterator[Path | None]:
-    """The folder at a place: itself, or what MLflow keeps, downloaded for as long as this lasts.
+def memory_folder(address: str | None) -> Iterator[Path | None]:
+    """The folder of memories at an address; a model in MLflow is downloaded for as long as the context lasts.
 
-    RunError: MLflow does not answer, or holds no such model.
+    None has no folder. Raises RunError if MLflow does not answer or holds no such model.
     """
-    if place is None or not is_model_uri(place):
-        yield place if place is None else folders_here(place, "memories")
+    if address is None or not is_model_uri(address):
+        yield address if address is None else folders_here(address, "memories")
         return
     with TemporaryDirectory(prefix="motion-memory-") as scratch:
-        yield download(place, scratch, _tracking_uri(place))
+        yield download(address, scratch, _tracking_uri(address))
 
 
 def memory_digest(folder: Path | None) -> str:
-    """A digest of the memories in a folder, whose headers hold the checksums of all else."""
+    """A digest of the memories in a folder: of their headers, which hold the checksums of everything else."""
     digest = hashlib.sha256()
     if folder is not None:
         for header in sorted([folder / "memory.json", *folder.glob("memories/[!.]*/memory.json")]):
@@ -69,50 +71,61 @@ def memory_digest(folder: Path | None) -> str:
     return digest.hexdigest()
 
 
-def load_from(place: str, vehicle: Vehicle) -> Memory:
-    """The memory in a folder, or of a model in MLflow at $MLFLOW_TRACKING_URI or in the usual data folder.
+def load_from(address: str, vehicle: Vehicle) -> Memory:
+    """The memory at an address: a folder, or a model in MLflow.
 
-    RunError: MLflow does not answer, or holds no such model. StorageError: there is no good archive.
+    MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder. Raises RunError if it does not answer
+    or holds no such model, and StorageError if the archive is damaged or belongs to another vehicle.
     """
-    if is_model_uri(place):
-        return _registered(place, vehicle)
-    return load_memory(folders_here(place, "memories"), vehicle)
+    with memory_folder(address) as folder:  # a mapped file outlives its name
+        assert folder is not None  # only an address of None has no folder
+        return load_memory(folder, vehicle)
 
 
-def _registered(uri: str, vehicle: Vehicle) -> Memory:
-    with TemporaryDirectory(prefix="motion-memory-") as scratch:  # mapped files outlive their names
-        return load_memory(download(uri, scratch, _tracking_uri(uri)), vehicle)
+def download(uri: str, scratch: str, server: str) -> Path:
+    """Download a model's memory from MLflow.
 
+    Parameters
+    ----------
+    uri
+        The model: ``models:/…`` or ``runs:/…``.
+    scratch
+        The folder to put it into.
+    server
+        The tracking URI of MLflow.
 
-def download(uri: str, scratch: str, where: str) -> Path:
-    """The memory of a model in MLflow at ``where``, downloaded into a folder.
+    Returns
+    -------
+    The memory's folder.
 
-    RunError: MLflow does not answer, or holds no such model.
+    Raises
+    ------
+    RunError
+        MLflow does not answer, or holds no such model.
+
     """
     set_mlflow_environment()
-    from unittest.mock import patch
-
     from mlflow.artifacts import download_artifacts
 
     try:
-        with patch.dict(os.environ, {"MLFLOW_TRACKING_URI": where}):  # of all that MLflow asks on the way
+        with environment(MLFLOW_TRACKING_URI=server):  # read by every part of MLflow that takes part
             folder = Path(download_artifacts(uri, dst_path=scratch))
     except Exception as error:  # each of MLflow's stores has errors of its own
         reason = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RunError(redacted(f"{uri} cannot be had from MLflow at {where}: {reason}")) from error
-    found = sorted(header.parent for header in folder.rglob("memory.json"))
-    if len(found) != 1:
+        raise RunError(redacted(f"{uri} cannot be had from MLflow at {server}: {reason}")) from error
+    memories = sorted(header.parent for header in folder.rglob("memory.json"))
+    if len(memories) != 1:
         raise RunError(
-            redacted(f"{uri} in MLflow at {where} holds {len(found)} memories; name a model with one.")
+            redacted(f"{uri} in MLflow at {server} holds {len(memories)} memories; name a model with one.")
         )
-    return found[0]
+    return memories[0]
 
 
 def _tracking_uri(uri: str) -> str:
     folder = DataFolder(default_data().absolute())
     if not os.environ.get("MLFLOW_TRACKING_URI") and not folder.mlflow_database.is_file():
         raise RunError(
-            f"{uri} is MLflow's to find, but there is none: {folder.mlflow_database} does not exist. "
+            f"{uri} is an address in MLflow, but {folder.mlflow_database} does not exist. "
             "Set MLFLOW_TRACKING_URI, or MOTION_MEMORY_DATA to the data folder of the run."
         )
     return tracking_uri(folder)

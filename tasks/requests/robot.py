@@ -26,7 +26,7 @@ from storage.exchange.problems import problem_of
 from storage.fields import parse_json
 from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.compile_assists import EMPTY, compile_assists
-from tasks.registry.memory_at import one_memory
+from tasks.registry.memory_at import memory_at
 from tasks.settings.run_settings import UsageError, check_known
 
 
@@ -112,7 +112,7 @@ def load_planner(
     check_known("recall", [] if recall is None else [recall], RECALLS)
     if top_k < 1:
         raise UsageError(f"Top k is {top_k}: give 1 or more.")
-    with one_memory(str(memory)) as folder:
+    with memory_at(str(memory)) as folder:
         found = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
     strategy = recall or default_recall(found)
     compile_assists(found.vehicle, planner, [strategy])

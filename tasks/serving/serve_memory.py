@@ -11,7 +11,7 @@ from pathlib import Path
 from planners.memory.recall import Memory
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.archives.memories import load_memory
-from tasks.registry.memory_at import one_memory
+from tasks.registry.memory_at import memory_at
 from tasks.servers.access import Guarded, access, auth, auth_environment, check_address
 from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
 from tasks.servers.prefect_server import ENVIRONMENT
@@ -24,7 +24,7 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
     check_address(host)
     for name, value in (ENVIRONMENT | auth_environment()).items():
         os.environ.setdefault(name, value)
-    with one_memory(memory) as folder, bound(host, port) as place:
+    with memory_at(memory) as folder, bound(host, port) as place:
         found = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
 
         def tell() -> None:
