@@ -20,7 +20,8 @@ from storage.places.data_folder import MARK, DataFolder, RunFolder
 from storage.tables.attempts import read_attempts
 from storage.tables.watched import add_watched
 from tasks.registry.champion_registry import CHAMPION, Registry
-from tasks.servers.prefect_server import running_server, set_environment
+from tasks.servers.access import auth_environment
+from tasks.servers.prefect_server import CLIENT, running_server, set_environment
 from tasks.settings.run_settings import RunError, default_data
 
 SOLVED: Final = "motion-memory.solved"
@@ -84,11 +85,12 @@ def watch(known: Watched | None, now: Mapping[str, Usefulness], data: Path | Non
     lines = [str(each) for each in found]
     lines += _keep(known.home, found)
     fallen = [each for each in found if each.has_fallen]
-    place = _server([data, default_data()]) if found else None
-    if place is None:
+    server = _server([data, default_data()]) if found else None
+    if server is None:
         return lines + ["no Prefect server to tell: `motion-memory serve` runs one"] * bool(fallen)
+    place = server["PREFECT_API_URL"]
     try:
-        _send(place, found)
+        _send(server, found)
     except Exception as error:  # solving is done, and told; who watches can be asked again
         reason = (str(error) or type(error).__name__).splitlines()[0]
         return [*lines, f"Prefect at {place} was not told: {reason}"]
@@ -106,23 +108,24 @@ def _keep(home: Path, found: Sequence[Drift]) -> list[str]:
     return []
 
 
-def _server(folders: Sequence[Path | None]) -> str | None:
-    """Address of the user's server, or of one that runs for a data folder."""
+def _server(folders: Sequence[Path | None]) -> dict[str, str] | None:
+    """What makes a client of the user's server, or of one that runs for a data folder."""
     if os.environ.get("PREFECT_API_URL"):
-        return os.environ["PREFECT_API_URL"]
+        environment = auth_environment() | os.environ
+        return {name: environment[name] for name in CLIENT if name in environment}
     for folder in folders:
-        url = None if folder is None else running_server(folder.absolute())
-        if url is not None and folder is not None:
+        server = None if folder is None else running_server(folder.absolute())
+        if server is not None and folder is not None:
             set_environment(folder.absolute())
-            return url
+            return server.environment
     return None
 
 
-def _send(url: str, found: Sequence[Drift]) -> None:
+def _send(server: Mapping[str, str], found: Sequence[Drift]) -> None:
     from prefect.artifacts import create_markdown_artifact
     from prefect.events import Event, Resource
     from prefect.events.clients import PrefectEventsClient
-    from prefect.settings import PREFECT_API_URL, temporary_settings
+    from prefect.settings import temporary_settings
 
     from tasks.fan_out.progress_artifact import artifact_key
 
@@ -136,13 +139,13 @@ def _send(url: str, found: Sequence[Drift]) -> None:
         return Event(event=name, resource=resource, payload=drift.to_json())
 
     async def send() -> None:
-        async with PrefectEventsClient(url, reconnection_attempts=1) as client:
+        async with PrefectEventsClient(reconnection_attempts=1) as client:
             for drift in found:
                 await client.emit(event(SOLVED, drift))
                 if drift.has_fallen:
                     await client.emit(event(DRIFT, drift))
 
-    with temporary_settings({PREFECT_API_URL: url}):
+    with temporary_settings(server):
         asyncio.run(send())
         told = "".join(f"- {each}\n" for each in found)
         create_markdown_artifact(

@@ -58,7 +58,7 @@ def serve(
         deployment = _deployment(schedule, parameters)
         if server is not None:
             server.wait()
-            print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
+            print(server, file=sys.stderr)
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
         print(f"retrains {when}, and when hits have fallen; Ctrl-C ends it", flush=True)
         try:
@@ -133,6 +133,6 @@ def _end_children() -> None:
 
 def _is_server(child: psutil.Process) -> bool:
     try:
-        return any(part.endswith("prefect_server.py") for part in child.cmdline())
+        return "tasks.servers.prefect_app" in child.cmdline()
     except psutil.Error:
         return False

@@ -10,7 +10,9 @@ import base64
 import hmac
 import ipaddress
 import os
+import secrets
 import socket
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tasks.settings.run_settings import UsageError
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send
 
 AUTH: Final = "MOTION_MEMORY_AUTH"
+HOSTS: Final = "MOTION_MEMORY_HOSTS"
+USER: Final = "motion-memory"
 OPEN: Final = ("/ping", "/health")  # whether a server lives is no secret
 _REFUSAL: Final = b'{"error_code": "UNAUTHENTICATED", "message": "Give user and password (HTTP Basic)."}'
 
@@ -46,6 +50,20 @@ def auth_environment() -> dict[str, str]:
         "MLFLOW_TRACKING_USERNAME": user,
         "MLFLOW_TRACKING_PASSWORD": password,
     }
+
+
+def new_secret(file: Path) -> str:
+    """A ``user:password`` that nobody can guess, in a new file that only its owner can read."""
+    secret = f"{USER}:{secrets.token_urlsafe(32)}"
+    file.unlink(missing_ok=True)  # whoever has the old one open does not see the new one
+    with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as sink:
+        sink.write(secret)
+    return secret
+
+
+def hosts() -> frozenset[str]:
+    """Names that servers have besides their addresses, as of a proxy before them: MOTION_MEMORY_HOSTS=a,b."""
+    return frozenset(name.strip() for name in os.environ.get(HOSTS, "").split(",") if name.strip())
 
 
 def check_address(host: str) -> None:

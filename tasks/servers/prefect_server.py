@@ -1,8 +1,9 @@
 """A command's own Prefect server: on loopback, inside the data folder, gone when nobody uses it.
 
-The server is a child process that watches the commands which registered with it. It outlives none of them:
-when the last one has ended, even by kill -9, it stops itself. A command that finds it alive shares it.
-Run as a script (``python local_server.py FOLDER PORT``) this file is that child.
+The server is a child process (``tasks.servers.prefect_app``) that watches the commands which registered with
+it. It outlives none of them: when the last one has ended, even by kill -9, it stops itself. A command that
+finds it alive shares it. Nobody else can be its client: its password, a new one each time, lies in a file
+that only the owner can read.
 """
 
 from __future__ import annotations
@@ -20,9 +21,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Final
 
+from tasks.servers.access import auth_environment, new_secret
+from tasks.settings.environment import environment
+
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
 STOP_SECONDS: Final = 0.8  # then the child ends itself the hard way; SQLite stands that
+
+CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")  # what makes a client of a server
+URL, SECRET, LOG, USERS = "server.url", "server.auth", "server.log", "users"  # files of the server's folder
 
 # Set before Prefect, MLflow, Dask or a BLAS is imported, and only where the user has not decided otherwise.
 ENVIRONMENT: Final = {
@@ -56,20 +63,40 @@ class LocalServer:
     """A server that is up, or coming up."""
 
     url: str  # of the API, http://127.0.0.1:<port>/api
-    log: Path
+    folder: Path  # where it lives, ``prefect`` in the data folder
 
     @property
     def ui_url(self) -> str:
-        """Address to open in a browser."""
+        """Address to open in a browser, which asks for the secret."""
         return self.url.removesuffix("/api")
+
+    @property
+    def secret_file(self) -> Path:
+        """Where the secret lies, readable by its owner alone."""
+        return self.folder / SECRET
+
+    @property
+    def secret(self) -> str:
+        """The ``user:password`` that it asks for."""
+        return self.secret_file.read_text()
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What makes Prefect in this process, and in its children, a client of the server."""
+        return dict(zip(CLIENT, (self.url, self.secret), strict=True))
+
+    def __str__(self) -> str:
+        """The line that tells people where to look, and where the password lies."""
+        return f"Prefect  {self.ui_url} (while this runs; the password is in {self.secret_file})"
 
     def wait(self, seconds: float = START_SECONDS) -> None:
         """Return when the server answers; RuntimeError with one line when it does not."""
         deadline = time.monotonic() + seconds
         while not is_healthy(self.url):
-            if time.monotonic() > deadline or _find(self.log.parent) is None:
+            if time.monotonic() > deadline or _find(self.folder) is None:
                 raise RuntimeError(
-                    f"The local Prefect server did not start; see {self.log}, or set PREFECT_API_URL."
+                    f"The local Prefect server did not start; see {self.folder / LOG}, "
+                    "or set PREFECT_API_URL."
                 )
             time.sleep(0.1)
 
@@ -79,8 +106,6 @@ def set_environment(data: Path) -> None:
 
     And the password of all servers, where one is set: ours ask for it, and clients send it.
     """
-    from tasks.servers.access import auth_environment  # late: as a script this file has nothing but itself
-
     home = data / "prefect"
     home.mkdir(parents=True, exist_ok=True)
     folders = {
@@ -96,7 +121,8 @@ def set_environment(data: Path) -> None:
 def local_server(data: Path) -> Iterator[LocalServer | None]:
     """Share or start the server of ``data [folder]``; None when PREFECT_API_URL names another one.
 
-    Returns at once, and the server needs some 5 s more: see ``LocalServer.wait``. Sets PREFECT_API_URL.
+    Returns at once, and the server needs some 5 s more: see ``LocalServer.wait``. Sets the environment that
+    makes a client of Prefect.
     """
     set_environment(data)
     if os.environ.get("PREFECT_API_URL"):
@@ -104,65 +130,75 @@ def local_server(data: Path) -> Iterator[LocalServer | None]:
         return
     folder = data / "prefect"
     server, user = _register(folder)
-    os.environ["PREFECT_API_URL"] = server.url
     try:
-        yield server
+        with environment(**server.environment):
+            yield server
     finally:
-        del os.environ["PREFECT_API_URL"]
         _leave(folder, user)
 
 
-def running_server(data: Path) -> str | None:
-    """Address of the API of the server that lives in a data folder, if one does."""
+def running_server(data: Path) -> LocalServer | None:
+    """The server that lives in a data folder, if one does."""
     return _find(data / "prefect")
 
 
 def _register(folder: Path) -> tuple[LocalServer, IO[str]]:
     """Become a user of the server, one who holds a file locked; start the server where there is none."""
-    (folder / "users").mkdir(parents=True, exist_ok=True)
-    log = folder / "server.log"
-    with _locked(folder):
-        user = (folder / "users" / str(os.getpid())).open("w")
+    (folder / USERS).mkdir(parents=True, exist_ok=True)
+    with locked(folder):
+        user = (folder / USERS / str(os.getpid())).open("w")
         fcntl.flock(user, fcntl.LOCK_EX)
-        url = _find(folder)
-        if url is None:
-            port = _free_port()
-            url = f"http://127.0.0.1:{port}/api"
-            with (folder / "server.url").open("w") as state, log.open("wb") as sink:
-                fcntl.flock(state, fcntl.LOCK_EX)
-                state.write(url)
-                state.flush()
-                child = subprocess.Popen(
-                    [sys.executable, "-P", __file__, str(folder), str(port)],
-                    stdin=subprocess.DEVNULL,
-                    stdout=sink,
-                    stderr=sink,
-                    pass_fds=[state.fileno()],  # the child holds the lock for as long as it lives
-                    start_new_session=True,  # Ctrl-C is for the command; the server follows by itself
-                )
-            threading.Thread(target=child.wait, daemon=True).start()  # no zombie, should it end first
-    return LocalServer(url, log), user
+        return _find(folder) or _start(folder), user
+
+
+def _start(folder: Path) -> LocalServer:
+    """Have a child be the server; its port is open at once, so that no program of others takes it first."""
+    secret = new_secret(folder / SECRET)
+    with (
+        socket.create_server(("127.0.0.1", 0)) as listener,
+        (folder / URL).open("w") as state,
+        (folder / LOG).open("wb") as sink,
+    ):
+        server = LocalServer(f"http://127.0.0.1:{listener.getsockname()[1]}/api", folder)
+        fcntl.flock(state, fcntl.LOCK_EX)
+        state.write(server.url)
+        state.flush()
+        child = subprocess.Popen(
+            [sys.executable, "-P", "-m", "tasks.servers.prefect_app", str(folder), str(listener.fileno())],
+            env=os.environ
+            | {
+                "PREFECT_SERVER_API_AUTH_STRING": secret,
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # what this one has
+            },
+            stdin=subprocess.DEVNULL,
+            stdout=sink,
+            stderr=sink,
+            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock for as long as it lives
+            start_new_session=True,  # Ctrl-C is for the command; the server follows by itself
+        )
+    threading.Thread(target=child.wait, daemon=True).start()  # no zombie, should it end first
+    return server
 
 
 def _leave(folder: Path, user: IO[str]) -> None:
     """Be no user any more and, if this was the last, see the server go."""
-    with (folder / "server.url").open("a") as state:  # the child still holds it after it removed the name
+    with (folder / URL).open("a") as state:  # the child still holds it after it removed the name
         Path(user.name).unlink(missing_ok=True)
         user.close()
         deadline = time.monotonic() + STOP_SECONDS + 4 * POLL_SECONDS
-        while not _is_used(folder) and _is_locked(state) and time.monotonic() < deadline:
+        while not is_used(folder) and _is_locked(state) and time.monotonic() < deadline:
             time.sleep(0.05)
 
 
-def _find(folder: Path) -> str | None:
-    """Address of the server that lives in ``folder``, healthy or still starting."""
-    path = folder / "server.url"
-    return path.read_text() if _is_held(path) else None
+def _find(folder: Path) -> LocalServer | None:
+    """The server that lives in ``folder``, healthy or still starting."""
+    path = folder / URL
+    return LocalServer(path.read_text(), folder) if _is_held(path) else None
 
 
-def _is_used(folder: Path) -> bool:
+def is_used(folder: Path) -> bool:
     """Whether a command that registered is still alive; what dead ones left is removed."""
-    entries = list((folder / "users").glob("*"))
+    entries = list((folder / USERS).glob("*"))
     for entry in entries:
         if not _is_held(entry):
             entry.unlink(missing_ok=True)
@@ -200,48 +236,9 @@ def is_healthy(url: str) -> bool:
         return False
 
 
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path) -> Iterator[None]:
+    """Nobody else starts or ends the server of ``folder`` meanwhile."""
     with (folder / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
-
-
-def _serve(folder: Path, port: int) -> None:
-    """Be the server until nobody uses it."""
-    import uvicorn
-
-    server = uvicorn.Server(
-        uvicorn.Config(
-            "prefect.server.api.server:create_app",
-            factory=True,
-            host="127.0.0.1",
-            port=port,
-            log_level="error",
-            timeout_graceful_shutdown=1,
-        )
-    )
-
-    def watch() -> None:
-        while True:
-            time.sleep(POLL_SECONDS)
-            with _locked(folder):
-                if not _is_used(folder):
-                    (folder / "server.url").unlink(missing_ok=True)  # whoever comes now starts another
-                    break
-        server.should_exit = True
-        time.sleep(STOP_SECONDS)
-        os._exit(0)
-
-    threading.Thread(target=watch, daemon=True).start()
-    server.run()
-
-
-if __name__ == "__main__":
-    _serve(Path(sys.argv[1]), int(sys.argv[2]))

@@ -64,7 +64,7 @@ def _workers_for(
         local = scheduler is None and name != "report"
         stack.enter_context(warm_up(shared, vehicle) if local else nullcontext())
         if server is not None:
-            print(f"Prefect  {server.ui_url} (while this runs)", file=sys.stderr)
+            print(server, file=sys.stderr)
             server.wait()
         yield
 

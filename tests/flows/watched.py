@@ -80,7 +80,9 @@ def _ports(command: psutil.Process) -> set[Port]:
             connections = process.net_connections("inet")
         except psutil.Error:  # it has ended
             continue
-        name = "command" if process == command else "server" if "prefect_server.py" in line else "child"
+        name = (
+            "command" if process == command else "server" if "tasks.servers.prefect_app" in line else "child"
+        )
         found |= {
             Port(name, connection.laddr.ip)
             for connection in connections

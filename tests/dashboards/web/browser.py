@@ -18,12 +18,13 @@ DESKTOP, PHONE = (1280, 800), (390, 844)
 
 @contextmanager
 def browser() -> Iterator[WebDriver]:
-    """Chromium that resolves no other host."""
+    """Chromium that resolves no other host; evil.example is this machine, as after DNS rebinding."""
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM or ""
     for argument in (
         "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars",
-        "--force-device-scale-factor=1", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+        "--force-device-scale-factor=1",
+        "--host-resolver-rules=MAP evil.example 127.0.0.1, MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
     ):  # fmt: skip
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

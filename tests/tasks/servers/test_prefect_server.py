@@ -1,64 +1,194 @@
-"""The local server: shared while somebody uses it, gone when nobody does, kill -9 or not."""
+"""The local server: shared while somebody uses it, closed to everybody else, gone when nobody uses it."""
 
 from __future__ import annotations
 
 import os
 import signal
+import stat
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-from tasks.servers.prefect_server import LocalServer, _is_held, local_server, set_environment
+import httpx
+import psutil
+import pytest
+from selenium.webdriver import Keys
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import WebDriverWait
+
+from tasks.servers.prefect_server import _is_held, local_server, running_server, set_environment
+from tests.dashboards.web.browser import CHROMIUM, DRIVER, browser
+from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, websocket_status
 
 HOLD = """
-import sys, time
+import os, sys, time
 from pathlib import Path
 from tasks.servers.prefect_server import local_server
+os.umask(0)
 with local_server(Path(sys.argv[1])) as server:
     print(server.url, flush=True)
-    time.sleep(120)
+    time.sleep(240)
 """
+ROOT = Path(__file__).parents[3]
 
 
-def test_a_server_is_found_again_and_outlives_no_user(tmp_path: Path) -> None:
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    environment["PYTHONPATH"] = str(Path(__file__).parents[3])
-    asked = [sys.executable, "-c", HOLD, str(tmp_path)]
-    state = tmp_path / "prefect" / "server.url"
-    users = [subprocess.Popen(asked, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+class Patient(httpx.HTTPTransport):
+    """Asks again, as Prefect's client does, while the database of a server that just started is locked."""
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        for _ in range(50):
+            answer = super().handle_request(request)
+            if answer.status_code != 503:
+                break
+            time.sleep(0.2)
+        return answer
+
+
+class Shared:
+    """A server in use by two commands."""
+
+    def __init__(self, data: Path) -> None:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
+        environment["PYTHONPATH"] = str(ROOT)
+        command = [sys.executable, "-c", HOLD, str(data)]
+        self.data = data
+        self.users = [
+            subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)
+        ]
+        self.urls = [user.stdout.readline().strip() for user in self.users if user.stdout]
+        found = running_server(data)
+        assert found is not None
+        self.server = found
+        self.server.wait()
+
+    def client(self) -> httpx.Client:
+        """One that knows the password, as the commands do."""
+        user, _, password = self.server.secret.partition(":")
+        return httpx.Client(base_url=f"{self.server.url}/", auth=(user, password), transport=Patient())
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
+    shared = Shared(tmp_path_factory.mktemp("data"))
     try:
-        first, second = (user.stdout.readline().strip() for user in users if user.stdout)
-        assert first == second  # one server for both
-        assert first.startswith("http://127.0.0.1:")
-        server = LocalServer(first, tmp_path / "prefect" / "server.log")
-        server.wait()
-        users[0].send_signal(signal.SIGKILL)
-        time.sleep(0.5)
-        assert _is_held(state)
-        server.wait(5.0)  # still answers the one that is left
+        yield shared
     finally:
-        for user in users:
+        for user in shared.users:
             user.kill()
             user.communicate()
+
+
+@pytest.fixture(scope="module")
+def deployment(shared: Shared) -> str:
+    """Path of a deployment, such as `serve` has: what it is made of is run."""
+    with shared.client() as client:
+        flow = client.post("flows/", json={"name": "retrain"}).json()["id"]
+        asked = {"name": "scheduled", "flow_id": flow}
+        return f"deployments/{client.post('deployments/', json=asked).json()['id']}"
+
+
+def test_commands_on_one_data_folder_share_a_server(shared: Shared) -> None:
+    assert shared.urls == [shared.server.url] * 2
+    assert shared.server.url.startswith("http://127.0.0.1:")
+
+
+def test_only_the_owner_can_read_the_password_whatever_the_umask(shared: Shared) -> None:
+    assert stat.S_IMODE(shared.server.secret_file.stat().st_mode) == 0o600
+    secret = shared.server.secret.partition(":")[2]
+    assert len(secret) >= 32
+    assert not [line for line in _command_lines() if secret in line]
+    files = [path for path in shared.data.rglob("*") if path.is_file() and path != shared.server.secret_file]
+    assert not [path for path in files if secret.encode() in path.read_bytes()]
+
+
+def test_who_does_not_know_the_password_is_told_nothing(shared: Shared, deployment: str) -> None:
+    for auth in (None, ("motion-memory", "wrong")):
+        assert httpx.get(f"{shared.server.url}/{deployment}", auth=auth).status_code == 401
+        assert httpx.patch(f"{shared.server.url}/{deployment}", json=STEPS, auth=auth).status_code == 401
+    assert httpx.get(f"{shared.server.url}/health").status_code == 200
+
+
+@pytest.mark.parametrize("foreign", [{"Origin": EVIL}, {"Origin": "null"}, {"Host": "evil.example"}])
+def test_another_site_is_refused_even_with_the_password(
+    shared: Shared, deployment: str, foreign: dict[str, str]
+) -> None:
+    with shared.client() as client:
+        for answer in (
+            client.patch(deployment, json=STEPS, headers=foreign),
+            client.post(f"{deployment}/create_flow_run", json={}, headers=foreign),
+            client.delete(deployment, headers=foreign),
+            client.get(deployment, headers=foreign),
+            client.options(deployment, headers=foreign | {"Access-Control-Request-Method": "PATCH"}),
+            client.get(shared.server.ui_url, headers=foreign),
+        ):
+            assert answer.status_code in (400, 403)
+            assert "access-control-allow-origin" not in answer.headers
+        assert not client.get(deployment).json()["pull_steps"]
+        asked = {"flow_runs": {"deployment_id": {"any_": [deployment.partition("/")[2]]}}}
+        assert client.post("flow_runs/filter", json=asked).json() == []
+    assert websocket_status(f"{shared.server.url}/events/in", foreign) == 403
+    assert websocket_status(f"{shared.server.url}/events/in", {}) == 101
+
+
+@pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
+def test_in_a_browser_a_page_elsewhere_reaches_nothing_and_the_servers_own_asks_for_the_password(
+    shared: Shared, deployment: str
+) -> None:
+    port = shared.server.ui_url.rpartition(":")[2]
+    with browser() as driver, evil_page() as page:
+        driver.get(page)
+        told = driver.execute_async_script(ATTACK, f"{shared.server.url}/{deployment}", STEPS)
+        assert told == {"read": "refused", "changed": "refused", "sent": "refused", "socket": "closed"}
+        driver.get(f"{EVIL}:{port}/")  # a name that now means this machine
+        told = driver.execute_async_script(ATTACK, f"/api/{deployment}", STEPS)
+        assert told == {"read": 400, "changed": 400, "sent": 400, "socket": "closed"}
+        with shared.client() as client:
+            assert not client.get(deployment).json()["pull_steps"]
+        driver.get(shared.server.ui_url)
+        waiting = WebDriverWait(driver, 60)
+        box = waiting.until(lambda driver: driver.find_element(By.CSS_SELECTOR, "input[type=password]"))
+        told = driver.execute_async_script(ATTACK, f"/api/{deployment}", STEPS)
+        assert told == {"read": 401, "changed": 401, "sent": 401, "socket": "open"}  # where the token is next
+        box.send_keys(shared.server.secret, Keys.ENTER)
+        waiting.until(lambda driver: "login" not in driver.current_url)
+        driver.get(f"{shared.server.ui_url}/deployments")
+        waiting.until(lambda driver: "scheduled" in driver.find_element(By.TAG_NAME, "body").text)
+
+
+def test_a_server_outlives_no_user_and_leaves_no_password(shared: Shared) -> None:
+    state = shared.data / "prefect" / "server.url"  # last: it ends what the others ask
+    shared.users[0].send_signal(signal.SIGKILL)
+    time.sleep(0.5)
+    assert _is_held(state)
+    shared.server.wait(5.0)  # still answers the one that is left
+    shared.users[1].kill()
     deadline = time.monotonic() + 10.0
-    while (state.exists() or _lives_in(tmp_path)) and time.monotonic() < deadline:
+    while (state.exists() or _lives_in(shared.data)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not state.exists()
-    assert not _lives_in(tmp_path)
+    assert not shared.server.secret_file.exists()
+    assert not _lives_in(shared.data)
+    assert running_server(shared.data) is None
+
+
+def _command_lines() -> list[str]:
+    return [" ".join(process.info["cmdline"] or []) for process in psutil.process_iter(["cmdline"])]
 
 
 def _lives_in(folder: Path) -> bool:
-    """Whether a process that was started for the folder is there."""
-    listed = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
-    return any(f"local_server.py {folder}" in line for line in listed.splitlines())
+    """Whether the child that was started for the folder is there."""
+    return any("prefect_app" in line and str(folder) in line for line in _command_lines())
 
 
 def test_a_server_of_the_users_own_is_left_alone(tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    monkeypatch.setattr(os, "environ", {**os.environ, "PREFECT_API_URL": "http://prefect.example/api"})
+    own = {"PREFECT_API_URL": "http://prefect.example/api", "PREFECT_API_AUTH_STRING": "robot:mine"}
+    monkeypatch.setattr(os, "environ", {**os.environ, **own})
     with local_server(tmp_path) as server:
         assert server is None
-    assert os.environ["PREFECT_API_URL"] == "http://prefect.example/api"
+        assert {name: os.environ[name] for name in own} == own
+    assert {name: os.environ[name] for name in own} == own
     assert not (tmp_path / "prefect" / "server.url").exists()
 
 

@@ -1,0 +1,134 @@
+"""Who may ask our servers: who calls them by their own address, from their own pages, with their password."""
+
+from __future__ import annotations
+
+import base64
+import hmac
+import ipaddress
+from collections.abc import Collection
+from typing import Final
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import JSONResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+OPEN: Final = ("/ping", "/health")  # whether a server lives is no secret
+_ADDED: Final = {  # to each answer: other sites neither read it, nor show it in a frame
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+}
+_OTHER_NAME: Final = (
+    "Ask this server by its own address; for another name set MOTION_MEMORY_HOSTS where it is started."
+)
+_SHARED: Final = "access-control-"  # headers that let other sites in (CORS)
+
+
+class Guard:
+    """An ASGI application that pages of other sites cannot reach, nor can anybody without the password.
+
+    A web page can have the browser send requests to any address, loopback included. Two headers that it
+    cannot choose give it away: Origin is the page's own address, Host the name by which it asks. A foreign
+    Host means DNS rebinding: the page's own name has come to mean this machine.
+    """
+
+    def __init__(self, app: ASGIApp, secret: str | None = None, names: Collection[str] = ()) -> None:
+        """Guard an application.
+
+        Parameters
+        ----------
+        app
+            What is guarded.
+        secret
+            The ``user:password`` to ask for (HTTP Basic); None: ask for none.
+        names
+            What the server may be called besides its address.
+
+        """
+        self._app = app
+        self._credentials = None if secret is None else base64.b64encode(secret.encode())
+        self._names = {_address(name) for name in names}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on a request or a websocket, or refuse it in one line."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal is None:
+            await self._app(scope, receive, _closed(send))
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await refusal(scope, receive, _closed(send))
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        headers = Headers(scope=scope)
+        hosts = headers.getlist("host")
+        if len(hosts) != 1 or not self._is_own(hosts[0], scope):
+            why = (
+                "Ask this server by its own address, or add the name to MOTION_MEMORY_HOSTS where it starts."
+            )
+            return _refusing(400, "BAD_REQUEST", why)
+        own_pages = (f"http://{hosts[0]}", f"https://{hosts[0]}")
+        if any(origin not in own_pages for origin in headers.getlist("origin")):
+            return _refusing(403, "PERMISSION_DENIED", "Pages of other sites may not ask this server.")
+        if not self._is_authorized(scope, headers):
+            refusal = _refusing(401, "UNAUTHENTICATED", "Give user and password (HTTP Basic).")
+            refusal.headers["WWW-Authenticate"] = 'Basic realm="motion-memory"'
+            return refusal
+        return None
+
+    def _is_own(self, host: str, scope: Scope) -> bool:
+        """Whether a Host header names the address that was connected to, or one of the server's names."""
+        name, colon, port = host.rpartition(":")
+        asked = _address(name if colon and port.isdigit() else host)
+        server = _address((scope.get("server") or ("",))[0])
+        if asked in self._names or asked == server:
+            return True
+        return _is_loopback(server) and (asked == "localhost" or _is_loopback(asked))
+
+    def _is_authorized(self, scope: Scope, headers: Headers) -> bool:
+        if self._credentials is None or (scope["path"] in OPEN and scope.get("method") == "GET"):
+            return True
+        given = headers.getlist("authorization")
+        scheme, _, credentials = (given[0] if len(given) == 1 else "").partition(" ")
+        return scheme.lower() == "basic" and hmac.compare_digest(
+            credentials.strip().encode("latin-1"), self._credentials
+        )
+
+
+Address = ipaddress.IPv4Address | ipaddress.IPv6Address
+
+
+def _address(name: str) -> Address | str:
+    """An IP address, whichever way it is written; any other name in small letters."""
+    try:
+        address = ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return name.lower()
+    return getattr(address, "ipv4_mapped", None) or address
+
+
+def _is_loopback(address: Address | str) -> bool:
+    return not isinstance(address, str) and address.is_loopback
+
+
+def _refusing(status: int, code: str, message: str) -> Response:
+    return JSONResponse({"error_code": code, "message": message}, status)
+
+
+def _closed(send: Send) -> Send:
+    """Have answers say that they are for the server's own pages alone."""
+
+    async def closed(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name in {name for name in headers if name.startswith(_SHARED)}:
+                del headers[name]
+            for name, value in _ADDED.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return closed

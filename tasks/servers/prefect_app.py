@@ -1,0 +1,52 @@
+"""Prefect's server behind the guard.
+
+As a program (``python -m tasks.servers.prefect_app FOLDER SOCKET``) it is the server of a data folder, at a
+port that a command has opened, and ends when no command uses it any more.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+
+from tasks.servers.access import hosts
+from tasks.servers.guard import Guard
+from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL, is_used, locked
+
+
+def prefect_app() -> Guard:
+    """The application; Prefect asks for PREFECT_SERVER_API_AUTH_STRING by itself."""
+    from prefect.server.api.server import create_app
+
+    return Guard(create_app(), names=hosts())
+
+
+def _serve(folder: Path, listener: socket.socket) -> None:
+    """Be the server until nobody uses it."""
+    from uvicorn import Config, Server
+
+    server = Server(Config(prefect_app, factory=True, log_level="error", timeout_graceful_shutdown=1))
+
+    def watch() -> None:
+        while True:
+            time.sleep(POLL_SECONDS)
+            with locked(folder):
+                if not is_used(folder):
+                    for name in (URL, SECRET):  # whoever comes now starts another
+                        (folder / name).unlink(missing_ok=True)
+                    break
+        server.should_exit = True
+        time.sleep(STOP_SECONDS)
+        os._exit(0)
+
+    threading.Thread(target=watch, daemon=True).start()
+    server.run(sockets=[listener])
+    os._exit(0)  # at once: Python's own end takes seconds, in which `watch` no longer runs
+
+
+if __name__ == "__main__":
+    _serve(Path(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
