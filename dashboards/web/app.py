@@ -19,7 +19,6 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from dashboards.web.chart_files import csv_file, svg_file
-from dashboards.web.guard import Guard
 from dashboards.web.notices import MissingError, NoticeError, WrongQuestionError
 from dashboards.web.page import Page, PageOf
 from dashboards.web.pages.comparison_page import comparison
@@ -30,6 +29,7 @@ from dashboards.web.pages.problems_page import problems
 from dashboards.web.pages.progress_page import progress
 from dashboards.web.pages.runs_page import runs
 from dashboards.web.pages.try_it_page import check_world, plan_world, try_it
+from dashboards.web.policy import Policy
 from dashboards.web.query import Asked, link
 from dashboards.web.retrained import Retrainings
 from dashboards.web.site import Site
@@ -67,7 +67,7 @@ def dashboard_app(data: DataFolder, retrainings: Retrainings = tuple) -> Starlet
     routes.append(Route("/static/{name}", _static))
     return Starlette(
         routes=routes,
-        middleware=[Middleware(Guard), Middleware(GZipMiddleware, minimum_size=2000)],
+        middleware=[Middleware(Policy), Middleware(GZipMiddleware, minimum_size=2000)],
         exception_handlers={HTTPException: _http_error, Exception: _bug},
     )
 

@@ -1,30 +1,24 @@
 """Closed by default: a server listens on loopback, or asks for the password of the one setting for all.
 
 ``MOTION_MEMORY_AUTH=user:password`` is that setting, read from the environment alone. Who listens elsewhere
-without it is refused; with it our servers, Prefect's and MLflow's ask for it, and clients here send it.
+without it is refused; with it our servers, Prefect's and MLflow's ask for it, and clients here send it. A
+server that must have a password without it makes one, which lies in a file that only its owner can read.
 """
 
 from __future__ import annotations
 
-import base64
-import hmac
 import ipaddress
 import os
 import secrets
 import socket
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from tasks.settings.run_settings import UsageError
-
-if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Receive, Scope, Send
 
 AUTH: Final = "MOTION_MEMORY_AUTH"
 HOSTS: Final = "MOTION_MEMORY_HOSTS"
 USER: Final = "motion-memory"
-OPEN: Final = ("/ping", "/health")  # whether a server lives is no secret
-_REFUSAL: Final = b'{"error_code": "UNAUTHENTICATED", "message": "Give user and password (HTTP Basic)."}'
 
 
 def auth() -> str | None:
@@ -85,33 +79,3 @@ def _is_loopback(host: str) -> bool:
             f"No address is known of {host!r}; give one of this machine, like 127.0.0.1."
         ) from None
     return all(ipaddress.ip_address(str(entry[4][0]).partition("%")[0]).is_loopback for entry in found)
-
-
-class Guarded:
-    """An ASGI application that only whoever knows ``secret`` (``user:password``) reaches; None: everybody."""
-
-    def __init__(self, app: ASGIApp, secret: str | None) -> None:
-        self._app = app
-        self._wanted = None if secret is None else base64.b64encode(secret.encode())
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on what may pass; 401 else."""
-        if scope["type"] == "lifespan" or self._may_pass(scope):
-            await self._app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008})
-        else:
-            headers = [
-                (b"content-type", b"application/json"),
-                (b"content-length", str(len(_REFUSAL)).encode()),
-                (b"www-authenticate", b'Basic realm="motion-memory"'),
-            ]
-            await send({"type": "http.response.start", "status": 401, "headers": headers})
-            await send({"type": "http.response.body", "body": _REFUSAL})
-
-    def _may_pass(self, scope: Scope) -> bool:
-        if self._wanted is None or (scope["path"] in OPEN and scope.get("method") == "GET"):
-            return True
-        given = [value for name, value in scope["headers"] if name == b"authorization"]
-        scheme, _, credentials = (given[0] if len(given) == 1 else b"").partition(b" ")
-        return scheme.lower() == b"basic" and hmac.compare_digest(credentials.strip(), self._wanted)

@@ -11,12 +11,17 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dashboards.web.notices import NoticeError
 from dashboards.web.retrained import Retrained, Retrainings
 from storage.places.data_folder import MARK, DataFolder, open_data_folder
 from tasks.registry.champion_registry import Registry, Version
+from tasks.servers.access import auth, hosts
 from tasks.settings.run_settings import RunError, UsageError
+
+if TYPE_CHECKING:
+    from tasks.servers.guard import Guard
 
 LOOPBACK = "127.0.0.1"
 HURRIED = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
@@ -38,22 +43,27 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
         ) from None
     import uvicorn  # late: with the application a second
 
-    from dashboards.web.app import dashboard_app
-
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
     for name, value in HURRIED.items():
         os.environ.setdefault(name, value)
     retrainings = partial(_retrainings, Registry(folder))
     threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
-    config = uvicorn.Config(
-        dashboard_app(folder, retrainings), log_level="warning", access_log=False, server_header=False
-    )
+    app = guarded_dashboard(folder, retrainings)
+    config = uvicorn.Config(app, log_level="warning", access_log=False, server_header=False)
     print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
     if open_browser and sys.stdout.isatty():
         import webbrowser
 
         webbrowser.open(address)
     uvicorn.Server(config).run(sockets=[listener])
+
+
+def guarded_dashboard(data: DataFolder, retrainings: Retrainings) -> Guard:
+    """The application over a data folder, and what the registry knows of it."""
+    from dashboards.web.app import dashboard_app  # late, as Uvicorn
+    from tasks.servers.guard import Guard
+
+    return Guard(dashboard_app(data, retrainings), auth(), hosts())
 
 
 def _retrainings(registry: Registry) -> Sequence[Retrained]:

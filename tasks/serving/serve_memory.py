@@ -12,7 +12,8 @@ from planners.memory.recall import Memory
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.archives.memories import load_memory
 from tasks.registry.memory_at import memory_at
-from tasks.servers.access import Guarded, access, auth, auth_environment, check_address
+from tasks.servers.access import access, auth, auth_environment, check_address, hosts
+from tasks.servers.guard import Guard
 from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
 from tasks.servers.prefect_server import ENVIRONMENT
 from tasks.settings.run_settings import check_known
@@ -35,7 +36,7 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
         serve_with(functools.partial(scoring_app, str(folder), vehicle), place, workers, tell)
 
 
-def scoring_app(folder: str, vehicle: str) -> Guarded:
+def scoring_app(folder: str, vehicle: str) -> Guard:
     """What a worker serves: loaded, compiled, asked once. It ends with the process that started it."""
     end_with_parent()
     from tasks.serving.scoring import Scoring
@@ -48,7 +49,7 @@ def scoring_app(folder: str, vehicle: str) -> Guarded:
     model.open(Path(folder), vehicle)
     scoring = Scoring(pyfunc_of(model))
     scoring.answer(sample_request(model.memory))
-    return Guarded(scoring, auth())
+    return Guard(scoring, auth(), hosts())
 
 
 def sample_request(memory: Memory) -> bytes:

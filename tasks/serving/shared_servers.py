@@ -1,7 +1,8 @@
 """Prefect's and MLflow's servers for several people or machines: one address, one password, one folder.
 
 They hold what a command's own servers hold; other databases, and places for artifacts, by the variables that
-Prefect and MLflow have for that. Commands use them by PREFECT_API_URL and MLFLOW_TRACKING_URI.
+Prefect and MLflow have for that. Commands use them by PREFECT_API_URL and MLFLOW_TRACKING_URI. Whoever can
+change Prefect's records decides what its clients run, so these servers always ask for a password.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import functools
 import multiprocessing
 import os
+import shlex
 import signal
 import socket
 import threading
@@ -19,9 +21,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from storage.places.data_folder import DataFolder, open_data_folder
-from tasks.servers.access import Guarded, access, auth, check_address
+from tasks.servers.access import AUTH, access, auth, check_address, hosts, new_secret
+from tasks.servers.guard import Guard
 from tasks.servers.listening import STOP_SECONDS, address_of, bound, config_of, end_with_parent
+from tasks.servers.prefect_app import prefect_app
 from tasks.servers.prefect_server import START_SECONDS, is_healthy, set_environment
+from tasks.settings.environment import environment
 from tasks.settings.run_settings import RunError
 
 LOOK_SECONDS: Final = 0.2  # between two looks at whether they live
@@ -34,8 +39,12 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     """
     check_address(host)
     folder = open_data_folder(data)
-    set_environment(folder.path)
-    with bound(host, prefect_port) as one, bound(host, mlflow_port) as other:
+    with (
+        password_set(folder) as admitted,
+        bound(host, prefect_port) as one,
+        bound(host, mlflow_port) as other,
+    ):
+        set_environment(folder.path)
         apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
             "Prefect": (prefect_app, one),
             "MLflow": (functools.partial(mlflow_app, folder), other),
@@ -45,18 +54,25 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
             wait(lambda: all(is_healthy(url) for url in healthy), START_SECONDS)
             print(f"Prefect  {address_of(one)}  PREFECT_API_URL={healthy[0]}")
             print(f"MLflow   {address_of(other)}  MLFLOW_TRACKING_URI={healthy[1]}")
-            print(f"access   {access()}; Ctrl-C stops", flush=True)
+            print(f"access   {admitted}; Ctrl-C stops", flush=True)
             wait(lambda: False, float("inf"))
 
 
-def prefect_app() -> Any:
-    """Prefect's server, which asks for the password by itself."""
-    from prefect.server.api.server import create_app
+@contextmanager
+def password_set(folder: DataFolder) -> Iterator[str]:
+    """See that a password is set, MOTION_MEMORY_AUTH or one that is made; how clients come by it."""
+    if auth() is not None:
+        yield access()
+        return
+    file = folder.path / "servers.auth"
+    try:
+        with environment(**{AUTH: new_secret(file)}):
+            yield f'export {AUTH}="$(cat {shlex.quote(str(file))})"'
+    finally:
+        file.unlink(missing_ok=True)
 
-    return create_app()
 
-
-def mlflow_app(data: DataFolder) -> Guarded:
+def mlflow_app(data: DataFolder) -> Guard:
     """MLflow's server behind the guard; it hands out artifacts, so that clients need no access to them."""
     from mlflow.server import constants
 
@@ -70,12 +86,13 @@ def mlflow_app(data: DataFolder) -> Guarded:
         constants.SERVE_ARTIFACTS_ENV_VAR: "true",
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
         "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # ten processes more, for what nobody here asks of it
+        "MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE": "true",  # the guard asks for more
     }
     from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores
 
     initialize_backend_stores(store, store, root)
-    return Guarded(app, auth())
+    return Guard(app, auth(), hosts())
 
 
 @contextmanager

@@ -106,9 +106,10 @@ def test_a_loopback_name_is_answered(client: httpx.Client, host: str) -> None:
     assert client.get("/", headers={"host": host}).status_code == 200
 
 
-def test_another_site_cannot_have_anything_planned(client: httpx.Client) -> None:
-    answer = client.post("/runs/first/plan", json={}, headers={"origin": "http://evil.example"})
-    assert answer.status_code == 403
+def test_another_site_can_neither_read_nor_have_anything_planned(client: httpx.Client) -> None:
+    evil = {"origin": "http://evil.example"}
+    assert client.post("/runs/first/plan", json={}, headers=evil).status_code == 403
+    assert client.get("/runs/first", headers=evil).status_code == 403
     plain = client.post("/runs/first/plan", content="{}", headers={"content-type": "text/plain"})
     assert plain.status_code == 400
 

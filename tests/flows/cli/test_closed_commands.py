@@ -16,6 +16,7 @@ import pytest
 from storage.exchange.problems import fields_of
 from tests.flows.watched import ROOT, Watched, watch
 from tests.tasks.served import JSON, good_request, problem, write_memory
+from tests.tasks.servers.attacks import EVIL
 
 SECRET = "s3cret-of-the-fleet"
 PLANTED = {
@@ -132,12 +133,15 @@ def test_servers_for_all(place: Path) -> None:
             answers.append(httpx.get(f"{prefect}/admin/version", auth=auth).status_code)
             answers.append(httpx.get(search, auth=auth).status_code)
         answers.append(httpx.get(f"{mlflow}/health").status_code)
+        for url in (f"{prefect}/admin/version", search):
+            for foreign in ({"Origin": EVIL}, {"Host": "evil.example"}):
+                answers.append(httpx.get(url, auth=("robot", SECRET), headers=foreign).status_code)
         return True
 
     ports = ["--prefect-port", "0", "--mlflow-port", "0"]
     watched = watch(["servers", "--data", str(place / "shared"), *ports], place / "all.log", PLANTED, asked)
     assert watched.code == 0, watched.output[-2000:]
-    assert answers == [401, 401, 401, 401, 200, 200, 200]
+    assert answers == [401, 401, 401, 401, 200, 200, 200, 403, 400, 403, 400]
     assert {port.process for port in watched.ports} >= {"child"}
     assert_closed("servers", watched)
     assert_nowhere_in(place / "shared")

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
+import os
+import stat
+import subprocess
 from pathlib import Path
-from typing import Any
 
 import pytest
-from starlette.applications import Starlette
-from starlette.responses import PlainTextResponse
-from starlette.routing import Route
 
 from flows.cli.main import call
-from tasks.servers.access import AUTH, Guarded, auth_environment, check_address
+from storage.places.data_folder import open_data_folder
+from tasks.servers.access import AUTH, auth, auth_environment, check_address, new_secret
 from tasks.servers.prefect_server import set_environment
+from tasks.serving.shared_servers import password_set
 from tasks.settings.run_settings import UsageError
-from tests.tasks.asgi import Client
 
 SECRET = "robot:s3cret-of-the-fleet"
 
@@ -75,45 +74,28 @@ def test_one_setting_is_that_of_prefect_and_mlflow(tmp_path: Path, monkeypatch: 
     assert environment["MLFLOW_TRACKING_PASSWORD"] == "s3cret-of-the-fleet"
 
 
-def client(secret: str | None) -> Client:
-    async def answer(_: Any) -> PlainTextResponse:
-        return PlainTextResponse("inside")
-
-    return Client(Guarded(Starlette(routes=[Route("/{path:path}", answer, methods=["GET", "POST"])]), secret))
-
-
-def test_only_who_knows_the_password_is_let_in() -> None:
-    guarded = client(SECRET)
-    user, _, password = SECRET.partition(":")
-    assert guarded.get("/x", auth=(user, password)).text == "inside"
-    assert guarded.post("/x", auth=(user, password)).text == "inside"
-    for wrong in [None, (user, ""), ("", password), (user, password + "x"), (user, password[:-1])]:
-        answer = guarded.get("/x", auth=wrong)
-        assert answer.status_code == 401
-        assert answer.headers["www-authenticate"].startswith("Basic")
-        assert "inside" not in answer.text
-    for header in ("", "Basic", "Basic ", f"Bearer {SECRET}", f"Basic {SECRET}", "Basic \xff"):
-        assert guarded.get("/x", headers={"Authorization": header.encode("latin-1")}).status_code == 401
+def test_a_password_that_is_made_is_the_owners_alone_and_another_each_time(tmp_path: Path) -> None:
+    file = tmp_path / "secret"
+    file.write_text("old")
+    file.chmod(0o666)
+    own = os.umask(0)
+    try:
+        made = {new_secret(file) for _ in range(3)}
+    finally:
+        os.umask(own)
+    assert len(made) == 3
+    assert file.read_text() in made
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-def test_whether_it_lives_is_told_to_everybody_and_nothing_else_is() -> None:
-    guarded = client(SECRET)
-    assert guarded.get("/ping").text == guarded.get("/health").text == "inside"
-    for path in ("/ping/", "/x/health", "/PING", "/ping%2f", "/ping;x"):
-        assert guarded.get(path).status_code == 401
-    assert guarded.post("/ping").status_code == 401
-
-
-def test_a_websocket_is_closed_to_who_does_not_know_the_password() -> None:
-    sent = []
-
-    async def send(message: Any) -> None:
-        sent.append(message)
-
-    scope = {"type": "websocket", "path": "/ping", "headers": []}
-    asyncio.run(Guarded(Starlette(), SECRET)(scope, None, send))  # type: ignore[arg-type]
-    assert sent == [{"type": "websocket.close", "code": 1008}]
-
-
-def test_without_a_password_all_are_let_in() -> None:
-    assert client(None).get("/x").text == "inside"
+def test_servers_without_the_setting_make_a_password_for_as_long_as_they_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = open_data_folder(tmp_path / "a data folder")
+    monkeypatch.setattr("os.environ", {})
+    with password_set(data) as told:
+        command = f'{told}; test "${AUTH}" = "$(cat "$1")"'
+        file = data.path / "servers.auth"
+        assert file.read_text() == os.environ[AUTH] == auth()
+        assert subprocess.run(["sh", "-c", command, "sh", str(file)], check=True, env={"PATH": os.defpath})
+    assert not file.exists()

@@ -18,6 +18,7 @@ import psutil
 import pytest
 
 from tests.tasks.served import JSON, good_request, malformed, write_memory
+from tests.tasks.servers.attacks import EVIL
 
 ROOT = Path(__file__).parents[3]
 SECRET = "robot:s3cret-of-the-fleet"
@@ -87,6 +88,10 @@ def test_with_the_setting_only_who_knows_it_is_answered_and_killed_it_leaves_nob
         assert given.status_code == 200
         assert httpx.get(f"{address}/version").status_code == 401
         assert httpx.get(f"{address}/ping").status_code == 200
+        for foreign in ({"Origin": EVIL}, {"Host": "evil.example"}):
+            asked["headers"] = JSON | foreign
+            answer = httpx.post(f"{address}/invocations", auth=(user, password), **asked)  # type: ignore[arg-type]
+            assert answer.status_code in (400, 403)
         left = running.children(recursive=True)
         running.kill()
         psutil.wait_procs(left, timeout=10)
