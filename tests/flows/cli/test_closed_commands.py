@@ -31,7 +31,12 @@ TINY = [
     "--preset", "smoke", "--classes", "random", "--experiences", "3", "--candidates", "3", "--workers", "2",
     "--problems-per-experience", "6", "--test-problems", "4", "--epochs", "1",
 ]  # fmt: skip
-PARTS_OF_ONE = "from tasks import parts; parts.PART_PROBLEMS = 1; from flows.cli.main import main; main()"
+PARTS_OF_ONE = """
+from flows.cli.main import main
+from tasks.requests import problem_parts
+problem_parts.PART_PROBLEMS = 1
+main()
+"""
 LISTENERS = {  # who a process may be, by command
     "run": {
         "server": "Prefect's server",
