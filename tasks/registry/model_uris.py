@@ -74,8 +74,8 @@ def memory_digest(folder: Path | None) -> str:
 def load_from(address: str, vehicle: Vehicle) -> Memory:
     """The memory at an address: a folder, or a model in MLflow.
 
-    MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder. Raises RunError if it does not answer
-    or holds no such model, and StorageError if the archive is damaged or belongs to another vehicle.
+    MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder. Raises RunError if it does not
+    answer or holds no such model, and StorageError if the archive is damaged or of another vehicle.
     """
     with memory_folder(address) as folder:  # a mapped file outlives its name
         assert folder is not None  # only an address of None has no folder
