@@ -12,11 +12,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from storage.errors import InUseError
 from storage.places.data_folder import DataFolder
 from tasks.registry.model_uris import download, set_mlflow_environment
 from tasks.settings.environment import environment
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import DEFAULT_VEHICLE, RunError
+from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import tracking_uri
 
 PREFIX: Final = "motion-memory-"
@@ -73,6 +75,7 @@ class Registry:
     def __init__(self, data: DataFolder) -> None:
         """Remember where the registry is; nothing is opened or made yet."""
         self.uri = tracking_uri(data)
+        self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
         self._missing = not os.environ.get("MLFLOW_TRACKING_URI") and not data.mlflow_database.is_file()
 
     def names(self) -> list[str]:
@@ -159,8 +162,10 @@ class Registry:
         from mlflow import MlflowClient
 
         try:
+            if self._own is not None:
+                ready_database(self._own)
             yield MlflowClient(self.uri)
-        except RunError:
+        except (RunError, InUseError):
             raise
         except Exception as error:  # each of MLflow's stores has errors of its own
             reason = " ".join(str(error).split())[:300] or type(error).__name__

@@ -25,6 +25,7 @@ from tasks.servers.prefect_server import ENVIRONMENT
 from tasks.settings.environment import environment
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import RunError, default_data
+from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import tracking_uri
 
 URI: Final = re.compile(r"(models|runs|mlflow-artifacts):/.*")
@@ -123,9 +124,11 @@ def download(uri: str, scratch: str, server: str) -> Path:
 
 def _tracking_uri(uri: str) -> str:
     folder = DataFolder(default_data().absolute())
-    if not os.environ.get("MLFLOW_TRACKING_URI") and not folder.mlflow_database.is_file():
-        raise RunError(
-            f"{uri} is an address in MLflow, but {folder.mlflow_database} does not exist. "
-            "Set MLFLOW_TRACKING_URI, or MOTION_MEMORY_DATA to the data folder of the run."
-        )
+    if not os.environ.get("MLFLOW_TRACKING_URI"):
+        if not folder.mlflow_database.is_file():
+            raise RunError(
+                f"{uri} is an address in MLflow, but {folder.mlflow_database} does not exist. "
+                "Set MLFLOW_TRACKING_URI, or MOTION_MEMORY_DATA to the data folder of the run."
+            )
+        ready_database(folder)
     return tracking_uri(folder)

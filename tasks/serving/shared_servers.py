@@ -28,6 +28,7 @@ from tasks.servers.prefect_app import prefect_app
 from tasks.servers.prefect_server import START_SECONDS, is_healthy, set_environment
 from tasks.settings.environment import environment
 from tasks.settings.run_settings import RunError
+from tasks.tracking.mlflow_database import ready_database
 
 LOOK_SECONDS: Final = 0.2  # between two looks at whether they live
 
@@ -76,7 +77,10 @@ def mlflow_app(data: DataFolder) -> Guard:
     """MLflow's server behind the guard; it hands out artifacts, so that clients need no access to them."""
     from mlflow.server import constants
 
-    store = os.environ.get("MLFLOW_BACKEND_STORE_URI") or f"sqlite:///{data.mlflow_database}"
+    store = os.environ.get("MLFLOW_BACKEND_STORE_URI")
+    if not store:
+        ready_database(data)
+        store = f"sqlite:///{data.mlflow_database}"
     artifacts = os.environ.get("MLFLOW_ARTIFACTS_DESTINATION") or data.mlflow_artifacts.as_uri()
     root = "mlflow-artifacts:/"
     os.environ.pop("MLFLOW_TRACKING_URI", None)  # it is the server, not its client

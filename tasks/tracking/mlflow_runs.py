@@ -16,10 +16,10 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.places.data_folder import DataFolder
-from storage.places.files import whole_file
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import UsageError
+from tasks.tracking.mlflow_database import ready_database
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -47,17 +47,6 @@ def tracking_uri(data: DataFolder) -> str:
     return given or f"sqlite:///{data.mlflow_database}"
 
 
-def _make_database(path: Path, artifacts: str) -> None:
-    """Make MLflow's database with all its tables: it stands no kill while it makes them, one by one."""
-    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
-
-    for left in path.parent.glob(f".{path.name}.*"):
-        left.unlink()
-    with whole_file(path) as temporary:
-        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
-        store.engine.dispose()
-
-
 class Tracker:
     """The runs of one data folder in MLflow."""
 
@@ -76,8 +65,7 @@ class Tracker:
             artifacts = None
             if self._own is not None:
                 artifacts = self._own.mlflow_artifacts.as_uri()
-                if not self._own.mlflow_database.exists():
-                    _make_database(self._own.mlflow_database, artifacts)
+                ready_database(self._own)
             client = MlflowClient(self.uri)
             found = client.get_experiment_by_name(EXPERIMENT)
             self._experiment = (

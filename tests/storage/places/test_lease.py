@@ -5,6 +5,8 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta, tzinfo
+from email.utils import format_datetime
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,25 @@ def test_a_lease_that_was_not_renewed_is_taken_by_one_of_those_who_come(
     assert found is not None
     with leased(PLACE, "me", "it"):
         assert objects.put_if(PLACE, b'{"owner": "who looked when I did"}', found.etag) is None
+
+
+@pytest.mark.parametrize("hours", [-1, 1])
+def test_a_clock_here_that_is_set_takes_no_lease(
+    storage: Any, hours: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dated(parsed: dict[str, Any], **_: Any) -> None:  # as every server answers, but not a pretended one
+        parsed["ResponseMetadata"]["HTTPHeaders"]["date"] = format_datetime(datetime.now(UTC), usegmt=True)
+
+    class Set(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            return datetime.now(tz) + timedelta(hours=hours)
+
+    objects.put_if(PLACE, b'{"owner": "alive"}', None)
+    storage.meta.events.register("after-call.s3.HeadObject", dated)
+    monkeypatch.setattr(objects, "datetime", Set)
+    with pytest.raises(InUseError), leased(PLACE, "me", "it"):
+        pass
 
 
 def test_a_lease_is_renewed_and_its_loss_ends_the_command(

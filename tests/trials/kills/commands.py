@@ -41,9 +41,10 @@ from tasks.champions.promote import promote
 from tasks.registry.champion_registry import AWAITING, CHALLENGER, PROMOTED, Registry
 registry = Registry(open_data_folder(Path("data")))
 first = MlflowClient(registry.uri).get_model_version("{NAME}", "1")
+model = first.source.rpartition("/")[2]
 def version(against, verdict):
     tags = {{"memory": "random", "against": against, "retraining": against, "verdict": verdict}}
-    return registry.register("{NAME}", first.run_id, first.model_id, str(against), tags, "")
+    return registry.register("{NAME}", first.run_id, model, str(against), tags, "")
 promote(registry, version(1, PROMOTED))
 registry.point(version(2, AWAITING), CHALLENGER)
 """  # a second version is champion then, and a third awaits approval

@@ -1,0 +1,94 @@
+"""MLflow's database in a data folder: made, or brought to the schema of the MLflow that is installed.
+
+MLflow changes tables one by one, and a kill meanwhile leaves a database that nothing can open. So the work is
+done on a copy, which then takes the database's place at once. The old one is kept beside it.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import sqlite3
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from storage.places.data_folder import DataFolder
+from storage.places.files import locked, whole_file
+from tasks.settings.run_settings import RunError
+
+if TYPE_CHECKING:
+    from alembic.script import ScriptDirectory
+
+
+def ready_database(data: DataFolder) -> None:
+    """Make the database of a data folder where there is none, and upgrade one that an older MLflow made.
+
+    RunError: a newer MLflow made it. InUseError: another command upgrades it.
+    """
+    path = data.mlflow_database
+    if not path.exists():
+        _make(path, data.mlflow_artifacts.as_uri())
+        return
+    schemas = _schemas()
+    if _schema_of(path) != schemas.get_current_head():
+        with locked(path.with_name(f".{path.name}.lock"), str(path)):
+            if _schema_of(path) != schemas.get_current_head():
+                _upgrade(path, schemas)
+
+
+def _make(path: Path, artifacts: str) -> None:
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    _remove_leftovers(path)
+    with whole_file(path) as temporary:
+        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
+        store.engine.dispose()
+
+
+def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
+    from alembic.util import CommandError
+    from mlflow.store.db.utils import _upgrade_db
+    from sqlalchemy import create_engine
+
+    old = _schema_of(path)
+    try:
+        schemas.get_revision(old)
+    except CommandError:
+        raise RunError(
+            f"{path} was written by a newer MLflow (schema {old}); install that one again, or give another "
+            "data folder."
+        ) from None
+    _remove_leftovers(path)
+    kept = path.with_name(f"{path.name}.{old}")
+    with whole_file(path) as temporary:
+        with closing(sqlite3.connect(path)) as source, closing(sqlite3.connect(temporary)) as copy:
+            source.backup(copy)
+        engine = create_engine(f"sqlite:///{temporary}")
+        _upgrade_db(engine)  # type: ignore[no-untyped-call]
+        engine.dispose()
+        if not kept.exists():
+            os.link(path, kept)
+    print(f"{path} now has the schema of this MLflow; as it was it is kept as {kept.name}", file=sys.stderr)
+
+
+@functools.cache
+def _schemas() -> ScriptDirectory:
+    """All schemas that the MLflow that is installed knows."""
+    import mlflow.store
+    from alembic.script import ScriptDirectory
+
+    return ScriptDirectory(str(Path(mlflow.store.__path__[0]) / "db_migrations"))
+
+
+def _schema_of(path: Path) -> str:
+    with closing(sqlite3.connect(path)) as database:
+        ((schema,),) = database.execute("SELECT version_num FROM alembic_version").fetchall()
+    return str(schema)
+
+
+def _remove_leftovers(path: Path) -> None:
+    """Delete what a killed command left of a copy; only one command at a time makes one."""
+    for left in path.parent.glob(f".{path.name}.*.partial*"):
+        left.unlink()
