@@ -31,7 +31,19 @@ def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
     tensors = _tensors(path, key, Checkpoint._fields)
     if tensors is None:
         return None
-    rows = tensors.pop("history").tolist()
+    history = tensors.pop("history")
+    states = (
+        np.stack(list(tensors.values())) if len({tensor.shape for tensor in tensors.values()}) == 1 else None
+    )
+    whole = (
+        states is not None
+        and (states.ndim, states.dtype) == (2, np.float32)
+        and history.shape == (max(1, len(history)), len(Epoch._fields))
+        and bool(np.isfinite(states).all() and np.isfinite(history[:, 2:]).all())
+    )
+    if not whole:
+        return None
+    rows = history.tolist()
     return Checkpoint(**tensors, history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in rows))
 
 
@@ -48,7 +60,7 @@ def epochs_kept(path: Path, key: str) -> int:
 def _tensors(path: Path, key: str, names: Sequence[str]) -> dict[str, Array] | None:
     try:
         with safe_open(fetch(path), "np") as kept:
-            if kept.metadata().get(_KEY) != key:
+            if (kept.metadata() or {}).get(_KEY) != key:
                 return None
             return {name: kept.get_tensor(name) for name in names}
     except (OSError, SafetensorError):

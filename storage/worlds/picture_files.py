@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import warnings
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -16,17 +15,6 @@ from storage.worlds.limits import check_size
 Levels = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 _MODES: Final = ("1", "L", "LA", "P", "RGB", "RGBA")
-_BROKEN: Final = (
-    OSError,
-    ValueError,
-    SyntaxError,
-    EOFError,
-    IndexError,
-    OverflowError,
-    struct.error,
-    Image.DecompressionBombError,
-    Image.DecompressionBombWarning,
-)  # what Pillow raises on a file that is no picture, or only begins like one
 
 
 class Picture(NamedTuple):
@@ -51,7 +39,7 @@ def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | N
                 coloured = picture.convert("RGBA")
     except _WrongPictureError:
         raise
-    except _BROKEN as error:
+    except Exception as error:  # of a file that only begins like a picture Pillow raises anything
         reason = str(error).partition("\n")[0]
         raise ValueError(f"is no whole {' or '.join(kinds)} picture ({reason})") from None
     paper = Image.new("RGBA", coloured.size, "white")

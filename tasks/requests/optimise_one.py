@@ -50,6 +50,15 @@ class Beginning:
             )
         return found.plan, self.planner
 
+    def tell_of_another(self, problem: Problem) -> None:
+        """Print a line if the plan file is of another problem: then it is only a guess."""
+        record = None if self.plan is None else read_plan(self.plan, self.vehicle)
+        if record is not None and (record.problem_id, record.scale) != (problem.id, problem.scale):
+            print(
+                f"only a guess: {self.plan} is for problem {record.problem_id} of scale {record.scale:g}, "
+                f"asked is {problem.id} of scale {problem.scale:g}"
+            )
+
 
 def beginning(stored: Path | None, planner: str | None, straight: bool, vehicle: str, seed: int) -> Beginning:
     """Where to begin as asked, by default with Follow's plan; UsageError for two ways or an unknown name."""
@@ -77,6 +86,7 @@ def optimise_one(
         raise RunError(f"{problem} holds {len(problems)} problems; `optimise` takes one.")
     asked = problems[0]
     objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=clearance_weight)
+    begin.tell_of_another(asked)
     guess, planner = begin.guess(asked)  # the first makes code warm
     began = perf_counter()
     guess, planner = begin.guess(asked)

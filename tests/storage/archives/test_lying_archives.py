@@ -15,11 +15,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import load_file, save_file
 
-from planners.memory.encoder.training import Epoch, TrainedEncoder, TrainingSettings
+from planners.memory.encoder.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
 from planners.memory.hallucination.learned_obstacles import weight_shapes
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.vehicles.vehicle import CAR_2_TRAILERS, DIFFERENTIAL_DRIVE
 from storage.archives.arrays import write_array
+from storage.archives.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
 from storage.archives.encoders import load_encoder, save_encoder
 from storage.archives.hallucinators import load_hallucinator, save_hallucinator
 from storage.archives.memories import load_memory, save_memory
@@ -257,6 +258,31 @@ def test_a_hallucinator_whose_arrays_do_not_fit_is_refused(
 ) -> None:
     change_tensors(archives / "hallucinator", "weights.safetensors", tensors)
     refusal(archives / "hallucinator")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"values": np.zeros(4, np.float32)},
+        {"mean": np.zeros(5, np.float64)},
+        {"best": np.full(5, np.nan, np.float32)},
+        {"square": None},
+        {"history": np.zeros((0, 6))},
+        {"history": np.zeros((1, 5))},
+        {"history": np.zeros(6)},
+        {"history": np.full((1, 6), np.nan)},
+        {},
+    ],
+)
+def test_a_checkpoint_that_lies_is_none(tmp_path: Path, change: dict[str, np.ndarray | None]) -> None:
+    path = tmp_path / "0.checkpoint.safetensors"
+    states = [np.zeros(5, np.float32)] * 4
+    save_checkpoint(path, Checkpoint(TRAINED.history, *states), "key")
+    assert load_checkpoint(path, "key") is not None
+    kept = {name: tensor for name, tensor in (load_file(path) | change).items() if tensor is not None}
+    save_file(kept, path, {"key": "key"} if change else None)
+    assert load_checkpoint(path, "key") is None
+    assert epochs_kept(path, "key") in (0, 1)
 
 
 VALUES = st.recursive(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,21 @@ def test_a_file_without_a_plan_or_of_another_vehicle_is_no_beginning(
     error = capsys.readouterr().err
     assert "was made for vehicle car-1-trailer" in error
     assert error.count("\n") == 1
+
+
+def test_a_plan_of_another_problem_is_said_to_be_only_a_guess(
+    problem: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, other = tmp_path / "own.json", tmp_path / "other.json"
+    assert call(["optimise", str(problem), "--straight", "--out", str(own)]) == 0
+    record = read_plan(own)
+    for change in ({"problem_id": "another"}, {"scale": 2.0}):
+        write_plan(other, replace(record, **change))  # type: ignore[arg-type]
+        capsys.readouterr()
+        assert call(["optimise", str(problem), "--plan", str(other)]) == 0
+        assert "only a guess" in capsys.readouterr().out
+    assert call(["optimise", str(problem), "--plan", str(own)]) == 0
+    assert "only a guess" not in capsys.readouterr().out
 
 
 def test_not_to_converge_is_told_and_recorded(
