@@ -11,6 +11,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from planners.memory.encoder.training import Checkpoint, Epoch
+from storage.archives.tensors import check_floats
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
 from storage.tables.columns import Array
@@ -32,16 +33,12 @@ def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
     if tensors is None:
         return None
     history = tensors.pop("history")
-    states = (
-        np.stack(list(tensors.values())) if len({tensor.shape for tensor in tensors.values()}) == 1 else None
-    )
-    whole = (
-        states is not None
-        and (states.ndim, states.dtype) == (2, np.float32)
-        and history.shape == (max(1, len(history)), len(Epoch._fields))
-        and bool(np.isfinite(states).all() and np.isfinite(history[:, 2:]).all())
-    )
-    if not whole:
+    try:
+        check_floats(tensors, dict.fromkeys(tensors, (len(tensors["values"]),)))
+    except (TypeError, ValueError):
+        return None
+    shape = (max(1, len(history)), len(Epoch._fields))
+    if history.shape != shape or not np.isfinite(history[:, 2:]).all():
         return None
     rows = history.tolist()
     return Checkpoint(**tensors, history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in rows))
