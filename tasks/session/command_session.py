@@ -78,11 +78,8 @@ def _tell(folder: DataFolder, settings: RunSettings) -> None:
     print(f"MLflow   {uri}" if uri.startswith("http") else f"MLflow   mlflow ui --backend-store-uri {uri}")
     if os.environ.get("PREFECT_API_URL"):
         print(f"Prefect  {redacted(os.environ['PREFECT_API_URL']).removesuffix('/api')}")
-        return
-    print(
-        f"Prefect  PREFECT_API_DATABASE_CONNECTION_URL=sqlite+aiosqlite:///{folder.prefect / 'prefect.db'} "
-        "prefect server start"
-    )
+    else:
+        print(f"Prefect  motion-memory servers --data {folder.path}")
 
 
 def _check_reachable(scheduler: str | None) -> None:

@@ -287,7 +287,5 @@ def _places(site: Site, run: RunFolder) -> Iterator[tuple[str, str, str]]:
     if server.startswith(("http://", "https://")):
         yield "Prefect", f"{server}/runs", ""
     else:
-        database = site.data.prefect / "prefect.db"
-        said = f"PREFECT_API_DATABASE_CONNECTION_URL=sqlite+aiosqlite:///{database} prefect server start"
-        yield "Prefect", "", said
+        yield "Prefect", "", f"motion-memory servers --data {site.data.path}"
     yield "Folder", "", str(run.path)

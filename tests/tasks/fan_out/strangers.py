@@ -32,7 +32,7 @@ def given_to_strangers() -> list[str]:
 def _ports() -> Iterator[int]:
     own = psutil.Process()
     for process in (own, *own.children(recursive=True)):
-        if not any("prefect_server.py" in part for part in process.cmdline()):
+        if not any("prefect_app" in part for part in process.cmdline()):
             for connection in process.net_connections("inet"):
                 if connection.status == psutil.CONN_LISTEN:
                     yield connection.laddr.port

@@ -204,7 +204,7 @@ def _victims(running: subprocess.Popen[bytes], victim: str) -> list[psutil.Proce
     for process in family.children(recursive=True):
         with suppress(psutil.Error):
             line = " ".join(process.cmdline())
-            is_server = "local_server" in line or "prefect_server" in line
+            is_server = "prefect_app" in line
             if is_server == (victim == "server") and "resource_tracker" not in line:
                 found.append(process)
     return found
