@@ -18,6 +18,7 @@ from dask.system import CPU_COUNT
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
+from tasks.fan_out.certificate import own_certificate
 from tasks.fan_out.progress import progress
 from tasks.fan_out.progress_artifact import progress_artifact
 from tasks.fan_out.stage import AnyPiece, Piece, kept_result
@@ -116,7 +117,7 @@ def _local(workers: int) -> Iterator[Any]:
             n_workers=workers,
             threads_per_worker=1,
             host="127.0.0.1",
-            security=True,  # a certificate for this cluster alone, kept in memory
+            security=own_certificate(),
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
             local_directory=scratch,
