@@ -16,6 +16,7 @@ from planners.solve import Attempt, turned
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
+from planners.world.workspace import Workspace
 
 
 class Recollection(NamedTuple):
@@ -35,13 +36,17 @@ class Recollection(NamedTuple):
 
 
 def recollections(
-    problem: Problem, attempt: Attempt, memory: Memory, vehicle: Vehicle = CAR
+    problem: Problem,
+    attempt: Attempt,
+    memory: Memory,
+    vehicle: Vehicle = CAR,
+    workspace: Workspace | None = None,
 ) -> list[Recollection]:
     """What an attempt at a canonical problem recalled, in its order, looked at again."""
-    view = View(problem)
+    view = View(problem, workspace)
     embedding = memory.forward(view.bits)
     scores = memory.vectors[1:] @ embedding + memory.biases[1:]
-    ranking = rank_by_cells(memory.masks, view.bits).cells.copy()
+    ranking = rank_by_cells(memory.masks, view.bits, view.workspace).cells
     stored = memory.heading is not None and abs(problem.start[2] - memory.heading) <= START_TOLERANCE
     best = _least_blocked(problem, attempt, memory, view)
     found: list[Recollection] = []

@@ -18,13 +18,15 @@ from planners.memory.recall import Memory, Recalled, default_recall, recall, sca
 from planners.search.anytime import improve
 from planners.search.guides.grid_path import grid_path
 from planners.search.guides.guidance import guidance
-from planners.search.outcome import Guide, Limits, Outcome, Status
-from planners.search.registry import PLANNERS, plan
+from planners.search.outcome import Outcome, Status
+from planners.search.query import Guide, Limits, Query
+from planners.search.registry import PLANNERS
 from planners.search.repair import Flags, blocked_states, free_prefix, repair
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
+from planners.world.workspace import Workspace
 
 ASSISTS = ("none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair")
 WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
@@ -104,7 +106,7 @@ def nearly_free(
 def guide_along(nearly: tuple[Plan, Flags] | None, view: View) -> Guide | None:
     """A guide along a recalled plan, if there is one, and a way over the grid, if there is one."""
     problem = view.problem
-    around = grid_path(view.bits, problem.start[:2], problem.goal, problem.goal_radius)
+    around = grid_path(view.bits, problem.start[:2], problem.goal, problem.goal_radius, view.workspace)
     ways = [each for each in (nearly and nearly[0].states, around) if each is not None]
     guide = guidance(ways) if ways else None
     view.lap("guide")
@@ -121,6 +123,7 @@ def solve(
     limits: Limits | None = None,
     vehicle: Vehicle = CAR,
     strategy: str | None = None,
+    workspace: Workspace | None = None,
 ) -> Attempt:
     """Solve a canonical ``problem``: stored plans first, as ``assist`` says, then the planner.
 
@@ -134,7 +137,7 @@ def solve(
     Raises ValueError for an unknown planner, assist or strategy, an assist that needs a memory and has none,
     and a memory of another vehicle or scale.
     """
-    view = View(problem)
+    view = View(problem, workspace)
     if planner not in PLANNERS:
         raise ValueError(f"unknown planner '{planner}': choose one of {', '.join(PLANNERS)}")
     if assist not in ASSISTS:
@@ -165,20 +168,20 @@ def solve(
         answer, source = turned(known.plans[recalled.free], problem.start[2]), "recalled"
     else:
         rng = generator(seed, "search", problem.id, planner)
-        guide, prefix = None, None
+        query = Query(problem, rng, view.scene, view.workspace, limits=limits or Limits(), vehicle=vehicle)
         nearly = None
         if known is not None and use != "closed":
             nearly, checked = nearly_free(known, recalled.plans, view, vehicle)
             checks += checked
         if use == "repair" and nearly is not None:
-            spent.append(repair(planner, problem, *nearly, view.bits, view.scene, rng, vehicle))
+            spent.append(repair(planner, query, *nearly, view.bits))
             answer, source = spent[0].plan, "repaired"
             view.lap("repair")
         if answer is None:
             if use == "fresh" or nearly is not None:
-                guide = guide_along(nearly, view)
                 prefix = free_prefix(*nearly) if nearly is not None else None
-            searched = plan(planner, problem, rng, guide, view.scene, limits, vehicle, prefix)
+                query = replace(query, guide=guide_along(nearly, view), prefix=prefix)
+            searched = PLANNERS[planner](query)
             spent.append(searched)
             answer, source = searched.plan, "searched"
             view.seconds |= {"roadmap": searched.roadmap_seconds, "search": searched.search_seconds}
@@ -207,10 +210,22 @@ def solve(
     )
 
 
-def improved(attempt: Attempt, problem: Problem, seconds: float, vehicle: Vehicle = CAR) -> Attempt:
+def improved(
+    attempt: Attempt,
+    problem: Problem,
+    seconds: float,
+    vehicle: Vehicle = CAR,
+    workspace: Workspace | None = None,
+) -> Attempt:
     """The attempt with its plan improved for that long, or with a first one; time and counts are added."""
     more = improve(
-        attempt.planner, problem, attempt.plan, seconds=seconds, seed=attempt.seed, vehicle=vehicle
+        attempt.planner,
+        problem,
+        attempt.plan,
+        seconds=seconds,
+        seed=attempt.seed,
+        vehicle=vehicle,
+        workspace=workspace,
     )
     attempt = replace(
         attempt,

@@ -20,6 +20,7 @@ from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Problem
 from planners.world.problem_faults import problem_fault
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.workspace import Workspace
 
 LONGEST_WAY: Final = (
     1.5  # of the distance to the goal: farther round, a global planner sets another local goal
@@ -55,11 +56,12 @@ def cut_problems(
     """
     blocks = blocks_of(world.size, surroundings.scale * WINDOW)
     cuts: list[Cut] = []
+    workspace = Workspace()
     vain = 0
     for pose in _poses(world, surroundings.scale, part, blocks, seed):
         problem = surroundings.problem(*pose, f"{world.name}-{part}-{len(cuts)}", world.name)
         vain += 1
-        if is_drivable(problem, vehicle):
+        if is_drivable(problem, vehicle, workspace):
             cuts.append(Cut(problem, world.pose(*pose)))
             vain = 0
             tell(len(cuts))
@@ -83,6 +85,7 @@ def cut_scenarios(
     """
     blocks = blocks_of(world.size, surroundings.scale * WINDOW)
     paths = GlobalPaths(world, surroundings.scale)
+    workspace = Workspace()
     for number, (start, goal) in enumerate(ends):
         path = paths.path(start, goal)
         heading = None if path is None else local_goal(path, start, surroundings.scale)
@@ -96,17 +99,19 @@ def cut_scenarios(
             problem = surroundings.problem(x, y, heading, f"{world.name}-scenario-{number}", world.name)
             if not lie_in(part, blocks, *window_boxes(pose, surroundings.scale))[0]:
                 yield f"its window is not wholly in the blocks of part {part}"
-            elif not is_drivable(problem, vehicle):
+            elif not is_drivable(problem, vehicle, workspace):
                 yield "its start or local goal is blocked, or no way of reasonable length joins them"
             else:
                 yield Cut(problem, world.pose(x, y, heading))
 
 
-def is_drivable(problem: Problem, vehicle: Vehicle = CAR) -> bool:
+def is_drivable(problem: Problem, vehicle: Vehicle = CAR, workspace: Workspace | None = None) -> bool:
     """Whether a cut problem makes sense, and a way over its grid, not too long, reaches the goal."""
     if problem_fault(problem, vehicle) is not None:
         return False
-    way = grid_path(drawing_of(problem).occupied, problem.start[:2], problem.goal, problem.goal_radius)
+    workspace = workspace or Workspace()
+    occupied = drawing_of(problem, workspace).occupied
+    way = grid_path(occupied, problem.start[:2], problem.goal, problem.goal_radius, workspace)
     if way is None:
         return False
     return float(np.hypot(*np.diff(way, axis=0).T).sum()) <= LONGEST_WAY * CANONICAL_DISTANCE

@@ -164,7 +164,7 @@ def recall(
 
 def among_the_first(memory: Memory, view: View, k: int) -> Recalled:
     """What the first plans of a large memory have for a problem of their heading, by blocked cells."""
-    ranking = rank_by_cells(memory.masks[:ASKED_FIRST], view.bits)
+    ranking = rank_by_cells(memory.masks[:ASKED_FIRST], view.bits, view.workspace)
     order = ranking.order[: min(TRIED_FIRST, int(ranking.places[WORTH_CELLS]))]
     view.lap("recall")
     free, checks = first_check(memory, view, order, stored=True)
@@ -198,8 +198,8 @@ def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> 
 
 def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, int]:
     """All plans, or those ``among``, the least blocked first, and how many of these are worth recalling."""
-    bits = view.bits
-    ranking = rank_by_cells(memory.masks if among is None else memory.masks[among], bits)
+    masks = memory.masks if among is None else memory.masks[among]
+    ranking = rank_by_cells(masks, view.bits, view.workspace)
     order = ranking.order if among is None else among[ranking.order]
     return order, int(ranking.places[WORTH_CELLS])
 

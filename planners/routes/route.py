@@ -33,6 +33,7 @@ from planners.world.problem import (
 )
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.workspace import Workspace
 
 CANONICAL_TRIED: Final = 4  # local goals at the canonical distance, from one place
 STOPS_TRIED: Final = 2  # places to brake at, of one plan
@@ -113,6 +114,7 @@ class Router:
         self._scene = scene_of(self._whole)
         self._paths = GlobalPaths(world, 1.0)
         self._attempts = self._most_attempts = 0
+        self._workspace = Workspace()
 
     def route(self, start: tuple[float, float, float], goals: list[Place]) -> Route | Stuck:
         """A route through all ``goals``, at rest in the disc around each."""
@@ -180,7 +182,7 @@ class Router:
             return []
         begin = simulate(state, turn, self._vehicle)[-1]
         problem = self._problem(begin, goal)
-        if goal.canonical and not is_drivable(problem, self._vehicle):
+        if goal.canonical and not is_drivable(problem, self._vehicle, self._workspace):
             return []
         self._attempts += 1
         attempt = self._recalled(problem) if goal.canonical else self._searched(problem)

@@ -13,12 +13,13 @@ from time import perf_counter
 from typing import NamedTuple
 
 from planners.search.guides.guidance import guidance
-from planners.search.outcome import Limits
-from planners.search.registry import plan
+from planners.search.query import Limits, Query
+from planners.search.registry import PLANNERS
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.workspace import Workspace
 
 FIRST_EXPANSIONS = 250  # of the first search; a few times what a planner mostly needs for a plan
 GROWTH = 1.5  # a search in vain may mean that it was too short: the next is this much longer
@@ -55,6 +56,7 @@ def improve(
     seed: int = 0,
     scene: Scene | None = None,
     vehicle: Vehicle = CAR,
+    workspace: Workspace | None = None,
 ) -> Improved:
     """Improve a ``known`` plan (or find one) with the planner called ``name`` until a limit is reached.
 
@@ -65,6 +67,7 @@ def improve(
         raise ValueError("improving never ends by itself: give it seconds or expansions")
     began = perf_counter()
     ready = scene_of(problem) if scene is None else scene
+    buffers = workspace or Workspace()
     most = math.inf if expansions is None else expansions
     best = known
     history = [] if known is None else [Improvement(0.0, 0, known.duration_s)]
@@ -77,15 +80,8 @@ def improve(
             bound_s=math.inf if best is None else (1.0 - LEAST_GAIN) * best.duration_s,
         )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
-        found = plan(
-            name,
-            problem,
-            generator(seed, "improve", problem.id, name, searches),
-            guide,
-            ready,
-            limits,
-            vehicle,
-        )
+        rng = generator(seed, "improve", problem.id, name, searches)
+        found = PLANNERS[name](Query(problem, rng, ready, buffers, guide, limits, vehicle))
         searches += 1
         checks += found.collision_checks
         nodes += found.nodes

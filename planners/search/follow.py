@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import BitGenerator
 
-from planners.search.guides.sampling import in_disc
+from planners.search.guides.sampling import in_disc, uniform
 from planners.search.gust import (
     SAMPLE,
     Groups,
@@ -22,7 +22,8 @@ from planners.search.gust import (
     keep,
     larger,
 )
-from planners.search.outcome import Guide, Limits, Outcome
+from planners.search.outcome import Outcome
+from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
 from planners.search.structures.neighbours import Indices
@@ -34,10 +35,9 @@ from planners.search.structures.roadmap import (
 )
 from planners.search.structures.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, scene_of
+from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
-from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 
 LONGEST_LEAD = 256  # waypoints
 # places in Lead.marks
@@ -75,7 +75,6 @@ class Lead(NamedTuple):
     marks: Indices  # [3] LENGTH of the path, iterations SINCE_FOLLOW and SINCE_GROUP were new
 
 
-@functools.lru_cache(maxsize=1)
 def allocate_lead() -> Lead:
     """Buffers for a lead path."""
     return Lead(
@@ -88,7 +87,7 @@ def allocate_lead() -> Lead:
 
 
 @lean
-def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: np.random.Generator) -> None:
+def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: BitGenerator) -> None:
     waypoint = tree.waypoints[vertex]
     if lead.counts[waypoint] == 0:
         lead.weights[waypoint] = waypoint * math.log(progress_base)
@@ -105,7 +104,7 @@ def _new_lead(
     groups: Groups,
     lead: Lead,
     settings: FollowSettings,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Follow the way of ``node``'s group from now on; its vertices are where to begin."""
     lead.marks[LENGTH] = resample_way(roadmap, node, settings.spacing_m, lead.points)
@@ -129,7 +128,7 @@ def _grow(
     exploring: GustSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     counts = tree.counts
     marks = lead.marks
@@ -144,7 +143,7 @@ def _grow(
             marks[SINCE_GROUP] = 0
             continue
         stuck = marks[SINCE_FOLLOW]
-        if stuck > settings.patience and rng.random() < 0.5 * 2.0 ** (stuck / settings.patience - 1.0):
+        if stuck > settings.patience and uniform(rng) < 0.5 * 2.0 ** (stuck / settings.patience - 1.0):
             node = heaviest(groups)
             groups.weights[node] += math.log(gust.selection_penalty)
             _new_lead(tree, node, roadmap, groups, lead, settings, rng)
@@ -155,7 +154,7 @@ def _grow(
                 best = lead.weights[i]
                 waypoint = i
         lead.weights[waypoint] += math.log(settings.selection_penalty)
-        radius = settings.near_radius_m if rng.random() < 0.5 else settings.far_radius_m
+        radius = settings.near_radius_m if uniform(rng) < 0.5 else settings.far_radius_m
         x, y = in_disc(lead.points[waypoint, 0], lead.points[waypoint, 1], radius, rng)
         vertex = choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, vehicle, rng)
         first = counts[SIZE]
@@ -194,7 +193,7 @@ def _begin(
     settings: FollowSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """As GUST begins, and a first lead."""
     begin_gust(tree, goal, roadmap, groups, settings.gust, vehicle, scene, rng)
@@ -202,35 +201,21 @@ def _begin(
     _new_lead(tree, heaviest(groups), roadmap, groups, lead, settings, rng)
 
 
-def follow(
-    problem: Problem,
-    settings: FollowSettings,
-    rng: np.random.Generator,
-    guide: Guide | None = None,
-    scene: Scene | None = None,
-    limits: Limits | None = None,
-    vehicle: Vehicle = CAR,
-    prefix: Plan | None = None,
-) -> Outcome:
+def follow(query: Query, settings: FollowSettings) -> Outcome:
     """Plan from the problem's start to its goal disc; with a guide, along it first."""
-    ready = scene_of(problem) if scene is None else scene
     on_roadmap = settings.gust.roadmap
-    roadmap = allocate_roadmap(on_roadmap.most_nodes, on_roadmap.neighbours)
-    groups = allocate_groups(on_roadmap.most_nodes)
-    lead = allocate_lead()
+    roadmap = query.workspace.buffers(allocate_roadmap, on_roadmap.most_nodes, on_roadmap.neighbours)
+    groups = query.workspace.buffers(allocate_groups, on_roadmap.most_nodes)
+    lead = query.workspace.buffers(allocate_lead)
+    vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
     exploring = settings.gust._replace(guide_probability=0.0)
 
     def prepare(tree: Tree, goal: Floats, trial: int) -> None:
         begun = settings._replace(gust=larger(settings.gust, trial))
-        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, ready, rng)
+        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, scene, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, ready, rng)
+        _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, scene, rng)
 
-    explore = towards_anywhere(vehicle, ready, rng)
-    along = along_guide(guide, vehicle, ready, rng)
-    restart_after = settings.gust.restart_after
-
-    return attempt(
-        problem, ready, limits or Limits(), vehicle, prefix, restart_after, prepare, grow, explore, along
-    )
+    explore, along = towards_anywhere(query), along_guide(query)
+    return attempt(query, settings.gust.restart_after, prepare, grow, explore, along)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import BitGenerator
 
-from planners.search.guides.sampling import in_bounds, in_disc
-from planners.search.outcome import Guide, Limits, Outcome
+from planners.search.guides.sampling import in_bounds, in_disc, uniform
+from planners.search.outcome import Outcome
+from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
 from planners.search.structures.neighbours import Indices, nearest_for
@@ -34,11 +35,10 @@ from planners.search.structures.tree import (
     extend,
 )
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, scene_of
+from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
-from planners.world.problem import Plan, Problem
 from planners.world.trigonometry import length
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 
 SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
 
@@ -68,7 +68,6 @@ class Groups(NamedTuple):
     way: Floats  # [8, 2] points ahead of a group, metres
 
 
-@functools.lru_cache(maxsize=2)
 def allocate_groups(capacity: int) -> Groups:
     """Buffers for groups of ``capacity`` roadmap nodes."""
     return Groups(
@@ -89,11 +88,11 @@ def clear_groups(groups: Groups) -> None:
 
 
 @inlined
-def keep(members: Indices, count: int, vertex: int, rng: np.random.Generator) -> None:
+def keep(members: Indices, count: int, vertex: int, rng: BitGenerator) -> None:
     """Keep a uniform sample of all vertices ever put, ``count`` of them before this one (algorithm R)."""
     place = count
     if count >= members.shape[0]:
-        place = int(rng.random() * (count + 1))
+        place = int(uniform(rng) * (count + 1))
     if place < members.shape[0]:
         members[place] = vertex
 
@@ -106,7 +105,7 @@ def join_groups(
     roadmap: Roadmap,
     groups: Groups,
     distance_exponent: float,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Put vertices ``first ..`` into the groups of their nearest roadmap nodes."""
     node = -1
@@ -146,7 +145,7 @@ def choose_member(
     x: float,
     y: float,
     vehicle: Vehicle,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> int:
     """A vertex, the likelier the sooner it was reached and the sooner it could reach (x, y).
 
@@ -163,7 +162,7 @@ def choose_member(
         speed = max(0.01 * vehicle.max_speed, tree.states[vertex, 3])
         weight = 1.0 / (tree.depths[vertex] * vehicle.dt + distance / speed + 1e-9)
         total += weight
-        if rng.random() * total < weight:  # each stays with its share, without a second pass
+        if uniform(rng) * total < weight:  # each stays with its share, without a second pass
             chosen = vertex
     return int(chosen)
 
@@ -178,7 +177,7 @@ def grow_gust(
     settings: GustSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Extend the heaviest group until solved or ``until`` expansions."""
     no_lead = groups.way[:0]
@@ -186,8 +185,8 @@ def grow_gust(
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
         node = heaviest(groups)
         groups.weights[node] += math.log(settings.selection_penalty)
-        if rng.random() < settings.guide_probability:
-            ahead = 1 + int(rng.random() * settings.guide_steps)
+        if uniform(rng) < settings.guide_probability:
+            ahead = 1 + int(uniform(rng) * settings.guide_steps)
             filled = resample_way(roadmap, node, settings.guide_spacing_m, groups.way[: ahead + 2])
             point = groups.way[min(ahead, filled - 1)]
             x, y = in_disc(point[0], point[1], settings.guide_radius_m, rng)
@@ -210,7 +209,7 @@ def begin_gust(
     settings: GustSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Build the roadmap and put the vertices that are there into their groups."""
     build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, scene, rng)
@@ -226,39 +225,18 @@ def larger(settings: GustSettings, trial: int) -> GustSettings:
     return settings._replace(roadmap=roadmap._replace(batch=batch)) if trial else settings
 
 
-def gust(
-    problem: Problem,
-    settings: GustSettings,
-    rng: np.random.Generator,
-    guide: Guide | None = None,
-    scene: Scene | None = None,
-    limits: Limits | None = None,
-    vehicle: Vehicle = CAR,
-    prefix: Plan | None = None,
-) -> Outcome:
+def gust(query: Query, settings: GustSettings) -> Outcome:
     """Plan from the problem's start to its goal disc; with a guide, along it first."""
-    ready = scene_of(problem) if scene is None else scene
-    roadmap = allocate_roadmap(settings.roadmap.most_nodes, settings.roadmap.neighbours)
-    groups = allocate_groups(settings.roadmap.most_nodes)
+    sizes = settings.roadmap.most_nodes, settings.roadmap.neighbours
+    roadmap = query.workspace.buffers(allocate_roadmap, *sizes)
+    groups = query.workspace.buffers(allocate_groups, settings.roadmap.most_nodes)
+    vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
 
     def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, ready, rng)
+        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, scene, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
-        grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, ready, rng)
+        grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, scene, rng)
 
-    explore = towards_anywhere(vehicle, ready, rng)
-    along = along_guide(guide, vehicle, ready, rng)
-
-    return attempt(
-        problem,
-        ready,
-        limits or Limits(),
-        vehicle,
-        prefix,
-        settings.restart_after,
-        prepare,
-        grow,
-        explore,
-        along,
-    )
+    explore, along = towards_anywhere(query), along_guide(query)
+    return attempt(query, settings.restart_after, prepare, grow, explore, along)

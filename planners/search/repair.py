@@ -7,7 +7,6 @@ there, every state simulated and checked. Where that meets the next collision, t
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -15,14 +14,15 @@ import numpy as np
 
 from planners.search.guides.grid_path import grid_path
 from planners.search.guides.guidance import guidance
-from planners.search.outcome import Limits, Outcome, Status
-from planners.search.registry import plan
+from planners.search.outcome import Outcome, Status
+from planners.search.query import Limits, Query
+from planners.search.registry import PLANNERS
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.geometry.occupancy import Bits
 from planners.world.jit import lean
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
@@ -91,31 +91,32 @@ def rejoin_at(
     return last
 
 
-@functools.lru_cache(maxsize=1)
 def allocate_drive(size: int) -> tuple[Floats, Floats]:
     """Buffers for the states ``[LONGEST, size]`` and controls of a repaired plan."""
     return np.empty((LONGEST, size)), np.empty((LONGEST, 2))
 
 
 def repair(
-    name: str,
-    problem: Problem,
-    stored: Plan,
-    blocked: Flags,
-    occupied: Bits,
-    scene: Scene,
-    rng: np.random.Generator,
-    vehicle: Vehicle = CAR,
-    settings: RepairSettings = REPAIR,
+    name: str, query: Query, stored: Plan, blocked: Flags, occupied: Bits, settings: RepairSettings = REPAIR
 ) -> Outcome:
-    """Make a plan for ``problem`` of a ``stored`` one that begins at its start, ``blocked [T]`` in places.
+    """Turn a stored plan that is blocked in places into a plan for the query's problem.
 
-    The planner called ``name`` searches, the ``occupied`` cells ``[64]`` show it the way around. Status when
-    that fails: ``BUDGET_SPENT``.
+    Args:
+        name: of the planner that searches around the blocked places.
+        query: the problem; the plan begins at its start. Guide, limits and prefix are not looked at.
+        stored: the plan, with T states.
+        blocked: ``[T]`` which of its states are in collision.
+        occupied: ``[64]`` the problem's occupied cells, which show the planner a way around.
+        settings: what the repair may cost.
+
+    Returns:
+        The repaired plan with status ``SOLVED``, or no plan with ``BUDGET_SPENT``.
+
     """
     began = perf_counter()
+    problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
     way = np.ascontiguousarray(stored.states)
-    states, controls = allocate_drive(state_size(vehicle))
+    states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
     goal = np.array([*problem.goal, problem.goal_radius])
     drive = free_prefix(stored, blocked)
     at = 0 if drive is None else len(drive.states)  # of the way: where to look for the next free place
@@ -129,11 +130,11 @@ def repair(
         to_goal = at == len(way) - 1
         disc = goal if to_goal else np.array([way[at, 0], way[at, 1], settings.rejoin_radius_m])
         target = (float(disc[0]), float(disc[1]))
-        around = grid_path(occupied, (x, y), target, float(disc[2]))
+        around = grid_path(occupied, (x, y), target, float(disc[2]), workspace)
         guide = guidance([drive.states] if around is None else [around, drive.states])
         local = replace(problem, goal=target, goal_radius=float(disc[2]))
         limits = Limits(expansions=settings.expansions)
-        found = plan(name, local, rng, guide, scene, limits, vehicle, drive)
+        found = PLANNERS[name](replace(query, problem=local, guide=guide, limits=limits, prefix=drive))
         searches.append(found)
         if found.plan is None:
             beyond_m *= 2.0

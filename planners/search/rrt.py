@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
+from numpy.random import BitGenerator
 
 from planners.search.guides.sampling import guided
-from planners.search.outcome import NO_GUIDE, Guide, Limits, Outcome
-from planners.search.search_loop import attempt
+from planners.search.outcome import Outcome
+from planners.search.query import NO_GUIDE, Guide, Query
+from planners.search.search_loop import Grow, attempt
 from planners.search.structures.neighbours import nearest
 from planners.search.structures.tree import (
     EXPANSIONS,
@@ -22,10 +22,9 @@ from planners.search.structures.tree import (
     extend,
 )
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, scene_of
+from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
-from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 
 
 class RrtSettings(NamedTuple):
@@ -38,6 +37,9 @@ class RrtSettings(NamedTuple):
     extension: Extension = EXTENSION
 
 
+RRT = RrtSettings()
+
+
 @lean
 def grow_rrt(
     tree: Tree,
@@ -48,7 +50,7 @@ def grow_rrt(
     settings: RrtSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Extend along the guide, or towards anywhere, until solved or ``until`` expansions."""
     counts = tree.counts
@@ -62,50 +64,25 @@ def grow_rrt(
             return
 
 
-def towards_anywhere(
-    vehicle: Vehicle, scene: Scene, rng: np.random.Generator
-) -> Callable[[Tree, Floats, int], None]:
-    """How any planner grows its tree without looking where, as ``attempt`` wants it."""
-    settings = RrtSettings()
+def towards_anywhere(query: Query, guide: Guide = NO_GUIDE, settings: RrtSettings = RRT) -> Grow:
+    """How RRT grows a tree: along a guide, or towards anywhere. Other planners use it for a while, too."""
+    bits = query.rng.bit_generator
     return lambda tree, goal, until: grow_rrt(
-        tree, goal, until, NO_GUIDE, NO_LEAD, settings, vehicle, scene, rng
+        tree, goal, until, guide, NO_LEAD, settings, query.vehicle, query.scene, bits
     )
 
 
-def along_guide(
-    guide: Guide | None, vehicle: Vehicle, scene: Scene, rng: np.random.Generator
-) -> Callable[[Tree, Floats, int], None] | None:
-    """How any planner grows its tree along a guide, as ``attempt`` wants it; None without a guide."""
-    if guide is None:
-        return None
-    settings = RrtSettings()
-    return lambda tree, goal, until: grow_rrt(
-        tree, goal, until, guide, NO_LEAD, settings, vehicle, scene, rng
-    )
+def along_guide(query: Query) -> Grow | None:
+    """How a planner with a roadmap grows its tree along a guide first; None without a guide."""
+    return None if query.guide is None else towards_anywhere(query, query.guide)
 
 
-def rrt(
-    problem: Problem,
-    settings: RrtSettings,
-    rng: np.random.Generator,
-    guide: Guide | None = None,
-    scene: Scene | None = None,
-    limits: Limits | None = None,
-    vehicle: Vehicle = CAR,
-    prefix: Plan | None = None,
-) -> Outcome:
-    """Plan from the problem's start to its goal disc; a guide leads the tree along its ways."""
-    ready = scene_of(problem) if scene is None else scene
-    guiding = NO_GUIDE if guide is None else guide
+def rrt(query: Query, settings: RrtSettings) -> Outcome:
+    """Plan from the problem's start to its goal disc; a guide leads the tree along its paths."""
+    guide = NO_GUIDE if query.guide is None else query.guide
     return attempt(
-        problem,
-        ready,
-        limits or Limits(),
-        vehicle,
-        prefix,
+        query,
         settings.restart_after,
         lambda tree, goal, trial: None,
-        lambda tree, goal, until: grow_rrt(
-            tree, goal, until, guiding, NO_LEAD, settings, vehicle, ready, rng
-        ),
+        towards_anywhere(query, guide, settings),
     )

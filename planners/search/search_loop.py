@@ -8,7 +8,8 @@ from time import perf_counter
 
 import numpy as np
 
-from planners.search.outcome import Limits, Outcome, Status
+from planners.search.outcome import Outcome, Status
+from planners.search.query import Query
 from planners.search.structures.tree import (
     CHECKS,
     EXPANSIONS,
@@ -23,9 +24,11 @@ from planners.search.structures.tree import (
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, box_is_free, state_is_free
 from planners.world.jit import lean
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import Vehicle, state_size
+
+Grow = Callable[[Tree, Floats, int], None]  # tree, goal [3], number of expansions at which to return
 
 NO_CONTROLS = np.empty((0, 2))
 GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
@@ -40,16 +43,12 @@ def _is_blocked(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> i
 
 
 def attempt(
-    problem: Problem,
-    scene: Scene,
-    limits: Limits,
-    vehicle: Vehicle,
-    prefix: Plan | None,
+    query: Query,
     restart_after: int,
     prepare: Callable[[Tree, Floats, int], None],
-    grow: Callable[[Tree, Floats, int], None],
-    explore: Callable[[Tree, Floats, int], None] | None = None,
-    follow_guide: Callable[[Tree, Floats, int], None] | None = None,
+    grow: Grow,
+    explore: Grow | None = None,
+    follow_guide: Grow | None = None,
 ) -> Outcome:
     """Plant a tree, ``prepare(tree, goal, trial)`` (roadmaps), then ``grow(tree, goal, until)`` until solved.
 
@@ -62,8 +61,10 @@ def attempt(
     ``until`` is the number of expansions at which ``grow`` returns; ``goal [3]`` is x, y, radius in metres.
     """
     began = perf_counter()
-    tree = allocate_tree(limits.nodes, state_size(vehicle))
+    problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
+    tree = query.workspace.buffers(allocate_tree, limits.nodes, state_size(vehicle))
     goal = np.array([*problem.goal, problem.goal_radius])
+    prefix = query.prefix
     if prefix is None:
         prefix = Plan(start_state(problem, vehicle)[np.newaxis], NO_CONTROLS, vehicle.dt)
     first = np.ascontiguousarray(prefix.states)

@@ -1,4 +1,4 @@
-"""What the last search of this process left in its buffers: its tree and its roadmap, to look at."""
+"""What the last search left in the buffers of a workspace: its tree and its roadmap, to look at."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 
 from planners.search.follow import FollowSettings
 from planners.search.gust import GustSettings
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.structures.neighbours import Indices
 from planners.search.structures.roadmap import BLOCKED, EDGES, FREE, NODES, allocate_roadmap
 from planners.search.structures.tree import SIZE, allocate_tree
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import Vehicle, state_size
+from planners.world.workspace import Workspace
 
 
 class Trace(NamedTuple):
@@ -31,21 +32,24 @@ class Roads(NamedTuple):
     unknown: Indices  # [u, 2] of strips that no search wanted to use
 
 
-def last_tree(limits: Limits, vehicle: Vehicle) -> Trace:
-    """The tree of the last search with these limits and vehicle: of its last trial, after a restart."""
-    tree = allocate_tree(limits.nodes, state_size(vehicle))
+def last_tree(workspace: Workspace, limits: Limits, vehicle: Vehicle) -> Trace:
+    """The tree of the last search with a workspace, these limits and this vehicle.
+
+    After restarts it is the tree of the last trial.
+    """
+    tree = workspace.buffers(allocate_tree, limits.nodes, state_size(vehicle))
     size = int(tree.counts[SIZE])
     parents = tree.parents[:size].copy()
     parents[parents >= size] = -1
     return Trace(tree.states[:size, :2].copy(), parents)
 
 
-def last_roadmap(planner: str) -> Roads | None:
-    """The roadmap of the last search by a planner; None for one that makes none."""
+def last_roadmap(workspace: Workspace, planner: str) -> Roads | None:
+    """The roadmap of the last search with a workspace by a planner; None for a planner without roadmaps."""
     settings = {"gust": GustSettings().roadmap, "follow": FollowSettings().gust.roadmap}.get(planner)
     if settings is None:
         return None
-    roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
+    roadmap = workspace.buffers(allocate_roadmap, settings.most_nodes, settings.neighbours)
     nodes, edges = int(roadmap.counts[NODES]), int(roadmap.counts[EDGES])
     ends = np.stack([roadmap.edge_to[: 2 * edges : 2], roadmap.edge_to[1 : 2 * edges : 2]], axis=1)
     state = roadmap.edge_state[:edges]

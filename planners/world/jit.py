@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
-from numba.core import boxing, cgutils, pythonapi, types
-from numba.extending import NativeValue, overload
+from numba.core import types
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, UserWideCacheLocator
+from numba.extending import overload
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -24,52 +25,50 @@ def _digest_of_sources() -> str:
     return digest.hexdigest()[:16]
 
 
-# Numba looks only at a kernel's own file for changes: after an edit to a kernel in another file, a compiled
-# caller would go on with the old one. So each state of the sources has a cache of its own.
 _config: Any = numba.config
-_cache = Path(_config.CACHE_DIR or _SOURCES / "__pycache__")
-_config.CACHE_DIR = str(_cache / f"kernels-{_digest_of_sources()}")
+_CACHE = Path(_config.CACHE_DIR or _SOURCES / "__pycache__") / f"kernels-{_digest_of_sources()}"
+
+
+class _KernelLocator(InTreeCacheLocator):
+    """Keeps a compiled kernel in the folder of the present state of all kernels' sources.
+
+    Numba looks only at a kernel's own file for changes: after an edit to a kernel in another file, a compiled
+    caller would go on with the old one.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(_CACHE / self.get_suitable_cache_subpath(file))
+
+
+class _KernelCacheImpl(CompileResultCacheImpl):
+    _locator_classes: list[type[object]] = [_KernelLocator, UserWideCacheLocator]  # noqa: RUF012 as in Numba
+
+
+class _KernelCache(FunctionCache):
+    _impl_class = _KernelCacheImpl
+
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
 # fastmath stays off: the same seed must give the same tree everywhere
-_FLAGS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _LEAN: dict[str, Any] = _FLAGS | {"_nrt": False}
 _INLINED: dict[str, Any] = _LEAN | {"forceinline": True}
 
 
-_unboxers: Any = pythonapi._unboxers
-_cgutils: Any = cgutils
-_native: Any = NativeValue
-_counting_unboxer = _unboxers.functions[types.NumPyRandomGeneratorType]
-
-
-def _borrowing_unboxer(kind: Any, generator: Any, context: Any) -> Any:
-    """How a kernel takes a random generator: without counting references it borrows it for the call.
-
-    Numba's own way takes a reference, which a kernel without counting never gives back: a leak each call.
-    """
-    if context.context.enable_nrt:
-        return _counting_unboxer(kind, generator, context)
-    native = _cgutils.create_struct_proxy(kind)(context.context, context.builder)
-    bits = context.pyapi.object_getattr_string(generator, "bit_generator")
-    unboxed = context.unbox(boxing._bit_gen_type, bits)
-    context.pyapi.decref(bits)
-    native.bit_generator = unboxed.value
-    native.parent = generator
-    native.meminfo = _cgutils.get_null_value(native.meminfo.type)
-    return _native(native._getvalue(), is_error=unboxed.is_error)
-
-
-_unboxers.functions[types.NumPyRandomGeneratorType] = _borrowing_unboxer
+def _compiled(function: Callable[_P, _R], flags: dict[str, Any]) -> Callable[_P, _R]:
+    dispatcher = numba.njit(**flags)(function)
+    dispatcher._cache = _KernelCache(function)
+    compiled: Callable[_P, _R] = dispatcher
+    return compiled
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a kernel: cached on disk, without the interpreter lock."""
-    compiled: Callable[_P, _R] = numba.njit(**_FLAGS)(function)
-    return compiled
+    return _compiled(function, _FLAGS)
 
 
 def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -77,14 +76,12 @@ def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     Numba otherwise counts each array of each tuple that is passed on, which costs more than a check.
     """
-    compiled: Callable[_P, _R] = numba.njit(**_LEAN)(function)
-    return compiled
+    return _compiled(function, _LEAN)
 
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a small ``lean`` kernel into each of its callers: calling it costs more than its work."""
-    compiled: Callable[_P, _R] = numba.njit(**_INLINED)(function)
-    return compiled
+    return _compiled(function, _INLINED)
 
 
 _implementations: dict[Callable[..., Any], dict[type, Callable[..., Any]]] = {}
@@ -102,7 +99,7 @@ def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
         kinds = (getattr(argument, "instance_class", None) for argument in arguments)
         return next((known[kind] for kind in kinds if kind in known), None)
 
-    options: Any = {name: on for name, on in _INLINED.items() if name not in ("cache", "no_cfunc_wrapper")}
+    options: Any = {name: on for name, on in _INLINED.items() if name != "no_cfunc_wrapper"}
     overload(interpreted, jit_options=options, strict=False)(compiled)
     _implementations[interpreted] = known
     declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]

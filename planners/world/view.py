@@ -7,13 +7,18 @@ from time import perf_counter
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.geometry.occupancy import Bits, Drawing, drawing_of
 from planners.world.problem import Problem
+from planners.world.workspace import Workspace
 
 
 class View:
-    """The drawing and the scene of a canonical problem. One view at a time: drawings share buffers."""
+    """The drawing and the scene of a canonical problem.
 
-    def __init__(self, problem: Problem) -> None:
+    The drawing lies in the buffers of a workspace, so it holds until the next problem is viewed with that.
+    """
+
+    def __init__(self, problem: Problem, workspace: Workspace | None = None) -> None:
         self.problem = problem
+        self.workspace = workspace or Workspace()
         self.seconds: dict[str, float] = {}  # by part
         self.began = self._last = perf_counter()
         self._drawing: Drawing | None = None
@@ -29,7 +34,7 @@ class View:
     def drawing(self) -> Drawing:
         """The cells that obstacles meet, of each convex piece too."""
         if self._drawing is None:
-            self._drawing = drawing_of(self.problem)
+            self._drawing = drawing_of(self.problem, self.workspace)
             self.lap("occupancy")
         return self._drawing
 

@@ -15,7 +15,8 @@ from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from planners.search.outcome import Limits, Status
+from planners.search.outcome import Status
+from planners.search.query import Limits
 from storage.tables.attempts import attempt_frames
 from storage.tables.configurations import Configuration, configured
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from planners.memory.plans.sweeps import free_plans
 from planners.memory.recall import RECALLS
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.solve import ASSISTS, improved, solve, turned
 from planners.world.authority.authority import faults

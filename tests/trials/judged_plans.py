@@ -26,7 +26,7 @@ from rich.console import Console
 from rich.table import Table
 
 from planners.memory.recall import Memory
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
 from planners.world.authority.authority import faults

@@ -18,7 +18,7 @@ from dashboards.web.query import Asked, link
 from dashboards.web.replay import Again, again
 from dashboards.web.site import Site
 from dashboards.web.world_picture import found_plan, recalled_plan, roadmap, tree, world
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
@@ -127,12 +127,11 @@ def _again(site: Site, run: RunFolder, row: Mapping[Any, Any], how: Any) -> tupl
     vehicle, seed = site.vehicle(run), int(row["seed"]) if row["seed"] == row["seed"] else 0
 
     def made() -> Again:
-        with site.planning():
-            try:
-                limits = Limits(seconds=SECONDS)
-                return again(drawn, str(row["planner"]), how, memory, seed, vehicle, limits)
-            except ValueError as error:
-                raise NoticeError(f"This attempt cannot be made again: {error}.") from None
+        try:
+            limits = Limits(seconds=SECONDS)
+            return again(drawn, str(row["planner"]), how, memory, seed, vehicle, limits)
+        except ValueError as error:
+            raise NoticeError(f"This attempt cannot be made again: {error}.") from None
 
     key = ("again", run.path, row["problem_id"], row["planner"], how, row["memory"], seed, id(memory))
     return site.kept(key, made), drawn

@@ -13,7 +13,7 @@ from dashboards.web.page import Page
 from dashboards.web.query import Asked
 from dashboards.web.site import Site
 from planners.memory.recall import Memory, scale_fault
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
 from planners.world.alignment import from_canonical, to_canonical
@@ -22,6 +22,7 @@ from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem, start_state
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
 from storage.exchange.problems import fields_of, problem_of
 from storage.fields import check_fields, text_of
 
@@ -88,9 +89,8 @@ def try_it(site: Site, asked: Asked) -> Page:
 def check_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
     """A world of one's own, checked, as the editor takes it; the frame stays the world's."""
     vehicle = site.vehicle(site.run(asked.run))
-    with site.planning():
-        found = _problem(content, vehicle)
-        return {"world": fields_of(found), "start": _outline(found, vehicle)}
+    found = _problem(content, vehicle)
+    return {"world": fields_of(found), "start": _outline(found, vehicle)}
 
 
 def plan_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
@@ -109,39 +109,38 @@ def plan_world(site: Site, asked: Asked, content: Any) -> dict[str, Any]:
     assist = choices.one_of("assist", ASSISTS, "repair")
     name = choices.text("memory")
     known = site.memory(run, name) if name else None
-    with site.planning():
-        found = _problem(content.get("world"), vehicle)
-        canonical, alignment = to_canonical(found)
-        unfit = scale_fault(known, found.scale) if known is not None else None
-        if unfit is not None:
-            raise WrongQuestionError(f"The {unfit}.")
-        ways: list[tuple[str, Memory | None]] = [("none", None)] + (
-            [(assist, known)] if known is not None else []
+    found = _problem(content.get("world"), vehicle)
+    canonical, alignment = to_canonical(found)
+    unfit = scale_fault(known, found.scale) if known is not None else None
+    if unfit is not None:
+        raise WrongQuestionError(f"The {unfit}.")
+    ways: list[tuple[str, Memory | None]] = [("none", None)] + (
+        [(assist, known)] if known is not None else []
+    )
+    answers = []
+    for way, used in ways:
+        attempt, milliseconds = _median(canonical, planner, way, used, vehicle)
+        plan = attempt.plan and from_canonical(attempt.plan, alignment)
+        way_m = [] if plan is None else np.round(plan.states[:, :2], 2).tolist()
+        corners: Floats | list[Any] = (
+            []
+            if plan is None
+            else np.round(footprints(plan.states[:: max(1, len(plan.states) // 14)], vehicle), 2)
         )
-        answers = []
-        for way, used in ways:
-            attempt, milliseconds = _median(canonical, planner, way, used, vehicle)
-            plan = attempt.plan and from_canonical(attempt.plan, alignment)
-            way_m = [] if plan is None else np.round(plan.states[:, :2], 2).tolist()
-            corners: Floats | list[Any] = (
-                []
-                if plan is None
-                else np.round(footprints(plan.states[:: max(1, len(plan.states) // 14)], vehicle), 2)
-            )
-            answers.append(
-                {
-                    "assist": way,
-                    "solved": attempt.solved,
-                    "ended": attempt.source or attempt.status,
-                    "ms": milliseconds,
-                    "checks": attempt.collision_checks,
-                    "nodes": attempt.nodes,
-                    "length_m": plan.length_m if plan else None,
-                    "duration_s": plan.duration_s if plan else None,
-                    "way": way_m,
-                    "bodies": np.asarray(corners).reshape(-1, 8).tolist(),
-                }
-            )
+        answers.append(
+            {
+                "assist": way,
+                "solved": attempt.solved,
+                "ended": attempt.source or attempt.status,
+                "ms": milliseconds,
+                "checks": attempt.collision_checks,
+                "nodes": attempt.nodes,
+                "length_m": plan.length_m if plan else None,
+                "duration_s": plan.duration_s if plan else None,
+                "way": way_m,
+                "bodies": np.asarray(corners).reshape(-1, 8).tolist(),
+            }
+        )
     return {"answers": answers}
 
 
@@ -149,12 +148,12 @@ def _median(
     canonical: Problem, planner: str, assist: str, known: Memory | None, vehicle: Vehicle
 ) -> tuple[Attempt, float]:
     """An attempt, and the median milliseconds of a few like it: the first one may find everything cold."""
-    way = (planner, assist, vehicle)
+    way, workspace = (planner, assist, vehicle), Workspace()
     times: list[float] = []
     began = perf_counter()
     while True:
         try:
-            attempt = solve(canonical, planner, assist, 5, known, 0, LIMITS, vehicle)
+            attempt = solve(canonical, planner, assist, 5, known, 0, LIMITS, vehicle, workspace=workspace)
         except ValueError as error:
             raise WrongQuestionError(f"{error}.") from None
         if way not in _WARM:  # the first attempt of all loads what was compiled

@@ -42,12 +42,11 @@ class Tables(NamedTuple):
         Floats32  # all that comes behind, end to end: of each layer slopes before, weights [in, out], biases
     )
     widths: Integers  # [L + 1] H, and the widths of the later layers
-    values: Floats32  # [3, widest] scratch
 
 
 @lean
-def _embed(bits: Bits, tables: Tables, embedding: Floats32) -> None:
-    values = tables.values
+def _embed(bits: Bits, tables: Tables, values: Floats32, embedding: Floats32) -> None:
+    """Fill in ``embedding [D]``; ``values [3, widest layer]`` is scratch."""
     channels = tables.bias.shape[0]
     hidden = tables.widths[0]
     sums = values[0]
@@ -166,7 +165,6 @@ def tables_of(weights: Weights) -> Tables:
         packed(np.einsum("pch,c->ph", by_patch, full - empty)),
         packed(np.concatenate([np.empty(0), *later])),
         np.array(widths, np.int32),
-        np.empty((3, max(*widths, len(bias))), np.float32),
     )
 
 
@@ -176,10 +174,11 @@ def forward_of(weights: Weights) -> Forward:
         encoder = Encoder(to_onnx(weights))
         return lambda bits: encoder(grid_of(bits))
     tables = tables_of(weights)
+    widest = max(*tables.widths.tolist(), len(tables.bias))
 
     def embed(bits: Bits) -> Floats32:
         embedding = np.empty(tables.widths[-1], np.float32)
-        _embed(bits, tables, embedding)
+        _embed(bits, tables, np.empty((3, widest), np.float32), embedding)
         return embedding
 
     return embed

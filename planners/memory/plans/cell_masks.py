@@ -6,7 +6,6 @@ obstacle meets it. Where the two share no cell, the plan is free: no check is ne
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from planners.world.arrays import Floats, Integers
 from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, draw_piece
 from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
+from planners.world.workspace import Workspace
 
 ROUNDING_M = 1e-6  # boxes are drawn that much larger, so that rounding never loses a cell
 MOST_CELLS = 511  # a plan sweeps some 200: beyond this, one is as blocked as another
@@ -73,14 +73,13 @@ def count_bits(word: np.uint64) -> np.uint64:
 
 
 class Ranking(NamedTuple):
-    """N plans by the number of their swept cells that are not free; buffers are kept."""
+    """N plans by the number of their swept cells that are not free."""
 
     cells: Integers  # [N] blocked cells of each plan, at most MOST_CELLS
     order: Integers  # [N] the plans, the least blocked first; equal ones in order of storing
     places: Integers  # [MOST_CELLS + 2] where plans with that many blocked cells begin: scratch
 
 
-@functools.lru_cache(maxsize=4)
 def allocate_ranking(count: int) -> Ranking:
     """Buffers for that many plans."""
     return Ranking(np.empty(count, np.int32), np.empty(count, np.int32), np.empty(MOST_CELLS + 2, np.int32))
@@ -108,8 +107,15 @@ def _rank(masks: Bits, occupied: Bits, ranking: Ranking) -> None:
         places[blocked] += 1
 
 
-def rank_by_cells(masks: Bits, occupied: Bits) -> Ranking:
-    """N plans by how many of their cells ``[N, 64]`` are ``occupied [64]``; good until the next ranking."""
-    ranking = allocate_ranking(len(masks))
+def rank_by_cells(masks: Bits, occupied: Bits, workspace: Workspace | None = None) -> Ranking:
+    """Rank N plans by how many of their swept cells are not free.
+
+    Args:
+        masks: ``[N, 64]`` the cells that each plan sweeps.
+        occupied: ``[64]`` the cells that are not free.
+        workspace: the caller's buffers, which the next ranking of N plans overwrites; by default new ones.
+
+    """
+    ranking = (workspace or Workspace()).buffers(allocate_ranking, len(masks))
     _rank(masks, occupied, ranking)
     return ranking

@@ -6,7 +6,6 @@ clear: a little more than half the car's width. It knows nothing of how a vehicl
 
 from __future__ import annotations
 
-import functools
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ from planners.world.arrays import Floats
 from planners.world.geometry.occupancy import CELL, GRID, Bits
 from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
+from planners.world.workspace import Workspace
 
 _LEFT: Final = BOUNDS[0]
 _BOTTOM: Final = BOUNDS[1]
@@ -24,7 +24,7 @@ _NONE: Final = np.uint64(0)
 
 
 class Flood(NamedTuple):
-    """Buffers of the search, one set a process; rows of cells as bits, an empty row below and above."""
+    """Buffers of the search: rows of cells as bits, with an empty row below and one above."""
 
     waves: Bits  # [GRID^2, GRID + 2] the cells that are so many steps from the goal disc
     free: Bits  # [GRID + 2] free cells
@@ -32,9 +32,8 @@ class Flood(NamedTuple):
     way: Floats  # [GRID^2, 2] metres
 
 
-@functools.lru_cache(maxsize=1)
 def allocate_flood() -> Flood:
-    """Buffers for one search at a time."""
+    """Buffers for one search at a time, all cells unset."""
     rows = GRID + 2
     return Flood(
         np.zeros((GRID * GRID, rows), np.uint64),
@@ -139,12 +138,25 @@ def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, way: Float
 
 
 def grid_path(
-    occupied: Bits, start: tuple[float, float], goal: tuple[float, float], radius: float
+    occupied: Bits,
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    radius: float,
+    workspace: Workspace | None = None,
 ) -> Floats | None:
-    """The shortest way ``[M, 2]`` over a problem's occupied cells ``[64]`` from a place to a disc, in metres.
+    """Find the shortest path over a problem's free cells from a point to a disc.
 
-    None when the two are not connected there. The points are cell centres; the array is the caller's own.
+    Args:
+        occupied: ``[64]`` the cells that are not free.
+        start: x, y in metres.
+        goal: x, y of the disc's centre in metres.
+        radius: of the disc, in metres.
+        workspace: the caller's buffers; by default new ones.
+
+    Returns:
+        The centres ``[M, 2]`` of the cells along the path, in metres; None if there is no path.
+
     """
-    flood = allocate_flood()
+    flood = (workspace or Workspace()).buffers(allocate_flood)
     count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, flood)
     return flood.way[:count].copy() if count else None

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planners.search.outcome import Guide
+from planners.search.query import Guide
 from planners.world.arrays import Floats
 from planners.world.jit import jit
 

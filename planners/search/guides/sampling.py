@@ -4,27 +4,39 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from numba.np.random.generator_core import next_double
+from numpy.random import BitGenerator
 
-from planners.search.outcome import Guide
+from planners.search.query import Guide
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
 
 
 @inlined
-def in_disc(x: float, y: float, radius: float, rng: np.random.Generator) -> tuple[float, float]:
+def uniform(rng: BitGenerator) -> float:
+    """The number from 0 to 1 that a generator with these random bits would draw next.
+
+    Kernels take the bits of a generator, since Numba leaks a reference to a generator with each call of a
+    kernel that counts no references.
+    """
+    number: float = next_double(rng)
+    return number
+
+
+@inlined
+def in_disc(x: float, y: float, radius: float, rng: BitGenerator) -> tuple[float, float]:
     """A uniform point of the disc around (x, y), metres."""
-    angle = 2.0 * math.pi * rng.random()
-    r = radius * math.sqrt(rng.random())
+    angle = 2.0 * math.pi * uniform(rng)
+    r = radius * math.sqrt(uniform(rng))
     return x + r * math.cos(angle), y + r * math.sin(angle)
 
 
 @inlined
-def in_bounds(bounds: Floats, rng: np.random.Generator) -> tuple[float, float]:
+def in_bounds(bounds: Floats, rng: BitGenerator) -> tuple[float, float]:
     """A uniform point of the bounds ``[4]``, metres."""
     return (
-        bounds[0] + (bounds[2] - bounds[0]) * rng.random(),
-        bounds[1] + (bounds[3] - bounds[1]) * rng.random(),
+        bounds[0] + (bounds[2] - bounds[0]) * uniform(rng),
+        bounds[1] + (bounds[3] - bounds[1]) * uniform(rng),
     )
 
 
@@ -36,7 +48,7 @@ def guided(
     near_m: float,
     far_m: float,
     lead: int,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> tuple[float, float, float, float]:
     """From where to extend, x, y, and where to, x, y: along way i of the guide with probability b_i.
 
@@ -45,15 +57,15 @@ def guided(
     nearest to the target is extended. (The paper, III-D, draws targets near a plan as it does anywhere. That
     says where to be, but not which way to go on from there, and is slower than no guide: docs/planners.md.)
     """
-    draw = rng.random()
+    draw = uniform(rng)
     for i in range(guide.probabilities.shape[0]):
         draw -= guide.probabilities[i]
         if draw < 0.0:
             first = guide.starts[i]
             count = guide.starts[i + 1] - first
-            chosen = int(rng.random() * count)
-            ahead = min(chosen + 1 + int(rng.random() * lead), count - 1)
-            radius = near_m + (far_m - near_m) * rng.random()
+            chosen = int(uniform(rng) * count)
+            ahead = min(chosen + 1 + int(uniform(rng) * lead), count - 1)
+            radius = near_m + (far_m - near_m) * uniform(rng)
             x, y = in_disc(guide.points[first + chosen, 0], guide.points[first + chosen, 1], radius, rng)
             to_x, to_y = in_disc(guide.points[first + ahead, 0], guide.points[first + ahead, 1], near_m, rng)
             return x, y, to_x, to_y

@@ -6,13 +6,13 @@ checks. Batches are added until the start is connected.
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import BitGenerator
 
-from planners.search.guides.sampling import in_bounds
+from planners.search.guides.sampling import in_bounds, uniform
 from planners.search.structures.clearance import clearance, strip_is_free
 from planners.search.structures.neighbours import (
     Buckets,
@@ -67,9 +67,8 @@ class Roadmap(NamedTuple):
     near_distances: Floats  # [k]
 
 
-@functools.lru_cache(maxsize=2)
 def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
-    """Buffers for ``capacity`` nodes, one set a process and size."""
+    """Buffers for ``capacity`` nodes with edges to ``neighbours`` others each."""
     nodes = np.empty((capacity, 2))
     edges = 2 * capacity * neighbours
     return Roadmap(
@@ -216,7 +215,7 @@ def grow_roadmap(
     settings: RoadmapSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> None:
     """Add ``batch`` draws, then search from the goal again."""
     half_length = 0.5 * settings.body_length_scale * (vehicle.front + vehicle.rear)
@@ -225,7 +224,7 @@ def grow_roadmap(
         if roadmap.counts[NODES] == roadmap.nodes.shape[0]:
             break
         x, y = in_bounds(scene.bounds, rng)
-        heading = 2.0 * math.pi * rng.random()
+        heading = 2.0 * math.pi * uniform(rng)
         roadmap.counts[CHECKS] += 1
         cos = math.cos(heading)
         sin = math.sin(heading)
@@ -242,7 +241,7 @@ def build_roadmap(
     settings: RoadmapSettings,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> bool:
     """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
     roadmap.counts.fill(0)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
+from numpy.random import BitGenerator
 
+from planners.search.guides.sampling import uniform
 from planners.search.structures.neighbours import (
     Buckets,
     Indices,
@@ -61,9 +62,8 @@ NO_LEAD = np.empty((0, 2))
 BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
-@functools.lru_cache(maxsize=1)
 def allocate_tree(capacity: int, state_size: int) -> Tree:
-    """Buffers for ``capacity`` vertices, one set a process."""
+    """Buffers for ``capacity`` vertices of ``state_size`` numbers a state."""
     states = np.empty((capacity, state_size))
     return Tree(
         states,
@@ -137,7 +137,7 @@ def extend(
     settings: Extension,
     vehicle: Vehicle,
     scene: Scene,
-    rng: np.random.Generator,
+    rng: BitGenerator,
 ) -> int:
     """Drive from ``vertex`` towards a target and add what is free; returns the number of new vertices.
 
@@ -150,15 +150,15 @@ def extend(
     state = load(states, vertex, vehicle)
     limit_1, limit_2 = control_limits(vehicle)
     waypoint = tree.waypoints[vertex]
-    steered = rng.random() < settings.steer_probability
+    steered = uniform(rng) < settings.steer_probability
     spread = settings.most_steps - settings.least_steps + 1
     steps = int(length(target_x - state[0], target_y - state[1]) / settings.metres_a_step)
-    steps += settings.least_steps + int(rng.random() * spread)
+    steps += settings.least_steps + int(uniform(rng) * spread)
     desired_speed = (
-        settings.slowest_share + (1.0 - settings.slowest_share) * rng.random()
+        settings.slowest_share + (1.0 - settings.slowest_share) * uniform(rng)
     ) * vehicle.max_speed
-    control_1 = (2.0 * rng.random() - 1.0) * limit_1
-    control_2 = (2.0 * rng.random() - 1.0) * limit_2
+    control_1 = (2.0 * uniform(rng) - 1.0) * limit_1
+    control_2 = (2.0 * uniform(rng) - 1.0) * limit_2
     turn_sum = 0.0
     speed_sum = 0.0
     last_turn = 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 from planners.world.arrays import Floats, Integers
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Problem
+from planners.world.workspace import Workspace
 
 Grid = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint64]]
@@ -32,19 +32,14 @@ class Drawing(NamedTuple):
     spans: Floats  # [2, 64] from and to which x a piece covers each row: scratch
 
 
-@functools.lru_cache(maxsize=2)
-def _allocate(pieces: int) -> Drawing:
+def allocate_drawing(pieces: int) -> Drawing:
+    """Buffers for a drawing of at most so many convex pieces."""
     return Drawing(
         np.empty(GRID, np.uint64),
         np.empty((pieces, GRID), np.uint64),
         np.empty((pieces, 2), np.int32),
         np.empty((2, GRID)),
     )
-
-
-def allocate_drawing(pieces: int) -> Drawing:
-    """Buffers for that many pieces, one set a process."""
-    return _allocate(max(_LEAST_PIECES, 1 << pieces.bit_length()))
 
 
 @inlined
@@ -149,10 +144,17 @@ def draw_occupancy(vertices: Floats, piece_starts: Integers, bounds: Floats) -> 
     return grid
 
 
-def drawing_of(problem: Problem) -> Drawing:
-    """The cells that a canonical problem's obstacles meet; good until the next problem is drawn."""
+def drawing_of(problem: Problem, workspace: Workspace | None = None) -> Drawing:
+    """Draw the cells that a canonical problem's obstacles meet.
+
+    Args:
+        problem: what to draw.
+        workspace: the caller's buffers, which the next drawing overwrites; by default new ones.
+
+    """
     obstacles = problem.obstacles
-    drawing = allocate_drawing(len(obstacles.piece_starts))
+    pieces = max(_LEAST_PIECES, 1 << len(obstacles.piece_starts).bit_length())
+    drawing = (workspace or Workspace()).buffers(allocate_drawing, pieces)
     draw(obstacles.vertices, obstacles.piece_starts, problem.bounds, drawing)
     return drawing
 
@@ -171,7 +173,8 @@ def bits_of(grids: Grid) -> Bits:
 
 def occupancy_of(problem: Problem) -> Grid:
     """The grid ``[64, 64]`` of a canonical problem: 1 where a cell's half-open square is not free."""
-    return grid_of(drawing_of(problem).occupied)
+    vertices, piece_starts, _ = problem.obstacles
+    return draw_occupancy(vertices, piece_starts, np.array(problem.bounds))
 
 
 def pack(grid: Grid) -> Grid:

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.search.structures.tree import SIZE, allocate_tree
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, state_size
+from planners.world.workspace import Workspace
 from tests.worlds import box, problem_of
 
 FOLDER = Path(__file__).parent / "golden"
@@ -22,8 +23,9 @@ LIMITS = Limits(expansions=4, nodes=1000)
 def tree_of(name):
     """What four extensions among two boxes add: each vertex as parent, x, y, heading, speed, steering."""
     problem = problem_of([box(8, 8, 0.4, 2, 1), box(20, 12, 1.0, 3, 1)], "golden")
-    plan(name, problem, generator(0, "golden"), limits=LIMITS)
-    tree = allocate_tree(LIMITS.nodes, state_size(CAR))
+    workspace = Workspace()
+    plan(name, problem, generator(0, "golden"), limits=LIMITS, workspace=workspace)
+    tree = workspace.buffers(allocate_tree, LIMITS.nodes, state_size(CAR))
     return [
         [int(tree.parents[i]), *(round(float(value), 6) for value in tree.states[i])]
         for i in range(tree.counts[SIZE])

@@ -6,12 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.search.outcome import Guide, Limits, Status
+from planners.search.outcome import Status
+from planners.search.query import Guide, Limits
 from planners.search.registry import PLANNERS, plan
 from planners.search.structures.tree import SIZE, allocate_tree
 from planners.world.authority.authority import faults
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, state_size
+from planners.world.workspace import Workspace
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 EVERY = pytest.mark.parametrize("name", PLANNERS)
@@ -86,9 +88,10 @@ def test_a_tree_of_nothing_but_dead_ends_grows_from_its_root(name, half_m):
     ]
     problem = problem_of([box(x, y, 0.0, length, width) for x, y, length, width in walls])
     limits = Limits(expansions=5000)
-    outcome = plan(name, problem, generator(0), limits=limits)
+    workspace = Workspace()
+    outcome = plan(name, problem, generator(0), limits=limits, workspace=workspace)
     assert outcome.status is Status.BUDGET_SPENT
-    tree = allocate_tree(limits.nodes, state_size(CAR))
+    tree = workspace.buffers(allocate_tree, limits.nodes, state_size(CAR))
     parents = tree.parents[1 : tree.counts[SIZE]]
     assert (parents >= 0).all()
     assert (np.abs(tree.states[: tree.counts[SIZE], :2]) < half_m).all()

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.search.outcome import Status
+from planners.search.query import Query
 from planners.search.registry import PLANNERS, plan
 from planners.search.repair import blocked_states, free_prefix, repair
 from planners.search.tracking import ARRIVED, BLOCKED, TRACKING, track
@@ -15,6 +16,7 @@ from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, VEHICLES
+from planners.world.workspace import Workspace
 from tests.worlds import box, problem_of, strewn
 
 EVERY = pytest.mark.parametrize("name", PLANNERS)
@@ -34,9 +36,8 @@ def with_boxes_on(stored, places, half=1.5):
 def repaired(name, problem, stored, seed=0):
     scene = scene_of(problem)
     blocked, _ = blocked_states(stored, scene)
-    return repair(
-        name, problem, stored, blocked, drawing_of(problem).occupied, scene, generator(seed)
-    ), blocked
+    query = Query(problem, generator(seed), scene, Workspace())
+    return repair(name, query, stored, blocked, drawing_of(problem).occupied), blocked
 
 
 @given(seed=st.integers(0, 20), count=st.integers(0, 60))
@@ -100,8 +101,8 @@ def test_plans_of_every_vehicle_are_repaired_and_pass_the_authority(vehicle):
         problem = with_boxes_on(stored, (0.55,), 1.0)
         scene = scene_of(problem)
         blocked, _ = blocked_states(stored, scene, vehicle)
-        occupied = drawing_of(problem).occupied
-        outcome = repair("gust", problem, stored, blocked, occupied, scene, generator(seed), vehicle)
+        query = Query(problem, generator(seed), scene, Workspace(), vehicle=vehicle)
+        outcome = repair("gust", query, stored, blocked, drawing_of(problem).occupied)
         done.append(outcome.plan is not None)
         if outcome.plan is not None:
             assert faults(problem, outcome.plan, vehicle) == []

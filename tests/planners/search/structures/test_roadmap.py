@@ -34,7 +34,7 @@ def build(problem, settings, seed=0):
     roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
     goal = np.array([*problem.goal, problem.goal_radius])
     start = np.array([*problem.start, 0.0, 0.0])
-    joined = build_roadmap(roadmap, start, goal, settings, CAR, scene, generator(seed))
+    joined = build_roadmap(roadmap, start, goal, settings, CAR, scene, generator(seed).bit_generator)
     return roadmap, joined, scene
 
 

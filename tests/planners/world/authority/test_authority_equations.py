@@ -26,7 +26,7 @@ def test_a_step_follows_the_differential_equations(vehicle: Vehicle, seed: int) 
     exact = exact_motion(state, controls, np.array([vehicle.dt]), vehicle)[0]
     again = simulate_again(state, controls[np.newaxis], vehicle)
     assert again.shape == (2, state_size(vehicle))
-    assert np.abs(again[1] - exact).max() < 5e-5  # m, rad: what one RK4 step may err
+    assert np.abs(again[1] - exact).max() < 1e-4  # m, rad: what one RK4 step may err
 
 
 @each_vehicle

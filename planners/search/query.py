@@ -1,0 +1,52 @@
+"""What a planner is asked: the problem, what may guide it, when it gives up, and the buffers it may use."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.collision import Scene
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.workspace import Workspace
+
+
+class Guide(NamedTuple):
+    """Paths to sample around: path i with probability b_i, else the goal, else anywhere."""
+
+    points: Floats  # [M, 2] metres, about a metre apart: the points of all paths, one path after another
+    starts: Integers  # [k + 1] path i owns points[starts[i] : starts[i + 1]]
+    probabilities: Floats  # [k] b_1 > ... > b_k
+    goal_probability: float
+    # what remains to 1 is b_other
+
+
+NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When to give up. Expansions decide the result; seconds only guard against a machine's bad day."""
+
+    expansions: int = 20_000
+    nodes: int = 400_000  # tree vertices at once
+    seconds: float = 30.0
+    bound_s: float = math.inf  # only plans that take less time than this count as solutions
+
+
+@dataclass(frozen=True, eq=False)
+class Query:
+    """One problem for a planner."""
+
+    problem: Problem
+    rng: np.random.Generator
+    scene: Scene  # the problem's obstacles, ready for collision checks
+    workspace: Workspace
+    guide: Guide | None = None
+    limits: Limits = field(default_factory=Limits)
+    vehicle: Vehicle = CAR
+    prefix: Plan | None = None  # a free drive from the problem's start, from which the search goes on

@@ -1,0 +1,31 @@
+"""What importing the kernels leaves alone: Numba, for all other code of the process."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+OTHERS = """
+import numba, numpy as np
+from numba.core import pythonapi
+
+def draw(rng):
+    return rng.random()
+
+def state():
+    compiled = numba.njit(cache=True)(draw)
+    converters = [dict(each.functions) for each in (pythonapi._boxers, pythonapi._unboxers)]
+    return numba.config.CACHE_DIR, compiled._cache.cache_path, converters
+
+before = state()
+import planners.solve
+assert state() == before
+assert numba.njit(draw)(np.random.default_rng(1)) == draw(np.random.default_rng(1))
+"""
+
+
+def test_importing_the_kernels_leaves_numba_as_it_is_for_others(tmp_path, monkeypatch):
+    script = tmp_path / "others.py"
+    script.write_text(OTHERS)
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
