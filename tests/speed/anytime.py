@@ -23,6 +23,7 @@ from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.view import View
+from planners.world.workspace import Workspace
 from tests.speed.assists import MEASURING, memory_of
 
 COUNT = 30  # problems a class
@@ -49,7 +50,7 @@ def report(console: Console, picture: Path | None = None) -> None:
     for moment in SHOWN:
         table.add_column(f"{1e3 * moment:.0f} ms", justify="right")
     table.add_column("searches won", justify="right")
-    curves = []
+    curves, workspace = [], Workspace()
     for name in CLASSES:
         memory = memory_of(name)
         problems = [problem_class(name).draw(MEASURING, index) for index in range(COUNT)]
@@ -60,8 +61,9 @@ def report(console: Console, picture: Path | None = None) -> None:
                 scene = scene_of(problem)
                 found = recall(memory, View(problem), default_recall(memory), 5).free
                 known = memory.plans[found] if found >= 0 else None
-                made["nothing"].append(improve(planner, problem, seconds=SECONDS, scene=scene))
-                made["memory"].append(improve(planner, problem, known, seconds=SECONDS, scene=scene))
+                given = {"seconds": SECONDS, "scene": scene, "workspace": workspace}
+                made["nothing"].append(improve(planner, problem, **given))
+                made["memory"].append(improve(planner, problem, known, **given))
             for start, results in made.items():
                 best = durations(results, np.array(SHOWN))
                 cells = [_cell(best[:, k]) for k in range(len(SHOWN))]

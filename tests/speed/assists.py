@@ -35,6 +35,7 @@ from planners.world.classes.problem_classes import CLASSES, ProblemClass, proble
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
 from storage.tables.configurations import Configuration
@@ -129,16 +130,25 @@ def measure(
 ) -> Rows:
     """Attempts of every configuration on every problem, those of one problem next to each other."""
     rows: Rows = {each: [] for each in asked}
+    workspace = Workspace()
     for problem in problems[:5]:  # compiled or loaded now, not while the clock runs
         for assist, strategy, k in asked:
-            solve(problem, planner, assist, max(k, 1), memory, MEASURING, strategy=strategy)
+            solve(
+                *(problem, planner, assist, max(k, 1), memory, MEASURING),
+                strategy=strategy,
+                workspace=workspace,
+            )
     gc.collect()
     gc.disable()
     for number, problem in enumerate(track(problems, description=description, transient=True)):
         first = number % len(asked)
         for each in asked[first:] + asked[:first]:
             assist, strategy, k = each
-            made = solve(problem, planner, assist, max(k, 1), memory, MEASURING, strategy=strategy)
+            made = solve(
+                *(problem, planner, assist, max(k, 1), memory, MEASURING),
+                strategy=strategy,
+                workspace=workspace,
+            )
             rows[each].append(made)
     gc.enable()
     return rows

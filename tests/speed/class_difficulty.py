@@ -21,6 +21,7 @@ from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
+from planners.world.workspace import Workspace
 
 STORED = 100  # plans that the oracle may choose from
 STORED_BY = "follow"  # the planner that made them
@@ -67,12 +68,12 @@ def oracle(draw: Draw, plans: list[Plan], fresh: int) -> tuple[float, float]:
 def baseline(planner: str, draw: Draw, fresh: int) -> Baseline:
     """The planner from scratch on the fresh problems, failures included."""
     outcomes: list[Outcome] = []
-    seconds = []
+    seconds, workspace = [], Workspace()
     for index in range(fresh):
         problem = draw(FRESH_SEED, index)
         rng = generator(FRESH_SEED, problem.id, planner)
         began = perf_counter()
-        outcomes.append(plan(planner, problem, rng))
+        outcomes.append(plan(planner, problem, rng, workspace=workspace))
         seconds.append(perf_counter() - began)
     return Baseline(
         float(np.mean([one.status is Status.SOLVED for one in outcomes])),

@@ -27,7 +27,7 @@ from planners.memory.curation import coverage, curate
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import Flags, sweep_plans
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats

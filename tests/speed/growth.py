@@ -39,6 +39,7 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.view import View
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory, save_memory
 from tests.speed.assists import KEPT, MEASURING
 from tests.speed.many_plans import collected_memory, collected_plans, place_of, synthetic_memory
@@ -84,6 +85,7 @@ def add_recalls(rows: Table, memory: Memory, problems: list[Problem], free: Flag
     """A row a strategy, those of one problem next to each other."""
     seconds: dict[str, list[float]] = {name: [] for name in RECALLS}
     hits = {(name, k): 0 for name in RECALLS for k in (1, K)}
+    workspace = Workspace()
     for name in RECALLS:  # compiled or loaded now
         recall(memory, View(problems[0]), name, K, generator(MEASURING))
     gc.collect()
@@ -92,7 +94,7 @@ def add_recalls(rows: Table, memory: Memory, problems: list[Problem], free: Flag
         for name in RECALLS[number % len(RECALLS) :] + RECALLS[: number % len(RECALLS)]:
             rng = generator(MEASURING, problem.id)
             began = thread_time()
-            recall(memory, View(problem), name, K, rng)
+            recall(memory, View(problem, workspace), name, K, rng)
             seconds[name].append(thread_time() - began)
             for k in (1, K):
                 found = recall(memory, View(problem), name, k, generator(MEASURING, problem.id))

@@ -14,7 +14,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.search.structures.neighbours import nearest
 from planners.search.structures.tree import SIZE, Tree, allocate_tree
@@ -25,6 +25,7 @@ from planners.world.jit import lean
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import load, step
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
+from planners.world.workspace import Workspace
 from tests.speed.statistics import with_interval
 
 SEED = 77
@@ -76,6 +77,7 @@ def report(console: Console) -> None:
     """Print the table."""
     table = Table(title=f"Kernels on RRT's trees, {COUNT} problems a class", title_justify="left")
     table.add_column("class")
+    workspace = Workspace()
     for name in ("check ns", "step + check ns", "nearest ns", "M steps/s", "M steps/s in RRT"):
         table.add_column(f"{name} [95 %]", justify="right")
     for name in CLASSES:
@@ -84,9 +86,9 @@ def report(console: Console) -> None:
             problem = problem_class(name).draw(SEED, index)
             scene = scene_of(problem)
             began = thread_time()
-            outcome = plan("rrt", problem, generator(SEED, problem.id))
+            outcome = plan("rrt", problem, generator(SEED, problem.id), workspace=workspace)
             searched = thread_time() - began
-            tree = allocate_tree(Limits().nodes, state_size(CAR))
+            tree = workspace.buffers(allocate_tree, Limits().nodes, state_size(CAR))
             size = int(tree.counts[SIZE])
             places = generator(SEED, "places").uniform(scene.bounds[:2], scene.bounds[2:], (QUERIES, 2))
             rows.append((

@@ -27,6 +27,7 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.view import View
+from planners.world.workspace import Workspace
 from tests.speed.assists import memory_of
 
 MEASURING = 81  # seed of the problems here
@@ -36,6 +37,7 @@ PARTS = ("occupancy", "encode", "recall", "scene", "check")
 PLANNER = "gust"
 PLANNED = 300  # problems a class that are planned for
 ASSISTS = ("none", "closed", "open", "repair")
+WORKSPACE = Workspace()  # for every attempt: all are made in one thread
 
 
 def hits(memory: Memory, problems: list[Problem], strategy: str) -> list[tuple[bool, bool]]:
@@ -59,7 +61,7 @@ def latencies(memory: Memory, problems: list[Problem]) -> dict[str, list[dict[st
         first = number % len(RECALLS)
         for strategy in RECALLS[first:] + RECALLS[:first]:
             rng = generator(MEASURING, problem.id) if strategy == "random" else None
-            view = View(problem)
+            view = View(problem, WORKSPACE)
             recall(memory, view, strategy, TOP_K, rng)
             rows[strategy].append({"whole": perf_counter() - view.began, **view.seconds})
     gc.enable()
@@ -96,7 +98,7 @@ def _plan(table: Table, name: str, memory: Memory, problems: list[Problem]) -> N
     for number, problem in enumerate(problems):
         first = number % len(ASSISTS)
         for assist in ASSISTS[first:] + ASSISTS[:first]:
-            made = solve(problem, PLANNER, assist, TOP_K, memory, MEASURING)
+            made = solve(problem, PLANNER, assist, TOP_K, memory, MEASURING, workspace=WORKSPACE)
             seconds[assist].append(made.planning_seconds)
     alone = np.mean(seconds["none"])
     for assist, each in seconds.items():

@@ -26,6 +26,7 @@ from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.places.data_folder import open_data_folder
 from storage.places.files import read_text
@@ -109,10 +110,16 @@ def side_by_side(
 ) -> list[list[Attempt]]:
     """The attempts at each problem, in the order of the ways."""
 
+    workspace = Workspace()
+
     def attempt(problem: Problem, way: Way) -> Attempt:
         assist, recall, size = way
         known = memories.get(size)
-        return solve(problem, planner, assist, TOP_K if known else 0, known, SEED, strategy=recall)
+        return solve(
+            *(problem, planner, assist, TOP_K if known else 0, known, SEED),
+            strategy=recall,
+            workspace=workspace,
+        )
 
     compile_assists(next(iter(memories.values())).vehicle)
     for way in ways:

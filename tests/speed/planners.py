@@ -20,17 +20,21 @@ from rich.table import Table
 from planners.search.follow import FollowSettings, follow
 from planners.search.gust import GustSettings, gust
 from planners.search.outcome import Outcome, Status
-from planners.search.registry import PLANNERS
+from planners.search.query import Query
+from planners.search.registry import PLANNERS, plan
 from planners.search.structures.roadmap import RoadmapSettings
 from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.workspace import Workspace
 from tests.speed.statistics import with_interval
 
 SEED = 77  # the tuning seed
 COUNT = 200  # problems a class
 BATCHES = (40, 60, 100, 150, 200, 300, 500)  # nodes drawn before the first search for a way
 NEIGHBOURS = (8, 12)
+WORKSPACE = Workspace()  # for every attempt: all are made in one thread
 
 Run = Callable[[Problem, np.random.Generator], Outcome]
 
@@ -88,11 +92,11 @@ def sized(roadmap: RoadmapSettings) -> dict[str, Run]:
 def _call(
     planner: Callable[..., Outcome], settings: object, problem: Problem, rng: np.random.Generator
 ) -> Outcome:
-    return planner(problem, settings, rng)
+    return planner(Query(problem, rng, scene_of(problem), WORKSPACE), settings)
 
 
 def _default(name: str, problem: Problem, rng: np.random.Generator) -> Outcome:
-    return PLANNERS[name](problem, rng=rng)
+    return plan(name, problem, rng, workspace=WORKSPACE)
 
 
 def report(console: Console) -> None:

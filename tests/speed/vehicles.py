@@ -23,12 +23,14 @@ from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+from planners.world.workspace import Workspace
 from storage.places.files import whole_file
 from tests.speed.planners import SEED, measure
 from tests.speed.statistics import with_interval
 
 COUNT = 200  # problems a class
 PICTURED, PICTURED_PLANNER = 2, "follow"
+WORKSPACE = Workspace()  # for every attempt: all are made in one thread
 OTHERS = {name: vehicle for name, vehicle in VEHICLES.items() if vehicle != CAR}
 
 Rows = list[tuple[Outcome, float]]  # of each problem: what came out, and seconds
@@ -97,7 +99,7 @@ def report(console: Console, count: int = COUNT) -> None:
 
 
 def _plan(planner: str, vehicle: Vehicle, problem: Problem, rng: np.random.Generator) -> Outcome:
-    return plan(planner, problem, rng, vehicle=vehicle)
+    return plan(planner, problem, rng, vehicle=vehicle, workspace=WORKSPACE)
 
 
 def _mean_seconds(rows: Rows) -> float:

@@ -13,13 +13,14 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from planners.search.outcome import Limits
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator
+from planners.world.workspace import Workspace
 from tests.speed.peers.answer import Answer, MissingError
 from tests.speed.peers.native import Native
 from tests.speed.peers.problems import WORLDS, problem_sets
@@ -31,6 +32,7 @@ COUNT: Final = 100  # problems a set
 WHEEL_COUNT: Final = 10  # of these for OMPL in Python: it takes up to seconds for one
 LIMIT_S: Final = 5.0  # on the wall's clock, for each attempt; ours also fail when their vertices are used up
 MARK: Final = "KPIECE1, C++"
+WORKSPACE = Workspace()  # for every attempt: all are made in one thread
 COLUMNS: Final = ("runs", "solved", "median [95 %]", "mean", "90 %", "checks", "drive s", "mean x", "90 % x")
 
 Run = Callable[[Problem, int], Answer]  # (problem, seed)
@@ -66,7 +68,7 @@ def ours(name: str, problem: Problem, seed: int) -> Answer:
     rng = generator(seed, problem.id, name)
     limits = Limits(expansions=10**9, seconds=LIMIT_S)
     began = thread_time()
-    outcome = plan(name, problem, rng, limits=limits)
+    outcome = plan(name, problem, rng, limits=limits, workspace=WORKSPACE)
     return Answer(outcome.plan, thread_time() - began, outcome.collision_checks)
 
 
