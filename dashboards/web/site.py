@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -38,7 +38,7 @@ _DRAWN: Final = re.compile(r"(.+)-(easy|standard|hard)-(\d{1,12})-(\d{1,9})")
 
 
 class Site:
-    """One data folder. Planning uses buffers that a process has once, so it takes turns (``planning``)."""
+    """One data folder."""
 
     def __init__(self, data: DataFolder, retrainings: Retrainings) -> None:
         """Nothing is read yet. ``retrainings``: what the registry knows; NoticeError: it cannot tell."""
@@ -46,17 +46,6 @@ class Site:
         self._retrainings = retrainings
         self._kept: OrderedDict[Hashable, Any] = OrderedDict()
         self._lock = threading.Lock()
-        self._turn = threading.Lock()
-
-    @contextmanager
-    def planning(self) -> Iterator[None]:
-        """Wait for one's turn; a NoticeError after some seconds."""
-        if not self._turn.acquire(timeout=10.0):
-            raise NoticeError("Other planning takes long; try again in a moment.", "Busy")
-        try:
-            yield
-        finally:
-            self._turn.release()
 
     def kept(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """What was made for a key, or what is made now, while others go on; the least used is forgotten."""

@@ -23,6 +23,7 @@ from planners.world.problem import (
 )
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
 from tasks.settings.run_settings import COLLECTOR
 
 EMPTY: Final = Problem(
@@ -32,7 +33,8 @@ EMPTY: Final = Problem(
 
 def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequence[str] = RECALLS) -> None:
     """What a memory needs, by each strategy of recall: of copies of one plan, with a box put on it."""
-    plan = solve(EMPTY, planner, vehicle=vehicle).plan
+    workspace = Workspace()
+    plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan
     if plan is None:
         return
     plans = [plan] * (TRIED_DRAWN + 1)  # so that the last is checked with the scene
@@ -48,4 +50,9 @@ def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequ
     blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
     for strategy in strategies:
         for assist in ("open", "repair"):
-            solve(blocked, planner, assist, 1, memory, vehicle=vehicle, strategy=strategy)
+            solve(
+                *(blocked, planner, assist, 1, memory),
+                vehicle=vehicle,
+                strategy=strategy,
+                workspace=workspace,
+            )

@@ -16,6 +16,7 @@ from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, tu
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
+from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.exchange.problems import read_problems
 from storage.places.files import whole_file
@@ -85,6 +86,7 @@ class Assistant:
         self._place = None if assist in WITHOUT_MEMORY or memory is None else _place_of(str(memory))
         self._memories: dict[str, Memory] = {}
         self.recall = recall
+        self._workspace = Workspace()
 
     def memory_of(self, class_name: str) -> Memory | None:
         """The memory for problems of a class: its own, else the combined, else the only one there is."""
@@ -122,6 +124,7 @@ class Assistant:
             self.seed if seed is None else seed,
             vehicle=self.vehicle,
             strategy=self.recall,
+            workspace=self._workspace,
         )
 
     def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
@@ -129,7 +132,7 @@ class Assistant:
         canonical, alignment = to_canonical(problem)
         attempt = self.attempt(canonical)
         if self.improve_seconds > 0.0:
-            attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle)
+            attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle, self._workspace)
         check_attempt(canonical, attempt, set(), self.vehicle)
         if attempt.length_m is not None:
             attempt = replace(attempt, length_m=problem.scale * attempt.length_m)

@@ -8,10 +8,10 @@ Everything is loaded, checked and compiled before ``load_planner`` returns.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 from planners.memory.recall import RECALLS, Memory, default_recall
@@ -20,6 +20,7 @@ from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
@@ -45,7 +46,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class RobotPlanner:
-    """Plans for one problem at a time, from whatever thread."""
+    """Plans for a problem in whatever thread it is asked; several threads plan at the same time."""
 
     memory: Memory
     planner: str
@@ -54,7 +55,7 @@ class RobotPlanner:
     recall: str
     seed: int
     judged: bool
-    _turn: Lock = field(default_factory=Lock, repr=False)  # kernels draw into buffers of the process
+    _idle: list[Workspace] = field(default_factory=list, repr=False)  # that no thread uses at the moment
 
     def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
         """Plan for a problem, or for the contract's object (or its JSON text) that describes one.
@@ -67,17 +68,30 @@ class RobotPlanner:
             problem = _parsed(problem)
         if not isinstance(problem, Problem):
             problem = problem_of(problem, "problem", vehicle)
-        with self._turn:
-            asked, alignment = to_canonical(problem)
+        asked, alignment = to_canonical(problem)
+        with self._workspace() as workspace:
             attempt = solve(
                 *(asked, self.planner, self.assist, self.top_k, self.memory, self.seed),
                 vehicle=vehicle,
                 strategy=self.recall,
+                workspace=workspace,
             )
-            if self.judged:
-                check_attempt(asked, attempt, set(), vehicle)
+        if self.judged:
+            check_attempt(asked, attempt, set(), vehicle)
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
         return Answer(problem.id, attempt.status, attempt.source, plan, attempt.planning_seconds)
+
+    @contextmanager
+    def _workspace(self) -> Iterator[Workspace]:
+        """Lend a workspace to one thread: one that another has given back, or a new one."""
+        try:
+            workspace = self._idle.pop()
+        except IndexError:
+            workspace = Workspace()
+        try:
+            yield workspace
+        finally:
+            self._idle.append(workspace)
 
 
 def _parsed(text: str) -> Any:

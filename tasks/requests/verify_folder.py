@@ -23,6 +23,7 @@ from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of, pack
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
+from planners.world.workspace import Workspace
 from storage.archives.encoders import load_encoder
 from storage.archives.hallucinators import load_hallucinator
 from storage.archives.memories import load_memory
@@ -188,6 +189,7 @@ def _attempts(
         for name, made in {(row["memory"], row["run_id"]) for row in rows if row["memory"]}
     }
     again = plans = 0
+    workspace = Workspace()
     for place, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
         if generator(settings.seed, "verify", identity).random() >= sample:
             continue
@@ -206,6 +208,7 @@ def _attempts(
                 row["seed"],
                 vehicle=vehicle,
                 strategy=row["recall"],
+                workspace=workspace,
             )
             check_attempt(problem, attempt, set(), vehicle)
             again += 1

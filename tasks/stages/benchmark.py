@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import vehicle_named
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.tables.attempts import write_attempts
 from storage.tables.shards import shard_is_done
@@ -52,11 +53,16 @@ def benchmark_chunk(chunk: Chunk) -> dict[str, Any]:
     places = {memory: chunk.run.memory(memory) for memory in memories_of(settings, name)}
     memories = {memory: load_memory(place, vehicle) for memory, place in places.items()}
 
+    workspace = Workspace()
+
     def attempt(problem: Problem, asked: Configuration) -> Attempt:
         memory = memories[asked.memory] if asked.memory else None
         assist, top_k, strategy = asked.assist
         return solve(
-            problem, asked.planner, assist, top_k, memory, settings.seed, vehicle=vehicle, strategy=strategy
+            *(problem, asked.planner, assist, top_k, memory, settings.seed),
+            vehicle=vehicle,
+            strategy=strategy,
+            workspace=workspace,
         )
 
     rows = side_by_side(

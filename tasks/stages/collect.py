@@ -8,6 +8,7 @@ from typing import Any, Final
 from planners.memory.plans.experience import Experience
 from planners.solve import solve
 from planners.world.vehicles.vehicle import vehicle_named
+from planners.world.workspace import Workspace
 from storage.tables.experiences import copy_experiences, write_experiences
 from storage.tables.shards import metadata_of, shard_is_done
 from tasks.attempts.attempt_rows import check_attempt
@@ -38,10 +39,11 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
     planner, seed = chunk.settings.collector, chunk.settings.seed
     vehicle = vehicle_named(chunk.settings.vehicle)
+    workspace = Workspace()
     experiences, seconds = [], []
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
-        attempt = solve(problem, planner, seed=seed, vehicle=vehicle)
+        attempt = solve(problem, planner, seed=seed, vehicle=vehicle, workspace=workspace)
         if attempt.plan is not None:
             check_attempt(problem, attempt, set(), vehicle)
             experiences.append(Experience(problem, attempt.plan, vehicle))

@@ -14,6 +14,7 @@ from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.authority.authority import faults
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import vehicle_named
+from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.experiences import read_experiences
@@ -66,12 +67,17 @@ def judge_chunk(chunk: Chunk) -> dict[str, Any]:
         if way[2:] not in memories:
             memories[way[2:]] = load_memory(place(way.memory), vehicle)
 
+    workspace = Workspace()
+
     def attempt(problem: Problem, way: Way) -> Attempt:
         assist, top_k, strategy = way.assist
         known = memories[way[2:]]
         strategy = strategy or default_recall(memories[way.memory, challenger])  # both alike
         return solve(
-            problem, way.planner, assist, top_k, known, settings.seed, vehicle=vehicle, strategy=strategy
+            *(problem, way.planner, assist, top_k, known, settings.seed),
+            vehicle=vehicle,
+            strategy=strategy,
+            workspace=workspace,
         )
 
     held = held_back(chunk.data, settings, name)

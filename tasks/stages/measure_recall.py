@@ -54,7 +54,7 @@ def recall_chunk(chunk: Chunk) -> dict[str, Any]:
     problems = _held_out(chunk) if chunk.index == 0 else _fresh(chunk, memories[0])
     rows: list[dict[str, Any]] = []
     for asked in problems:
-        by_cells = rank_by_cells(memories[0].masks, bits_of(asked.grid)).order.copy()
+        by_cells = rank_by_cells(memories[0].masks, bits_of(asked.grid)).order
         rows.append(_row(chunk, protocol, asked, "mask", 0, by_cells, False))
         if by_popularity is not None:
             rows.append(_row(chunk, protocol, asked, "popularity", 0, by_popularity, False))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from threading import Lock
 from typing import Any, Final
 
 import pandas as pd
@@ -73,7 +72,6 @@ class MemoryModel(PythonModel):
         """The same, of an archive that need not be MLflow's."""
         self.vehicle = vehicle_named(vehicle)
         self.memory: Memory = load_memory(archive, self.vehicle)
-        self._turn = Lock()  # kernels draw into buffers of the process, and servers call from many threads
 
     def predict(
         self,
@@ -92,12 +90,11 @@ class MemoryModel(PythonModel):
         top_k = (params or {}).get("top_k", TOP_K)
         if top_k is None or top_k < 1:
             raise MlflowException(f"top_k is {top_k}: give 1 or more.", INVALID_PARAMETER_VALUE)
-        with self._turn:
-            rows = [
-                row
-                for number, text in enumerate(model_input["problem"], start=1)
-                for row in self._ranked(self._problem(text, number), top_k)
-            ]
+        rows = [
+            row
+            for number, text in enumerate(model_input["problem"], start=1)
+            for row in self._ranked(self._problem(text, number), top_k)
+        ]
         return pd.DataFrame(rows, columns=SIGNATURE.outputs.input_names())
 
     def _problem(self, text: object, number: int) -> Problem:

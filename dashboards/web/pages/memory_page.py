@@ -79,8 +79,7 @@ def memory(site: Site, asked: Asked) -> Page:
     placed = _placed(site, run, name, known)
     embedding = None
     if drawn is not None:
-        with site.planning():
-            embedding = known.encoder(occupancy_of(drawn))
+        embedding = known.encoder(occupancy_of(drawn))
         values["near"] = _near(site, run, name, known, drawn, embedding, placed)
     if placed is not None:
         charts.append(_map_chart(run, name, known, placed, asked_plan, embedding))
@@ -291,13 +290,11 @@ def _near(
     """The plans that the encoder ranks first for a problem, and the problems it places nearest."""
     scores = known.vectors[1:] @ embedding + known.biases[1:]
     order = np.argsort(-scores)[:NEAREST]
-    with site.planning():
-        scene = scene_of(drawn)
+    scene = scene_of(drawn)
     plans = []
     for rank, i in enumerate(order.tolist(), start=1):
         plan = turned(known.plans[i], drawn.start[2])
-        with site.planning():
-            blocked, _ = blocked_states(plan, scene, known.vehicle)
+        blocked, _ = blocked_states(plan, scene, known.vehicle)
         layer = recalled_plan(plan, blocked, i, rank, False)
         told = "free" if not blocked.any() else f"{int(blocked.sum())} of {len(blocked)} states in collision"
         plans.append(
