@@ -75,6 +75,7 @@ def password_set(folder: DataFolder) -> Iterator[str]:
 
 def mlflow_app(data: DataFolder) -> Guard:
     """MLflow's server behind the guard; it hands out artifacts, so that clients need no access to them."""
+    os.environ["MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE"] = "true"  # read on import; the guard does more
     from mlflow.server import constants
 
     store = os.environ.get("MLFLOW_BACKEND_STORE_URI")
@@ -90,7 +91,6 @@ def mlflow_app(data: DataFolder) -> Guard:
         constants.SERVE_ARTIFACTS_ENV_VAR: "true",
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
         "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # ten processes more, for what nobody here asks of it
-        "MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE": "true",  # the guard asks for more
     }
     from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores

@@ -138,15 +138,17 @@ def test_servers_for_all(place: Path) -> None:
             answers.append(httpx.get(f"{prefect}/admin/version", auth=auth).status_code)
             answers.append(httpx.get(search, auth=auth).status_code)
         answers.append(httpx.get(f"{mlflow}/health").status_code)
-        for url in (f"{prefect}/admin/version", search):
-            for foreign in ({"Origin": EVIL}, {"Host": "evil.example"}):
-                answers.append(httpx.get(url, auth=("robot", SECRET), headers=foreign).status_code)
+        for headers in ({"Origin": EVIL}, {"Host": "evil.example"}, {"Host": "hub", "Origin": "http://hub"}):
+            asked = {"auth": ("robot", SECRET), "headers": headers, "json": {"max_results": 5}}
+            answers.append(httpx.post(f"{prefect}/flows/filter", **asked).status_code)
+            answers.append(httpx.post(f"{mlflow}/api/2.0/mlflow/experiments/search", **asked).status_code)
         return True
 
     ports = ["--prefect-port", "0", "--mlflow-port", "0"]
-    watched = watch(["servers", "--data", str(place / "shared"), *ports], place / "all.log", PLANTED, asked)
+    command = ["servers", "--data", str(place / "shared"), *ports]
+    watched = watch(command, place / "all.log", PLANTED | {"MOTION_MEMORY_HOSTS": "hub"}, asked)
     assert watched.code == 0, watched.output[-2000:]
-    assert answers == [401, 401, 401, 401, 200, 200, 200, 403, 400, 403, 400]
+    assert answers == [401, 401, 401, 401, 200, 200, 200, 403, 403, 400, 400, 200, 200]
     assert {port.process for port in watched.ports} >= {"child"}
     assert_closed("servers", watched)
     assert_nowhere_in(place / "shared")
