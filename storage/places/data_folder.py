@@ -28,6 +28,7 @@ from storage.places.mirror import (
 )
 
 LAYOUT: Final = 1  # one more whenever an older program could no longer read the folder
+OWNER_ONLY: Final = 0o700  # of a folder that is made here; who wants it shared makes it, or uses chmod
 MARK: Final = "motion-memory.json"
 HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}")
@@ -208,7 +209,7 @@ def open_data_folder(path: Path | str) -> DataFolder:
         return _open_remote(local_place(path))
     folder = Path(path).expanduser().absolute()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(OWNER_ONLY, parents=True, exist_ok=True)
         names = [entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)]
     except OSError as error:
         raise _not_writable(folder, error) from None
@@ -230,7 +231,7 @@ def open_data_folder(path: Path | str) -> DataFolder:
 def _open_remote(folder: Path) -> DataFolder:
     """The same of a folder in object storage, by its copy here; asked once a process."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(OWNER_ONLY, parents=True, exist_ok=True)
     except OSError as error:
         raise _not_writable(folder, error) from None
     if fetch(folder / MARK).exists():

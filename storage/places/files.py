@@ -22,10 +22,11 @@ REMOVAL_SECONDS: Final = 0.2
 
 
 @contextmanager
-def whole_file(path: Path, note: str = "") -> Iterator[Path]:
+def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
     """Yield a temporary name beside ``path``; put it in the place of ``path`` once it is on the disk.
 
     Where ``path`` stands for an object (``mirror.py``), it is put into storage first, with the ``note``.
+    Its permissions are those of ``mode`` that the umask leaves.
 
     StorageError: it could not be written (disk full, no permission); ``path`` is as it was.
     """
@@ -36,7 +37,7 @@ def whole_file(path: Path, note: str = "") -> Iterator[Path]:
         temporary = Path(name)
         try:
             yield temporary
-            temporary.chmod(0o666 & ~_umask())
+            temporary.chmod(mode & ~_umask())
             _synchronise(temporary)
             publish(temporary, path, note)
             temporary.replace(path)

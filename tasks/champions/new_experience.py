@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory, save_memory
 from storage.places.data_folder import DataFolder
+from storage.places.scratch import scratch_folder
 from storage.tables.learned_experiences import read_learned, snapshot_ids
 from tasks.fan_out.stage import run_folder
 from tasks.inputs.learned_on_the_job import with_learned
@@ -111,10 +111,10 @@ def _retraining(folder: DataFolder, settings: RunSettings, registry: Registry, f
     number = _next_number(registry)
     asked = with_learned(asked, folder.path, f"retrain-{number:04d}")
     vehicle = vehicle_named(settings.vehicle)
-    with TemporaryDirectory(prefix="motion-memory-") as scratch:
+    with scratch_folder() as scratch:
         archives = {}
         for name, version in against.items():
-            place = Path(scratch) / name
+            place = scratch / name
             place.mkdir()
             archives[name] = registry.fetch(version, str(place))
         asked = replace(

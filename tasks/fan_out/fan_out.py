@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +17,7 @@ from dask.system import CPU_COUNT
 from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
+from storage.places.scratch import scratch_folder
 from tasks.fan_out.certificate import own_certificate
 from tasks.fan_out.progress import progress
 from tasks.fan_out.progress_artifact import progress_artifact
@@ -112,7 +112,7 @@ def _check_encryption(address: str) -> None:
 
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
-    with tempfile.TemporaryDirectory(prefix="motion-memory-") as scratch, dask.config.set(_settings()):
+    with scratch_folder() as scratch, dask.config.set({**_settings(), "temporary-directory": str(scratch)}):
         local = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -120,7 +120,6 @@ def _local(workers: int) -> Iterator[Any]:
             security=own_certificate(),
             dashboard_address="127.0.0.1:0",
             scheduler_kwargs={"dashboard": False},
-            local_directory=scratch,
             silence_logs="CRITICAL",
         )
         try:

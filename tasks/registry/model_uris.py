@@ -12,7 +12,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Final
 
 from planners.memory.recall import Memory
@@ -20,6 +19,7 @@ from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.memories import load_memory
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import folders_here
+from storage.places.scratch import scratch_folder
 from tasks.servers.access import auth_environment
 from tasks.servers.prefect_server import ENVIRONMENT
 from tasks.settings.environment import environment
@@ -57,8 +57,8 @@ def memory_folder(address: str | None) -> Iterator[Path | None]:
     if address is None or not is_model_uri(address):
         yield address if address is None else folders_here(address, "memories")
         return
-    with TemporaryDirectory(prefix="motion-memory-") as scratch:
-        yield download(address, scratch, _tracking_uri(address))
+    with scratch_folder() as scratch:
+        yield download(address, str(scratch), _tracking_uri(address))
 
 
 def memory_digest(folder: Path | None) -> str:

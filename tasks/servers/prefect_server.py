@@ -107,7 +107,7 @@ def set_environment(data: Path) -> None:
     And the password of all servers, where one is set: ours ask for it, and clients send it.
     """
     home = data / "prefect"
-    home.mkdir(parents=True, exist_ok=True)
+    home.mkdir(0o700, parents=True, exist_ok=True)
     folders = {
         "PREFECT_HOME": str(home),
         "PREFECT_LOCAL_STORAGE_PATH": str(home / "results"),

@@ -7,8 +7,6 @@ import math
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import pandas as pd
@@ -16,6 +14,7 @@ import pandas as pd
 from dashboards.statistics.headline import headline, headline_retrieval
 from dashboards.verdicts.promotion import Judgement
 from storage.places.data_folder import open_data_folder
+from storage.places.scratch import scratch_folder
 from tasks.attempts.attempt_rows import commit
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Chunk, run_folder
@@ -156,8 +155,8 @@ def log_judgement(
         log.parameters(run_id, parameters_of(settings) | {"memory": memory})
         if judgement is not None:
             log.metrics(run_id, [_judgement_metrics(judgement)])
-        with TemporaryDirectory(prefix="motion-memory-") as scratch:
-            told = Path(scratch) / "verdict.md"
+        with scratch_folder() as scratch:
+            told = scratch / "verdict.md"
             told.write_text(markdown, encoding="utf-8")
             log.artifacts(run_id, told)
         problems = {str(each) for side in attempts for each in side["problem_id"].unique()}

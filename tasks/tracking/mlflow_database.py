@@ -12,11 +12,13 @@ import sqlite3
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked, whole_file
 from tasks.settings.run_settings import RunError
+
+OWNER_ONLY: Final = 0o600
 
 if TYPE_CHECKING:
     from alembic.script import ScriptDirectory
@@ -42,7 +44,7 @@ def _make(path: Path, artifacts: str) -> None:
     from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
 
     _remove_leftovers(path)
-    with whole_file(path) as temporary:
+    with whole_file(path, mode=OWNER_ONLY) as temporary:
         store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
         store.engine.dispose()
 
@@ -62,7 +64,7 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         ) from None
     _remove_leftovers(path)
     kept = path.with_name(f"{path.name}.{old}")
-    with whole_file(path) as temporary:
+    with whole_file(path, mode=OWNER_ONLY) as temporary:
         with closing(sqlite3.connect(path)) as source, closing(sqlite3.connect(temporary)) as copy:
             source.backup(copy)
         engine = create_engine(f"sqlite:///{temporary}")

@@ -12,11 +12,11 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Final
 
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
+from storage.places.scratch import scratch_folder
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import UsageError
 from tasks.tracking.mlflow_database import ready_database
@@ -170,8 +170,8 @@ class Tracker:
 
         made = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
         self._client.log_outputs(run_id, [LoggedModelOutput(made.model_id, step=0)])
-        with TemporaryDirectory(prefix="motion-memory-") as scratch:
-            folder = Path(scratch) / name
+        with scratch_folder() as scratch:
+            folder = scratch / name
             model = Model(made.artifact_location, run_id)
             model.model_id = model.model_uuid = made.model_id
             save_memory_model(folder, fetch_folder(archive), vehicle, model)

@@ -23,6 +23,13 @@ def test_a_new_folder_is_marked_and_opens_again(tmp_path: Path) -> None:
     assert open_data_folder(folder.path) == folder
 
 
+def test_a_new_folder_is_its_owners_alone_and_an_old_one_as_its_owner_made_it(tmp_path: Path) -> None:
+    assert open_data_folder(tmp_path / "new" / "data").path.stat().st_mode & 0o777 == 0o700
+    (tmp_path / "shared").mkdir()
+    (tmp_path / "shared").chmod(0o750)
+    assert open_data_folder(tmp_path / "shared").path.stat().st_mode & 0o777 == 0o750
+
+
 def test_a_relative_folder_becomes_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert open_data_folder("data").path == tmp_path / "data"

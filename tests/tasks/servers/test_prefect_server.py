@@ -198,3 +198,4 @@ def test_what_the_user_has_set_stays(tmp_path: Path, monkeypatch) -> None:  # ty
     assert (os.environ["PREFECT_HOME"], os.environ["DO_NOT_TRACK"]) == ("/mine", "false")
     assert os.environ["PREFECT_RESULTS_DEFAULT_SERIALIZER"] == "json"
     assert str(tmp_path) in os.environ["PREFECT_API_DATABASE_CONNECTION_URL"]
+    assert (tmp_path / "prefect").stat().st_mode & 0o777 == 0o700  # its database and results are in there

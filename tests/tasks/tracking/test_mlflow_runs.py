@@ -31,5 +31,5 @@ def test_a_command_killed_while_it_makes_the_database_leaves_none_and_the_next_o
     assert not data.mlflow_database.exists()
     seen[0].write_bytes(b"what a killed process could not remove")
     assert Tracker(data).find("run", "run") is None
-    assert data.mlflow_database.exists()
+    assert data.mlflow_database.stat().st_mode & 0o777 == 0o600  # whatever the folder's own says
     assert not seen[0].exists()
