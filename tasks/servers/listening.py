@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from uvicorn import Config
 
 READY_SECONDS: Final = 300.0  # to load, and to compile where nothing was compiled before
-CONNECTIONS: Final = 128  # at once, of a worker that holds whole requests in memory
-KEEP_ALIVE_SECONDS: Final = 30
 STOP_SECONDS: Final = 5  # for requests that are being answered
 HEALTH_SECONDS: Final = 60  # a worker that does not stir for so long is replaced
 
@@ -59,9 +57,11 @@ def end_with_parent() -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
-def config_of(app: Callable[[], Any], workers: int = 1, connections: int | None = None) -> Config:
-    """How Uvicorn is to serve what ``app`` makes; with more ``connections`` at once a worker answers 503."""
+def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
+    """How Uvicorn is to serve what ``app`` makes; connections that owe a request are not waited for."""
     from uvicorn import Config
+
+    from tasks.servers.connections import IDLE_SECONDS, TimedProtocol
 
     return Config(
         app,
@@ -70,8 +70,8 @@ def config_of(app: Callable[[], Any], workers: int = 1, connections: int | None 
         log_level="warning",
         access_log=False,
         server_header=False,
-        limit_concurrency=connections,
-        timeout_keep_alive=KEEP_ALIVE_SECONDS,
+        http=TimedProtocol,
+        timeout_keep_alive=int(IDLE_SECONDS),
         timeout_graceful_shutdown=STOP_SECONDS,
         timeout_worker_healthcheck=HEALTH_SECONDS,
     )
@@ -109,7 +109,7 @@ def serve_with(
                 time.sleep(0.05)
             return not waiting
 
-    supervisor = Workers(config_of(app, workers, CONNECTIONS), [place])
+    supervisor = Workers(config_of(app, workers), [place])
     supervisor.run()
     if supervisor.failed:
         raise RunError("The server did not get ready; what its workers printed says why.")

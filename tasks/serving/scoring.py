@@ -23,6 +23,7 @@ from tasks.tracking.memory_model import TOP_K
 
 PATH: Final = "/invocations"
 MOST_BYTES: Final = 8 << 20  # of a request
+MOST_HELD: Final = 1 << 30  # bytes of all requests together
 MOST_PLANS: Final = 1_000  # problems times top k of a request: some 30 MB of answer
 BODY_SECONDS: Final = 20.0  # for a whole request to arrive
 LONGEST: Final = 400  # characters of a message
@@ -45,19 +46,23 @@ class Scoring:
     def __init__(self, model: PyFuncModel) -> None:
         self._model = model
         self._mlflow = scoring_server.init(model)
+        self._held = 0  # bytes of all requests that are arriving or being answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request; one line of JSON for what is refused."""
         if scope["type"] != "http" or scope["path"] != PATH or scope["method"] != "POST":
             await self._mlflow(scope, receive, send)
             return
+        body = bytearray()
         try:
             _check_headers(dict(scope["headers"]))
-            body = await _body(receive)
-            status, content = 200, await asyncio.to_thread(self.answer, body)
+            await self._read(receive, body)
+            status, content = 200, await asyncio.to_thread(self.answer, bytes(body))
         except RefusedError as error:
             code = "BAD_REQUEST" if error.status == 400 else "INVALID_PARAMETER_VALUE"
             status, content = error.status, orjson.dumps({"error_code": code, "message": str(error)})
+        finally:
+            self._held -= len(body)
         headers = [(b"content-type", b"application/json"), (b"content-length", str(len(content)).encode())]
         await send({"type": "http.response.start", "status": status, "headers": headers})
         await send({"type": "http.response.body", "body": content})
@@ -72,6 +77,25 @@ class Scoring:
                 raise
             raise RefusedError(400, str(error.message).rpartition("Error: ")[2]) from None
         return orjson.dumps({"predictions": plans.to_dict("records")})
+
+    async def _read(self, receive: Receive, body: bytearray) -> None:
+        try:
+            async with asyncio.timeout(BODY_SECONDS):
+                more = True
+                while more:
+                    message = await receive()
+                    if message["type"] == "http.disconnect":
+                        raise RefusedError(400, "The connection ended before the request did.")
+                    part = message.get("body", b"")
+                    body += part
+                    self._held += len(part)
+                    if len(body) > MOST_BYTES:
+                        raise _too_long()
+                    if self._held > MOST_HELD:
+                        raise RefusedError(503, "Too much is asked by too many at once; ask again.")
+                    more = message.get("more_body", False)
+        except TimeoutError:
+            raise RefusedError(408, f"The request did not arrive within {BODY_SECONDS:g} s.") from None
 
     def _asked(self, body: bytes) -> tuple[pd.DataFrame, int]:
         """The table of problems, and how many plans each is to get."""
@@ -124,24 +148,6 @@ def _check_headers(headers: dict[bytes, bytes]) -> None:
     length = headers.get(b"content-length", b"0")
     if length.isdigit() and int(length[:20]) > MOST_BYTES:
         raise _too_long()
-
-
-async def _body(receive: Receive) -> bytes:
-    body = bytearray()
-    try:
-        async with asyncio.timeout(BODY_SECONDS):
-            more = True
-            while more:
-                message = await receive()
-                if message["type"] == "http.disconnect":
-                    raise RefusedError(400, "The connection ended before the request did.")
-                body += message.get("body", b"")
-                if len(body) > MOST_BYTES:
-                    raise _too_long()
-                more = message.get("more_body", False)
-    except TimeoutError:
-        raise RefusedError(408, f"The request did not arrive within {BODY_SECONDS:g} s.") from None
-    return bytes(body)
 
 
 def _too_long() -> RefusedError:

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx
@@ -23,6 +23,7 @@ from tests.tasks.servers.attacks import EVIL
 ROOT = Path(__file__).parents[3]
 SECRET = "robot:s3cret-of-the-fleet"
 NONSENSE = 10_000
+SILENT = 300  # connections, on any number of which requests were answered 503 once
 GROWTH = 24 << 20  # bytes that allocators may add after the first thousand requests
 
 
@@ -68,6 +69,12 @@ def test_it_answers_replaces_a_dead_worker_and_ends_when_asked(memory: Path) -> 
         assert len(answer.json()["predictions"]) == 5
         assert client.get("/ping").status_code == 200
         assert _raw(address, b"\x00\xff nonsense\r\n\r\n").startswith(b"HTTP/1.1 400")
+        with ExitStack() as silent:
+            for _ in range(SILENT):
+                silent.enter_context(_connected(address))
+            among = client.post("/invocations", content=good_request(), headers=JSON)
+            assert among.content == answer.content
+            assert httpx.post(f"{address}/invocations", content=good_request(), headers=JSON).is_success
         (worker,) = [each for each in running.children() if "spawn_main" in " ".join(each.cmdline())]
         worker.kill()
         again = httpx.post(f"{address}/invocations", content=good_request(), headers=JSON, timeout=120)
@@ -135,8 +142,12 @@ def test_ten_thousand_malformed_requests_neither_break_it_nor_fill_its_memory(me
     assert sizes[-1] - sizes[0] < GROWTH, [size >> 20 for size in sizes]
 
 
-def _raw(address: str, message: bytes) -> bytes:
+def _connected(address: str) -> socket.socket:
     host, _, port = address.removeprefix("http://").partition(":")
-    with socket.create_connection((host, int(port)), timeout=10) as connection:
+    return socket.create_connection((host, int(port)), timeout=10)
+
+
+def _raw(address: str, message: bytes) -> bytes:
+    with _connected(address) as connection:
         connection.sendall(message)
         return connection.recv(1000)
