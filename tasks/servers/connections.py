@@ -10,15 +10,27 @@ request is being answered never makes room.
 from __future__ import annotations
 
 import math
+import resource
 from asyncio import TimerHandle, Transport
 from typing import Any, Final
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-MOST: Final = 500  # connections of a process: half the files that a process may usually open
+MOST: Final = 2_000  # connections of a process, some 30 MB; whoever is closed comes again, which costs more
 SHARE: Final = 10  # one of so many makes room at once: to look for it costs as much as to accept
 HEADER_SECONDS: Final = 10.0  # for the headers of a first request
 IDLE_SECONDS: Final = 30.0  # from an answer to the headers of the next request
+
+
+def files_allowed() -> int:
+    """How many files and connections this process may have open."""
+    return resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+
+
+def allow_files() -> None:
+    """Let this process and those that it starts have enough files open for ``MOST`` connections."""
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(files_allowed(), min(2 * MOST, most)), most))
 
 
 class TimedProtocol(H11Protocol):
@@ -34,7 +46,7 @@ class TimedProtocol(H11Protocol):
         """Wait for a request; if connections are too many now, have some make room."""
         super().connection_made(transport)
         self._watch()
-        if len(self.connections) > MOST:
+        if len(self.connections) > min(MOST, files_allowed() // 2):
             self._make_room()
 
     def connection_lost(self, exc: Exception | None) -> None:

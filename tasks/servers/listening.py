@@ -58,11 +58,15 @@ def end_with_parent() -> None:
 
 
 def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
-    """How Uvicorn is to serve what ``app`` makes; connections that owe a request are not waited for."""
+    """How Uvicorn is to serve what ``app`` makes; connections that owe a request are not waited for.
+
+    Also lets this process open as many files as its connections need.
+    """
     from uvicorn import Config
 
-    from tasks.servers.connections import IDLE_SECONDS, TimedProtocol
+    from tasks.servers.connections import IDLE_SECONDS, TimedProtocol, allow_files
 
+    allow_files()
     return Config(
         app,
         factory=True,

@@ -18,6 +18,7 @@ from dashboards.web.retrained import Retrained, Retrainings
 from storage.places.data_folder import MARK, DataFolder, open_data_folder
 from tasks.registry.champion_registry import Registry, Version
 from tasks.servers.access import auth, hosts
+from tasks.servers.listening import config_of
 from tasks.settings.run_settings import RunError, UsageError
 
 if TYPE_CHECKING:
@@ -43,17 +44,12 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
         ) from None
     import uvicorn  # late: with the application a second
 
-    from tasks.servers.connections import TimedProtocol
-
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
     for name, value in HURRIED.items():
         os.environ.setdefault(name, value)
     retrainings = partial(_retrainings, Registry(folder))
     threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
-    app = guarded_dashboard(folder, retrainings)
-    config = uvicorn.Config(
-        app, http=TimedProtocol, log_level="warning", access_log=False, server_header=False
-    )
+    config = config_of(partial(guarded_dashboard, folder, retrainings))
     print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
     if open_browser and sys.stdout.isatty():
         import webbrowser

@@ -67,7 +67,7 @@ def _report(console: Console, memory: Path, class_name: str, workers: int, nonse
     table = Table(title=f"{memory}, {workers} workers", title_justify="left")
     for heading in ("what", "problems/s", "plans/s", "median ms", "90 % ms", "99 % ms", "slowest ms"):
         table.add_column(heading, justify="left" if heading == "what" else "right")
-    with _served(memory, workers) as (address, process):
+    with served(memory, workers) as (address, process):
         times, plans = _batches(address, problems, workers)
         problems_a_second = len(times) * BATCH / SECONDS
         table.add_row(
@@ -90,7 +90,7 @@ def _report(console: Console, memory: Path, class_name: str, workers: int, nonse
 
 
 @contextmanager
-def _served(memory: Path, workers: int) -> Iterator[tuple[str, psutil.Popen]]:
+def served(memory: Path, workers: int) -> Iterator[tuple[str, psutil.Popen]]:
     command = [sys.executable, "-m", "flows.cli.main", "serve-memory", str(memory), "--port", "0"]
     running = psutil.Popen([*command, "--workers", str(workers)], stdout=subprocess.PIPE, text=True)
     try:
