@@ -1,4 +1,4 @@
-"""What retraining would do now, told without writing anything."""
+"""The command ``retrain --dry-run``: print what retraining would do, and write nothing."""
 
 from __future__ import annotations
 
@@ -24,49 +24,60 @@ HEADINGS: Final = ("class", "champion", "new experiences", "plans that change", 
 
 
 def dry_run(data: Path, settings: RunSettings) -> None:
-    """Print what there is to do. RunError: the registry cannot be reached."""
-    place = local_place(data).expanduser().absolute()
-    if not fetch(place / MARK).is_file():
+    """Print what retraining would do now. Raises RunError if the registry cannot be reached."""
+    path = local_place(data).expanduser().absolute()
+    if not fetch(path / MARK).is_file():
         print(f"{data} is no data folder yet: the run {settings.run_name} would make the first champions.")
         return
-    folder = DataFolder(place)
-    found = news(folder, settings, Registry(folder))
-    if found.first is not None:
-        names = ", ".join([*found.first.class_names, *([COMBINED] if found.first.combined else [])])
-        print(f"No champion yet of {names}: the run {found.first.run_name} would make the first.")
-    rows = [_row(folder, settings, found, name) for name in settings.class_names if name in found.champions]
+    folder = DataFolder(path)
+    pending = news(folder, settings, Registry(folder))
+    if pending.first is not None:
+        names = ", ".join([*pending.first.class_names, *([COMBINED] if pending.first.combined else [])])
+        print(f"No champion yet of {names}: the run {pending.first.run_name} would make the first.")
+    rows = [
+        _row(folder, settings, pending, name) for name in settings.class_names if name in pending.champions
+    ]
     if rows:
         console().print(rich_table("Retraining now", HEADINGS, [rows]))
-    if found.first is None and not found.fresh:
+    if pending.first is None and not pending.fresh:
         print("Nothing new was learned since champions were last judged: nothing would be done.")
 
 
-def _row(folder: DataFolder, settings: RunSettings, found: News, name: str) -> list[str]:
-    champion = f"version {found.champions[name].number}"
-    if name not in found.fresh:
+def _row(folder: DataFolder, settings: RunSettings, pending: News, name: str) -> list[str]:
+    champion = f"version {pending.champions[name].number}"
+    if name not in pending.fresh:
         return [name, champion, "0", "0", "none"]
-    plans, shards, of = _anew(folder, settings, found, name)
-    numbers = "all" if len(shards) == of else ", ".join(map(str, shards)) or "none"
-    return [name, champion, f"{len(found.fresh[name]):,}", f"{plans:,}", f"{len(shards)} of {of}: {numbers}"]
+    plans, shards, shard_count = _changes(folder, settings, pending, name)
+    numbers = "all" if len(shards) == shard_count else ", ".join(map(str, shards)) or "none"
+    return [
+        name,
+        champion,
+        f"{len(pending.fresh[name]):,}",
+        f"{plans:,}",
+        f"{len(shards)} of {shard_count}: {numbers}",
+    ]
 
 
-def _anew(folder: DataFolder, settings: RunSettings, found: News, name: str) -> tuple[int, list[int], int]:
-    """How many plans the champion's run has not, in which shards they stand, and of how many.
+def _changes(
+    folder: DataFolder, settings: RunSettings, pending: News, name: str
+) -> tuple[int, list[int], int]:
+    """The number of plans that the champion's run does not have, their shards, and the number of all shards.
 
-    Curation is really done; where the champion's run is not here any more, all are new.
+    Curation is done as in a retraining. If the champion's run is no longer here, all plans are new.
     """
     vehicle, size = vehicle_named(settings.vehicle), plans_at_once(settings)
-    of = -(-settings.taught // size)
-    before = champion_run(str(folder.path), found.champions[name].tag("run"))
+    shard_count = -(-settings.taught // size)
+    before = champion_run(str(folder.path), pending.champions[name].tag("run"))
     try:
         if before is None:
             raise StorageError("no run")
-        had = {each.problem.id for each in taught_experiences(before.folder, before.settings, name)}
+        taught = taught_experiences(before.folder, before.settings, name)
+        taught_ids = {experience.problem.id for experience in taught}
         shards = before.folder.shards("candidates", name)
-        drawn = [each for shard in shards for each in read_experiences(shard, vehicle)]
+        drawn = [experience for shard in shards for experience in read_experiences(shard, vehicle)]
     except StorageError:
-        return settings.taught, list(range(of)), of
-    everything = [*drawn, *found.learned[name]]
-    kept = chosen(drawn, found.learned[name], settings)[: settings.taught]
-    new = [place for place, row in enumerate(kept) if everything[row].problem.id not in had]
-    return len(new), sorted({place // size for place in new}), of
+        return settings.taught, list(range(shard_count)), shard_count
+    candidates = [*drawn, *pending.learned[name]]
+    kept = chosen(drawn, pending.learned[name], settings)[: settings.taught]
+    new = [index for index, row in enumerate(kept) if candidates[row].problem.id not in taught_ids]
+    return len(new), sorted({index // size for index in new}), shard_count

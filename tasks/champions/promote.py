@@ -1,4 +1,4 @@
-"""Changing champions by hand: approve a challenger, or go back to the champion before."""
+"""Change champions by hand: approve a challenger, or go back to the champion before."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from tasks.settings.run_settings import RunError
 
 
 def promote(registry: Registry, challenger: Version) -> None:
-    """Make a judged challenger the champion, if the one it was judged against still is.
+    """Make a judged challenger the champion.
 
-    RunError: another is.
+    Raises RunError if the champion is no longer the version that the challenger was judged against.
     """
     champion = registry.aliased(challenger.name)
     against = challenger.tag("against")
@@ -32,19 +32,37 @@ def promote(registry: Registry, challenger: Version) -> None:
         now = f"version {champion.number}" if champion else "none"
         raise RunError(
             f"{challenger.name} version {challenger.number} was judged against version {against}, but the "
-            f"champion is {now} now and stays; it is judged anew once more is learned."
+            f"champion is {now} now and stays; the next retraining judges again."
         )
     registry.tagged(challenger, {"previous": champion.number})
     registry.point(challenger)
 
 
 def promote_awaiting(data: Path, memory: str | None) -> None:
-    """Promote what awaits approval: of one memory, or all there is. RunError: nothing does."""
+    """Promote the challengers that await approval.
+
+    Parameters
+    ----------
+    data
+        The data folder.
+    memory
+        The memory whose challenger is promoted; None promotes those of all memories.
+
+    Raises
+    ------
+    RunError
+        No challenger awaits approval, or a champion has changed since its challenger was judged.
+
+    """
     registry = _registry(data)
-    found = [registry.aliased(name, CHALLENGER) for name in _names(registry, memory)]
-    awaiting = [each for each in found if each is not None and each.tag("verdict") in (AWAITING, PROMOTED)]
+    challengers = [registry.aliased(name, CHALLENGER) for name in _names(registry, memory)]
+    awaiting = [
+        version
+        for version in challengers
+        if version is not None and version.tag("verdict") in (AWAITING, PROMOTED)
+    ]
     if not awaiting:
-        raise RunError(f"{_of(memory)} no challenger awaits approval; `retrain --approve` leaves one.")
+        raise RunError(f"{_subject(memory)} no challenger awaits approval; `retrain --approve` leaves one.")
     for challenger in awaiting:
         promote(registry, challenger)
         registry.tagged(challenger, {"verdict": PROMOTED})
@@ -53,24 +71,35 @@ def promote_awaiting(data: Path, memory: str | None) -> None:
 
 
 def roll_back(data: Path, memory: str | None) -> None:
-    """Point the alias at the champion before: of one memory, or of all that the last retraining promoted.
+    """Make the champion before the current one champion again.
 
-    RunError: there was none before.
+    Parameters
+    ----------
+    data
+        The data folder.
+    memory
+        The memory whose champion changes; None changes those that the last retraining promoted.
+
+    Raises
+    ------
+    RunError
+        There was no champion before, or its version is no longer in the registry.
+
     """
     registry = _registry(data)
-    found = [registry.aliased(name) for name in _names(registry, memory)]
-    champions = [each for each in found if each is not None and each.tag("previous")]
+    current = [registry.aliased(name) for name in _names(registry, memory)]
+    champions = [version for version in current if version is not None and version.tag("previous")]
     if not champions:
-        raise RunError(f"{_of(memory)} no champion has one before it: nothing to roll back to.")
-    last = max(each.retraining for each in champions)
+        raise RunError(f"{_subject(memory)} no champion has one before it: nothing to roll back to.")
+    last = max(champion.retraining for champion in champions)
     for champion in champions:
         if memory is None and champion.retraining != last:
             continue
         before = next(
             (
-                each
-                for each in registry.versions(champion.name)
-                if str(each.number) == champion.tag("previous")
+                version
+                for version in registry.versions(champion.name)
+                if str(version.number) == champion.tag("previous")
             ),
             None,
         )
@@ -80,7 +109,9 @@ def roll_back(data: Path, memory: str | None) -> None:
                 f"registry any more; version {champion.number} stays."
             )
         registry.tagged(champion, {"verdict": ROLLED_BACK})
-        registry.point(before)  # last: who is killed before it goes back by one when told again, not by two
+        registry.point(
+            before
+        )  # last: a roll back killed before this line goes back one version when repeated
         print(f"{champion.name}: version {before.number} is champion again, was {champion.number}")
 
 
@@ -92,15 +123,15 @@ def _registry(data: Path) -> Registry:
 
 
 def _names(registry: Registry, memory: str | None) -> Sequence[str]:
-    """The names that are meant: all, or those of one memory, which may be given as in the registry."""
-    known = registry.names()
+    """All registered names, or those of one memory, given with or without the registry's prefix."""
+    names = registry.names()
     if memory is None:
-        return known
-    named = [name for name in known if name in (memory, PREFIX + memory)]
-    if not named:
-        raise RunError(f"No memory {memory!r} in the registry. Known: {', '.join(known) or 'none'}.")
-    return named
+        return names
+    matching = [name for name in names if name in (memory, PREFIX + memory)]
+    if not matching:
+        raise RunError(f"No memory {memory!r} in the registry. Known: {', '.join(names) or 'none'}.")
+    return matching
 
 
-def _of(memory: str | None) -> str:
+def _subject(memory: str | None) -> str:
     return "In the registry" if memory is None else f"Of {memory}"

@@ -1,4 +1,4 @@
-"""A report as artifacts of the Prefect flow that made it; where Prefect cannot be reached, nothing breaks."""
+"""Publish a report as artifacts of the Prefect flow that made it; without Prefect only a line is printed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from storage.places.files import read_text
 from storage.places.mirror import fetch, files_in, uri_of
 from tasks.fan_out.progress_artifact import artifact_key
 
-MAX_IMAGE_BYTES: Final = 700_000  # an artifact is a row of the server's database
+MAX_IMAGE_BYTES: Final = 700_000  # an artifact is one row in the server's database
 
 
 def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
-    """Link the page, and add the summary, the verdicts on the claims, and every figure as an image."""
+    """Publish a link to the report, its summary, the verdicts on the claims, and each figure as an image."""
     from prefect.artifacts import (
         create_image_artifact,
         create_link_artifact,
@@ -26,34 +26,34 @@ def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
         create_table_artifact,
     )
 
-    told = [claim._asdict() for claim in claims]
+    table = [claim._asdict() for claim in claims]
     try:
         create_link_artifact(uri_of(run.report), "Report", key=_key(run, "report"), description="Whole page")
         create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
-        create_table_artifact(told, key=_key(run, "claims"), description="Claims of the paper")
+        create_table_artifact(table, key=_key(run, "claims"), description="Claims of the paper")
         for figure in files_in(run.figures, "*.png"):
             if fetch(figure).stat().st_size <= MAX_IMAGE_BYTES:
                 create_image_artifact(_address(figure), key=_key(run, figure.stem), description=figure.stem)
-    except Exception as error:  # a report is whole without its artifacts, whatever is wrong with the server
-        _complain("the report", error)
+    except Exception as error:  # the report is complete without them
+        _warn("the report", error)
 
 
-def publish_judgements(run_name: str, told: Sequence[tuple[str, str, str]]) -> None:
-    """The verdict on each memory: its name, one line, the whole as Markdown."""
+def publish_judgements(run_name: str, verdicts: Sequence[tuple[str, str, str]]) -> None:
+    """Publish the verdict on each memory: (name of the memory, one line, the details as Markdown)."""
     from prefect.artifacts import create_markdown_artifact, create_table_artifact
 
     try:
-        for memory, line, markdown in told:
+        for memory, line, markdown in verdicts:
             create_markdown_artifact(markdown, key=artifact_key(f"verdict-{memory}"), description=line)
-        table = [{"memory": memory, "verdict": line} for memory, line, _ in told]
+        table = [{"memory": memory, "verdict": line} for memory, line, _ in verdicts]
         create_table_artifact(table, key=artifact_key("verdicts"), description=run_name)
-    except Exception as error:  # the champions are who they are, whatever is wrong with the server
-        _complain("the verdicts", error)
+    except Exception as error:  # champions do not depend on Prefect
+        _warn("the verdicts", error)
 
 
-def _complain(what: str, error: Exception) -> None:
+def _warn(what: str, error: Exception) -> None:
     reason = (str(error) or type(error).__name__).splitlines()[0]
-    print(f"Prefect has not got all artifacts of {what}: {reason}", file=sys.stderr)
+    print(f"Prefect did not take all artifacts of {what}: {reason}", file=sys.stderr)
 
 
 def _key(run: RunFolder, name: str) -> str:

@@ -1,7 +1,7 @@
-"""A memory as an MLflow model: problem JSON in, ranked plans out, checked and in the problem's own frame.
+"""A memory as an MLflow model: problem JSON in; ranked plans out, checked and in the frame of the problem.
 
-The model is saved *from code*: it is the archive and ``memory_model_code.py``, three lines that import this
-file from the installed package. Nothing of it is pickled, and the archive is checked as any other.
+The model is saved *from code*: it consists of the archive and ``memory_model_code.py``, which imports this
+file from the installed package. Nothing is pickled, and the archive is checked like any other.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from storage.fields import parse_json
 
 CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
-REQUIREMENTS: Final = ("motion-memory",)  # given, so that MLflow infers none, which takes seconds
+REQUIREMENTS: Final = ("motion-memory",)  # given, because it takes MLflow seconds to infer them
 TOP_K: Final = 5
-MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: others wait meanwhile
-MOST_CORNERS_OF_ONE: Final = 1_000  # making convex pieces of a polygon grows with their square
+MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: other requests wait meanwhile
+MOST_CORNERS_OF_ONE: Final = 1_000  # the time to cut a polygon into convex pieces grows with their square
 _ROWS: Final = Array(Array(DataType.double))
 SIGNATURE: Final = ModelSignature(
     inputs=Schema([ColSpec(DataType.string, "problem")]),
@@ -62,14 +62,14 @@ SIGNATURE: Final = ModelSignature(
 
 
 class MemoryModel(PythonModel):
-    """Recalls plans; a row of input is a problem as JSON text, a row of output is a plan."""
+    """Recalls plans: a row of the input is a problem as JSON text, a row of the output is a plan."""
 
     def load_context(self, context: PythonModelContext) -> None:
-        """Load and check the archive; a StorageError where it is not as it was written."""
+        """Load and check the archive. Raises StorageError if it is damaged."""
         self.open(Path(context.artifacts[ARTIFACT]), context.model_config["vehicle"])
 
     def open(self, archive: Path, vehicle: str) -> None:
-        """The same, of an archive that need not be MLflow's."""
+        """Load and check an archive that need not be in MLflow, for the vehicle of this name."""
         self.vehicle = vehicle_named(vehicle)
         self.memory: Memory = load_memory(archive, self.vehicle)
 
@@ -79,14 +79,14 @@ class MemoryModel(PythonModel):
         model_input: pd.DataFrame,
         params: dict[str, Any] | None = None,
     ) -> pd.DataFrame:
-        """The ``top_k`` best plans of each problem, best first; none where the memory says that none fits.
+        """The ``top_k`` best plans for each problem, best first; none if the encoder says that none fits.
 
-        MlflowException: a problem is malformed or impossible; its message is one line.
+        Raises MlflowException, with one line, if a problem is malformed or impossible.
         """
         return self.plans(model_input, params)
 
     def plans(self, model_input: pd.DataFrame, params: dict[str, Any] | None = None) -> pd.DataFrame:
-        """``predict`` without MLflow's context."""
+        """Like ``predict``, without MLflow's context."""
         top_k = (params or {}).get("top_k", TOP_K)
         if top_k is None or top_k < 1:
             raise MlflowException(f"top_k is {top_k}: give 1 or more.", INVALID_PARAMETER_VALUE)
@@ -100,51 +100,70 @@ class MemoryModel(PythonModel):
     def _problem(self, text: object, number: int) -> Problem:
         try:
             if not isinstance(text, str):
-                raise ValueError(f"it is {type(text).__name__}, wanted was the text of a JSON object")
+                raise ValueError(f"it is {type(text).__name__}; give the text of a JSON object")
             fields = parse_json(text, "it")
-            _refuse_endless(fields)
+            _refuse_too_many_corners(fields)
             problem = problem_of(fields, f"problem-{number}", self.vehicle)
-            unfit = scale_fault(self.memory, problem.scale)
-            if unfit is not None:
-                raise ValueError(unfit)
+            fault = scale_fault(self.memory, problem.scale)
+            if fault is not None:
+                raise ValueError(fault)
         except (StorageError, ValueError) as error:
             raise MlflowException(f"Problem {number}: {error}", INVALID_PARAMETER_VALUE) from None
         return problem
 
     def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
-        asked, alignment = to_canonical(problem)
-        memory, scene = self.memory, scene_of(asked)
-        embedding = memory.forward(drawing_of(asked).occupied)
-        known = memory.vectors[1:] @ embedding + memory.biases[1:]
+        canonical, alignment = to_canonical(problem)
+        memory, scene = self.memory, scene_of(canonical)
+        embedding = memory.forward(drawing_of(canonical).occupied)
+        scores = memory.vectors[1:] @ embedding + memory.biases[1:]
         rows = []
         best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
         for rank, i in enumerate(best, start=1):
-            free, _ = plan_answers(memory.sweeps, i, scene, asked.start, asked.goal, asked.goal_radius)
-            aligned = from_canonical(turned(memory.plans[i], asked.start[2]), alignment)
+            free, _ = plan_answers(
+                memory.sweeps, i, scene, canonical.start, canonical.goal, canonical.goal_radius
+            )
+            aligned = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
             plan = scaled(aligned, problem.scale)
-            row = (problem.id, rank, i, bool(free), float(known[i]), plan.dt)
+            row = (problem.id, rank, i, bool(free), float(scores[i]), plan.dt)
             rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
         return rows
 
 
 def pyfunc_of(model: MemoryModel) -> PyFuncModel:
-    """A model as MLflow would load it, but by the installed code, whatever lies beside its archive."""
+    """Wrap a model as MLflow would load it, but with the installed code, not that beside the archive."""
     return PyFuncModel(Model(signature=SIGNATURE), model, predict_fn="plans")
 
 
-def _refuse_endless(fields: object) -> None:
-    """ValueError where polygons have so many corners that everybody else would wait."""
+def _refuse_too_many_corners(fields: object) -> None:
+    """Raise ValueError if the polygons have so many corners that other requests would have to wait."""
     polygons = fields.get("obstacles") if isinstance(fields, Mapping) else None
-    corners = [len(each) for each in polygons if isinstance(each, list)] if isinstance(polygons, list) else []
+    corners = (
+        [len(polygon) for polygon in polygons if isinstance(polygon, list)]
+        if isinstance(polygons, list)
+        else []
+    )
     if max(corners, default=0) > MOST_CORNERS_OF_ONE or sum(corners) > MOST_CORNERS:
         raise ValueError(
             f"obstacles have {sum(corners)} corners, one of them {max(corners)}; at most {MOST_CORNERS} and "
-            f"{MOST_CORNERS_OF_ONE} are taken: simplify them, or use the command `solve`"
+            f"{MOST_CORNERS_OF_ONE} are accepted: simplify them, or use the command `solve`"
         )
 
 
 def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:
-    """Write an archive and all that MLflow wants to load it as a model into a new folder."""
+    """Write a memory's archive into a new folder, with the files that MLflow needs to load it as a model.
+
+    Parameters
+    ----------
+    folder
+        The folder to write; it must not exist.
+    archive
+        The memory's folder.
+    vehicle
+        The vehicle's name.
+    model
+        MLflow's description of the model, which this fills.
+
+    """
     save_model(
         folder,
         python_model=str(CODE),

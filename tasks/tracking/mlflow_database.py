@@ -1,7 +1,7 @@
-"""MLflow's database in a data folder: made, or brought to the schema of the MLflow that is installed.
+"""Make MLflow's database in a data folder, or upgrade it to the schema of the installed MLflow.
 
-MLflow changes tables one by one, and a kill meanwhile leaves a database that nothing can open. So the work is
-done on a copy, which then takes the database's place at once. The old one is kept beside it.
+MLflow changes the tables one by one, and a kill in between leaves a database that nothing can open. So a copy
+is upgraded, which then replaces the database in one step. The old database is kept beside it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,15 @@ if TYPE_CHECKING:
 
 
 def ready_database(data: DataFolder) -> None:
-    """Make the database of a data folder where there is none, and upgrade one that an older MLflow made.
+    """Make the database of a data folder if there is none; upgrade it if an older MLflow made it.
 
-    RunError: a newer MLflow made it. InUseError: another command upgrades it.
+    Raises
+    ------
+    RunError
+        A newer MLflow made the database.
+    InUseError
+        Another command is upgrading it.
+
     """
     path = data.mlflow_database
     if not path.exists():
@@ -59,8 +65,8 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         schemas.get_revision(old)
     except CommandError:
         raise RunError(
-            f"{path} was written by a newer MLflow (schema {old}); install that one again, or give another "
-            "data folder."
+            f"{path} was written by a newer MLflow (schema {old}); install that version again, or give "
+            "another data folder."
         ) from None
     _remove_leftovers(path)
     kept = path.with_name(f"{path.name}.{old}")
@@ -72,12 +78,12 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         engine.dispose()
         if not kept.exists():
             os.link(path, kept)
-    print(f"{path} now has the schema of this MLflow; as it was it is kept as {kept.name}", file=sys.stderr)
+    print(f"{path} now has this MLflow's schema; the old one is kept as {kept.name}", file=sys.stderr)
 
 
 @functools.cache
 def _schemas() -> ScriptDirectory:
-    """All schemas that the MLflow that is installed knows."""
+    """All schemas that the installed MLflow knows."""
     import mlflow.store
     from alembic.script import ScriptDirectory
 
@@ -91,6 +97,6 @@ def _schema_of(path: Path) -> str:
 
 
 def _remove_leftovers(path: Path) -> None:
-    """Delete what a killed command left of a copy; only one command at a time makes one."""
+    """Delete unfinished copies of a killed command; only one command at a time makes one."""
     for left in path.parent.glob(f".{path.name}.*.partial*"):
         left.unlink()

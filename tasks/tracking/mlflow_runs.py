@@ -1,7 +1,7 @@
-"""What a run leaves in MLflow: a parent run, and below it a run for each training and one for the benchmark.
+"""Runs in MLflow: a parent run for each of ours, with a child for each training and one for the benchmark.
 
-Only the command's own process talks to MLflow. Runs are found by tags, so the same command again adds to what
-is there. MLflow is imported, and its database made, in a background thread: both take seconds.
+Only the command's own process talks to MLflow. Runs are found by their tags, so a repeated command adds to
+the same MLflow run. A background thread imports MLflow and makes its database, because both take seconds.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ if TYPE_CHECKING:
     from mlflow import MlflowClient
 
 EXPERIMENT: Final = "motion-memory"
-RUN_TAG: Final = "motion_memory.run"  # name of the run's folder
+RUN_TAG: Final = "motion_memory.run"  # the name of the run's folder
 STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
-KEY_TAG: Final = "motion_memory.key"  # what the logged content depends on
-MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was made of its encoder
-MODEL_TAG: Final = "motion_memory.model"  # and the id of that memory's model
+KEY_TAG: Final = "motion_memory.key"  # digest of what the logged content depends on
+MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory logged_model with its encoder
+MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
 def tracking_uri(data: DataFolder) -> str:
-    """Where MLflow is: as the user says, else a database in the data folder.
+    """The address of MLflow: MLFLOW_TRACKING_URI if it is set, else of a database in the data folder.
 
-    UsageError: the data folder is in object storage, where no database can be.
+    Raises UsageError if the data folder is in object storage, which cannot hold a database.
     """
-    given = os.environ.get("MLFLOW_TRACKING_URI")
-    if not given and data.is_remote:
+    uri = os.environ.get("MLFLOW_TRACKING_URI")
+    if not uri and data.is_remote:
         raise UsageError(
             f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
             "keeps its own (docs/runbook.md)."
         )
-    return given or f"sqlite:///{data.mlflow_database}"
+    return uri or f"sqlite:///{data.mlflow_database}"
 
 
 class Tracker:
     """The runs of one data folder in MLflow."""
 
     def __init__(self, data: DataFolder) -> None:
-        """Begin to connect; whatever is asked first waits for it."""
+        """Start to connect in the background; the first call that needs MLflow waits for it."""
         self.uri = tracking_uri(data)
         self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
         self._failure: Exception | None = None
@@ -67,12 +67,12 @@ class Tracker:
                 artifacts = self._own.mlflow_artifacts.as_uri()
                 ready_database(self._own)
             client = MlflowClient(self.uri)
-            found = client.get_experiment_by_name(EXPERIMENT)
+            experiment = client.get_experiment_by_name(EXPERIMENT)
             self._experiment = (
-                found.experiment_id if found else client.create_experiment(EXPERIMENT, artifacts)
+                experiment.experiment_id if experiment else client.create_experiment(EXPERIMENT, artifacts)
             )
             self._connected = client
-        except Exception as error:  # shown by whoever asks first, in one line
+        except Exception as error:  # raised again, in one line, where the client is used
             self._failure = error
 
     @property
@@ -87,7 +87,24 @@ class Tracker:
     def run(
         self, run_name: str, stage: str, tags: Mapping[str, str], parent: str | None = None
     ) -> Iterator[str]:
-        """Id of the MLflow run of a stage, found again or made; it ends finished, or failed on an error."""
+        """Open the MLflow run of a stage, or make it; it ends as FINISHED, or as FAILED on an error.
+
+        Parameters
+        ----------
+        run_name
+            The name of the run's folder.
+        stage
+            "run" for the parent run, else what the child run is of, such as "train trap".
+        tags
+            Set on the MLflow run.
+        parent
+            The id of the parent run, or None.
+
+        Yields
+        ------
+        The id of the MLflow run.
+
+        """
         client = self._client
         run_id = self.find(run_name, stage)
         if run_id is not None:
@@ -105,17 +122,17 @@ class Tracker:
         client.set_terminated(run_id, "FINISHED")
 
     def find(self, run_name: str, stage: str) -> str | None:
-        """Id of the MLflow run of a stage, if there is one."""
-        asked = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{STAGE_TAG}` = '{stage}'"
-        found = self._client.search_runs([self._experiment], filter_string=asked, max_results=1)
-        return str(found[0].info.run_id) if found else None
+        """The id of the MLflow run of a stage, or None."""
+        condition = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{STAGE_TAG}` = '{stage}'"
+        runs = self._client.search_runs([self._experiment], filter_string=condition, max_results=1)
+        return str(runs[0].info.run_id) if runs else None
 
     def is_logged(self, run_id: str, key: str, what: str = "content") -> bool:
-        """Whether this content, made from what ``key`` says, is logged already (``mark_logged``)."""
+        """Whether ``mark_logged`` has noted content with this key."""
         return bool(self._client.get_run(run_id).data.tags.get(f"{KEY_TAG}.{what}") == key)
 
     def mark_logged(self, run_id: str, key: str, what: str = "content") -> None:
-        """Note that the content is logged."""
+        """Note that content with this key is logged; ``what`` names the content."""
         self._client.set_tag(run_id, f"{KEY_TAG}.{what}", key)
 
     def tag(self, run_id: str, tags: Mapping[str, str]) -> None:
@@ -124,9 +141,9 @@ class Tracker:
             self._client.set_tag(run_id, tag, value)
 
     def logged_memory(self, run_name: str, memory: str, key: str) -> tuple[str, str]:
-        """Ids of the training that a memory came from, and of its model; RuntimeError: it is not logged."""
-        asked = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
-        for run in self._client.search_runs([self._experiment], filter_string=asked):
+        """The ids of a memory's training run and of its model. Raises RuntimeError if it is not logged."""
+        condition = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
+        for run in self._client.search_runs([self._experiment], filter_string=condition):
             if run.data.tags.get(f"{KEY_TAG}.memory") == key:
                 return str(run.info.run_id), str(run.data.tags[MODEL_TAG])
         raise RuntimeError(
@@ -134,15 +151,15 @@ class Tracker:
         )
 
     def parameters(self, run_id: str, values: Mapping[str, Any]) -> None:
-        """Log parameters that the run does not have yet; a run's parameters never change."""
+        """Log the parameters that the run does not have yet: MLflow lets none change."""
         from mlflow.entities import Param
 
-        known = self._client.get_run(run_id).data.params
-        new = [Param(name, str(value)[:500]) for name, value in values.items() if name not in known]
+        logged = self._client.get_run(run_id).data.params
+        new = [Param(name, str(value)[:500]) for name, value in values.items() if name not in logged]
         self._client.log_batch(run_id, params=new)
 
     def metrics(self, run_id: str, rows: Sequence[Mapping[str, float]], step: str | None = None) -> None:
-        """Log metrics, one row a step; ``step`` names the column that counts them."""
+        """Log metrics, one row for each step; ``step`` names the column that holds the step's number."""
         from mlflow.entities import Metric
 
         now = int(time.time() * 1000)
@@ -152,37 +169,65 @@ class Tracker:
             for name, value in row.items()
             if name != step and value == value  # NaN is no metric
         ]
-        for first in range(0, len(entries), 1000):  # MLflow's limit a call
+        for first in range(0, len(entries), 1000):  # MLflow's limit for one call
             self._client.log_batch(run_id, metrics=entries[first : first + 1000])
 
-    def artifacts(self, run_id: str, place: Path, under: str | None = None) -> None:
-        """Log a file, or the files of a folder, as artifacts."""
-        for path in [place] if place.suffix else files_in(place, "[!.]*"):
-            if fetch(path).is_file():
-                self._client.log_artifact(run_id, str(path), under)
+    def artifacts(self, run_id: str, path: Path, under: str | None = None) -> None:
+        """Log a file, or the files in a folder, as artifacts in the artifact folder ``under``."""
+        for file in [path] if path.suffix else files_in(path, "[!.]*"):
+            if fetch(file).is_file():
+                self._client.log_artifact(run_id, str(file), under)
 
     def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
-        """Log an archive as the model ``name`` that the run brought forth; the id of the model."""
+        """Log a memory's archive as a model that the run made.
+
+        Parameters
+        ----------
+        run_id
+            The MLflow run.
+        name
+            The model's name in MLflow.
+        archive
+            The memory's folder.
+        vehicle
+            The vehicle's name.
+
+        Returns
+        -------
+        The model's id.
+
+        """
         from mlflow.entities import LoggedModelOutput
         from mlflow.models.model import Model
 
         from tasks.tracking.memory_model import save_memory_model
 
-        made = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
-        self._client.log_outputs(run_id, [LoggedModelOutput(made.model_id, step=0)])
+        logged_model = self._client.create_logged_model(self._experiment, name, run_id, model_type="memory")
+        self._client.log_outputs(run_id, [LoggedModelOutput(logged_model.model_id, step=0)])
         with scratch_folder() as scratch:
             folder = scratch / name
-            model = Model(made.artifact_location, run_id)
-            model.model_id = model.model_uuid = made.model_id
+            model = Model(logged_model.artifact_location, run_id)
+            model.model_id = model.model_uuid = logged_model.model_id
             save_memory_model(folder, fetch_folder(archive), vehicle, model)
-            self._client.log_model_artifacts(made.model_id, str(folder))
-        self._client.finalize_logged_model(made.model_id, "READY")
-        return str(made.model_id)
+            self._client.log_model_artifacts(logged_model.model_id, str(folder))
+        self._client.finalize_logged_model(logged_model.model_id, "READY")
+        return str(logged_model.model_id)
 
-    def dataset(self, run_id: str, name: str, place: Path, digest: str, context: str) -> None:
-        """Log which data went in (``context``: "training", "benchmark")."""
+    def dataset(self, run_id: str, name: str, path: Path, digest: str, context: str) -> None:
+        """Log which data a run has used.
+
+        Parameters
+        ----------
+        run_id
+            The MLflow run.
+        name, path, digest
+            The name, the address and the digest of the data.
+        context
+            What the data was used for: "training" or "benchmark".
+
+        """
         from mlflow.entities import Dataset, DatasetInput, InputTag
 
-        source = f'{{"uri": "{uri_of(place)}"}}'
+        source = f'{{"uri": "{uri_of(path)}"}}'
         entry = Dataset(name, digest, "local", source)
         self._client.log_inputs(run_id, [DatasetInput(entry, [InputTag("mlflow.data.context", context)])])

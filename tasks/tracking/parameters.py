@@ -1,4 +1,4 @@
-"""A run's settings as flat texts, so that runs can be compared and searched by any of them."""
+"""A run's settings as flat texts, by which MLflow can compare and search runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tasks.settings.run_settings import RunSettings
 
 
 def parameters_of(settings: RunSettings) -> dict[str, str]:
-    """Each setting under its name; those of ``learning`` and ``retraining`` as ``learning.margin``."""
+    """Each setting under its name; nested settings are joined with a dot, such as ``learning.margin``."""
     return dict(
         _leaves("", asdict(settings) | {"hallucination": _shares(settings), "assists": _assists(settings)})
     )
@@ -29,4 +29,4 @@ def _shares(settings: RunSettings) -> list[str]:
 
 
 def _assists(settings: RunSettings) -> list[str]:
-    return [" ".join(str(part) for part in assist if part) for assist in settings.assists]
+    return [" ".join(str(field) for field in assist if field) for assist in settings.assists]
