@@ -1,4 +1,4 @@
-"""Who may ask our servers: who calls them by their own address, from their own pages, with their password."""
+"""Refuse requests to our servers by a foreign name, from foreign pages, or without the password."""
 
 from __future__ import annotations
 
@@ -12,25 +12,22 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-OPEN: Final = ("/ping", "/health")  # whether a server lives is no secret
-_ADDED: Final = {  # to each answer: other sites neither read it, nor show it in a frame
+OPEN: Final = ("/ping", "/health")  # anybody may know that a server is alive
+_ADDED: Final = {  # headers of each answer, so that other sites can neither read it nor show it in a frame
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "SAMEORIGIN",
 }
-_OTHER_NAME: Final = (
-    "Ask this server by its own address; for another name set MOTION_MEMORY_HOSTS where it is started."
-)
-_SHARED: Final = "access-control-"  # headers that let other sites in (CORS)
+_SHARED: Final = "access-control-"  # headers that let other sites read answers (CORS)
 
 
 class Guard:
-    """An ASGI application that pages of other sites cannot reach, nor can anybody without the password.
+    """Protects an ASGI application from pages of other sites, and from users without the password.
 
-    A web page can have the browser send requests to any address, loopback included. Two headers that it
-    cannot choose give it away: Origin is the page's own address, Host the name by which it asks. A foreign
-    Host means DNS rebinding: the page's own name has come to mean this machine.
+    A web page can make the browser send requests to any address, loopback included. Two headers that the page
+    cannot choose reveal it: Origin is the page's own address, Host is the name that it called. A foreign Host
+    means DNS rebinding: the name of the page's site was made to point at this machine.
     """
 
     def __init__(self, app: ASGIApp, secret: str | None = None, names: Collection[str] = ()) -> None:
@@ -39,11 +36,11 @@ class Guard:
         Parameters
         ----------
         app
-            What is guarded.
+            The application to protect.
         secret
-            The ``user:password`` to ask for (HTTP Basic); None: ask for none.
+            The ``user:password`` to ask for (HTTP Basic), or None.
         names
-            What the server may be called besides its address.
+            Other names of the server, besides its address.
 
         """
         self._app = app
@@ -51,7 +48,7 @@ class Guard:
         self._names = {_address(name) for name in names}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on a request or a websocket, or refuse it in one line."""
+        """Pass on a request or a websocket, or refuse it with one line."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -83,11 +80,11 @@ class Guard:
     def _is_own(self, host: str, scope: Scope) -> bool:
         """Whether a Host header names the address that was connected to, or one of the server's names."""
         name, colon, port = host.rpartition(":")
-        asked = _address(name if colon and port.isdigit() else host)
+        called = _address(name if colon and port.isdigit() else host)
         server = _address((scope.get("server") or ("",))[0])
-        if asked in self._names or asked == server:
+        if called in self._names or called == server:
             return True
-        return _is_loopback(server) and (asked == "localhost" or _is_loopback(asked))
+        return _is_loopback(server) and (called == "localhost" or _is_loopback(called))
 
     def _is_authorized(self, scope: Scope, headers: Headers) -> bool:
         if self._credentials is None or (scope["path"] in OPEN and scope.get("method") == "GET"):
@@ -103,7 +100,7 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 def _address(name: str) -> Address | str:
-    """An IP address, whichever way it is written; any other name in small letters."""
+    """An IP address in whatever notation, or any other name in lower case."""
     try:
         address = ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
     except ValueError:
@@ -120,7 +117,7 @@ def _refusing(status: int, code: str, message: str) -> Response:
 
 
 def _closed(send: Send) -> Send:
-    """Have answers say that they are for the server's own pages alone."""
+    """Add headers to answers by which browsers keep them from other sites."""
 
     async def closed(message: Message) -> None:
         if message["type"] == "http.response.start":

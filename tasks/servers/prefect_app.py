@@ -1,7 +1,7 @@
 """Prefect's server behind the guard.
 
-As a program (``python -m tasks.servers.prefect_app FOLDER SOCKET``) it is the server of a data folder, at a
-port that a command has opened, and ends when no command uses it any more.
+``python -m tasks.servers.prefect_app FOLDER SOCKET`` runs the server of a data folder at a port that a
+command has opened, and ends when no command uses the server any more.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL
 
 
 def prefect_app() -> Guard:
-    """The application; Prefect asks for PREFECT_SERVER_API_AUTH_STRING by itself."""
+    """Prefect's server, which itself asks for the password in PREFECT_SERVER_API_AUTH_STRING."""
     from prefect.server.api.server import create_app
 
     return Guard(create_app(), names=hosts())
 
 
 def _serve(folder: Path, listener: socket.socket) -> None:
-    """Be the server until nobody uses it."""
+    """Serve until no command uses the server."""
     from uvicorn import Config, Server
 
     server = Server(Config(prefect_app, factory=True, log_level="error", timeout_graceful_shutdown=1))
@@ -36,7 +36,7 @@ def _serve(folder: Path, listener: socket.socket) -> None:
             time.sleep(POLL_SECONDS)
             with locked(folder):
                 if not is_used(folder):
-                    for name in (URL, SECRET):  # whoever comes now starts another
+                    for name in (URL, SECRET):  # the next command starts another server
                         (folder / name).unlink(missing_ok=True)
                     break
         server.should_exit = True
@@ -45,7 +45,7 @@ def _serve(folder: Path, listener: socket.socket) -> None:
 
     threading.Thread(target=watch, daemon=True).start()
     server.run(sockets=[listener])
-    os._exit(0)  # at once: Python's own end takes seconds, in which `watch` no longer runs
+    os._exit(0)  # at once: Python takes seconds to exit, in which `watch` no longer runs
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
-"""A command's own Prefect server: on loopback, inside the data folder, gone when nobody uses it.
+"""A command's own Prefect server, on loopback, with its files in the data folder.
 
-The server is a child process (``tasks.servers.prefect_app``) that watches the commands which registered with
-it. It outlives none of them: when the last one has ended, even by kill -9, it stops itself. A command that
-finds it alive shares it. Nobody else can be its client: its password, a new one each time, lies in a file
-that only the owner can read.
+The server is a child process (``tasks.servers.prefect_app``) that watches the commands registered with it.
+When the last of them has ended, even by kill -9, it stops. A command that finds a server running shares it.
+Each server has a new password, in a file that only the owner can read.
 """
 
 from __future__ import annotations
@@ -26,12 +25,15 @@ from tasks.settings.environment import environment
 
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
-STOP_SECONDS: Final = 0.8  # then the child ends itself the hard way; SQLite stands that
+STOP_SECONDS: Final = 0.8  # then the child exits at once, which SQLite survives
 
-CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")  # what makes a client of a server
+CLIENT: Final = (
+    "PREFECT_API_URL",
+    "PREFECT_API_AUTH_STRING",
+)  # variables that make a process a client of the server
 URL, SECRET, LOG, USERS = "server.url", "server.auth", "server.log", "users"  # files of the server's folder
 
-# Set before Prefect, MLflow, Dask or a BLAS is imported, and only where the user has not decided otherwise.
+# Set before Prefect, MLflow, Dask or a BLAS is imported, unless the user has set them.
 ENVIRONMENT: Final = {
     "DO_NOT_TRACK": "true",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
@@ -44,10 +46,10 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_READ_BATCH_SIZE": "50",
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_FLUSH_INTERVAL": "1",
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
-    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # a failure is told once, in one line, by the command
-    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states say it all; logs would cost a request a task
+    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command reports a failure once, in one line
+    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states are enough; logs would cost one request for each task
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
-    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # what a server says whose database is away
+    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
     "MLFLOW_LOGGING_LEVEL": "ERROR",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",
@@ -60,37 +62,37 @@ ENVIRONMENT: Final = {
 
 @dataclass(frozen=True)
 class LocalServer:
-    """A server that is up, or coming up."""
+    """A server that runs or is starting."""
 
     url: str  # of the API, http://127.0.0.1:<port>/api
-    folder: Path  # where it lives, ``prefect`` in the data folder
+    folder: Path  # of its files: ``prefect`` in the data folder
 
     @property
     def ui_url(self) -> str:
-        """Address to open in a browser, which asks for the secret."""
+        """The address to open in a browser, which then asks for the password."""
         return self.url.removesuffix("/api")
 
     @property
     def secret_file(self) -> Path:
-        """Where the secret lies, readable by its owner alone."""
+        """The file with the password, which only its owner can read."""
         return self.folder / SECRET
 
     @property
     def secret(self) -> str:
-        """The ``user:password`` that it asks for."""
+        """The ``user:password`` that the server asks for."""
         return self.secret_file.read_text()
 
     @property
     def environment(self) -> dict[str, str]:
-        """What makes Prefect in this process, and in its children, a client of the server."""
+        """Variables that make Prefect, in this process and its children, a client of the server."""
         return dict(zip(CLIENT, (self.url, self.secret), strict=True))
 
     def __str__(self) -> str:
-        """The line that tells people where to look, and where the password lies."""
+        """The line that tells the user the address and the file of the password."""
         return f"Prefect  {self.ui_url} (while this runs; the password is in {self.secret_file})"
 
     def wait(self, seconds: float = START_SECONDS) -> None:
-        """Return when the server answers; RuntimeError with one line when it does not."""
+        """Return when the server answers. Raises RuntimeError if it does not within ``seconds``."""
         deadline = time.monotonic() + seconds
         while not is_healthy(self.url):
             if time.monotonic() > deadline or _find(self.folder) is None:
@@ -102,9 +104,9 @@ class LocalServer:
 
 
 def set_environment(data: Path) -> None:
-    """Quiet, private and embedded defaults for every library a command uses, all inside ``data``.
+    """Set quiet and private defaults for the libraries that a command uses, with their files in ``data``.
 
-    And the password of all servers, where one is set: ours ask for it, and clients send it.
+    A password (``tasks.servers.access``) is set for Prefect's and MLflow's servers and clients too.
     """
     home = data / "prefect"
     home.mkdir(0o700, parents=True, exist_ok=True)
@@ -119,10 +121,10 @@ def set_environment(data: Path) -> None:
 
 @contextmanager
 def local_server(data: Path) -> Iterator[LocalServer | None]:
-    """Share or start the server of ``data [folder]``; None when PREFECT_API_URL names another one.
+    """Share or start the server of a data folder, and make this process its client.
 
-    Returns at once, and the server needs some 5 s more: see ``LocalServer.wait``. Sets the environment that
-    makes a client of Prefect.
+    Yields the server, which needs some 5 s to start (``LocalServer.wait``), or None if PREFECT_API_URL names
+    another one.
     """
     set_environment(data)
     if os.environ.get("PREFECT_API_URL"):
@@ -138,12 +140,12 @@ def local_server(data: Path) -> Iterator[LocalServer | None]:
 
 
 def running_server(data: Path) -> LocalServer | None:
-    """The server that lives in a data folder, if one does."""
+    """The running server of a data folder, or None."""
     return _find(data / "prefect")
 
 
 def _register(folder: Path) -> tuple[LocalServer, IO[str]]:
-    """Become a user of the server, one who holds a file locked; start the server where there is none."""
+    """Register as a user of the server, by the lock on a file; start the server if none runs."""
     (folder / USERS).mkdir(parents=True, exist_ok=True)
     with locked(folder):
         user = (folder / USERS / str(os.getpid())).open("w")
@@ -152,7 +154,7 @@ def _register(folder: Path) -> tuple[LocalServer, IO[str]]:
 
 
 def _start(folder: Path) -> LocalServer:
-    """Have a child be the server; its port is open at once, so that no program of others takes it first."""
+    """Start the server in a child process, at a port opened here, so that no other program takes it."""
     secret = new_secret(folder / SECRET)
     with (
         socket.create_server(("127.0.0.1", 0)) as listener,
@@ -168,20 +170,20 @@ def _start(folder: Path) -> LocalServer:
             env=os.environ
             | {
                 "PREFECT_SERVER_API_AUTH_STRING": secret,
-                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # what this one has
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # as in this process
             },
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=sink,
-            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock for as long as it lives
-            start_new_session=True,  # Ctrl-C is for the command; the server follows by itself
+            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock until it ends
+            start_new_session=True,  # Ctrl-C ends the command; the server then stops by itself
         )
-    threading.Thread(target=child.wait, daemon=True).start()  # no zombie, should it end first
+    threading.Thread(target=child.wait, daemon=True).start()  # no zombie is left if it ends first
     return server
 
 
 def _leave(folder: Path, user: IO[str]) -> None:
-    """Be no user any more and, if this was the last, see the server go."""
+    """Stop being a user; the last user waits for the server to end."""
     with (folder / URL).open("a") as state:  # the child still holds it after it removed the name
         Path(user.name).unlink(missing_ok=True)
         user.close()
@@ -191,13 +193,13 @@ def _leave(folder: Path, user: IO[str]) -> None:
 
 
 def _find(folder: Path) -> LocalServer | None:
-    """The server that lives in ``folder``, healthy or still starting."""
+    """The server of ``folder`` that runs or is starting, or None."""
     path = folder / URL
     return LocalServer(path.read_text(), folder) if _is_held(path) else None
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a command that registered is still alive; what dead ones left is removed."""
+    """Whether a registered command is alive; files of dead ones are removed."""
     entries = list((folder / USERS).glob("*"))
     for entry in entries:
         if not _is_held(entry):
@@ -206,7 +208,7 @@ def is_used(folder: Path) -> bool:
 
 
 def _is_held(path: Path) -> bool:
-    """Whether a living process holds the lock on a file; the kernel takes locks from dead ones."""
+    """Whether a living process holds the lock on a file; the kernel releases the locks of dead ones."""
     try:
         with path.open() as file:
             return _is_locked(file)
@@ -224,8 +226,8 @@ def _is_locked(file: IO[str]) -> bool:
 
 
 def is_healthy(url: str) -> bool:
-    """Whether the server at an address answers that it is."""
-    import urllib.request  # late: few who import this start a server
+    """Whether the server at an address answers that it is healthy."""
+    import urllib.request  # late: few importers of this module start a server
 
     try:
         direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -238,7 +240,7 @@ def is_healthy(url: str) -> bool:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Nobody else starts or ends the server of ``folder`` meanwhile."""
+    """Keep other processes from starting or ending the server of ``folder``."""
     with (folder / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield

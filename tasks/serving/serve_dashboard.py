@@ -1,4 +1,4 @@
-"""The dashboard's server: on loopback, over one data folder, until it is interrupted."""
+"""The command ``dashboard``: serve the pages of one data folder on loopback until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -25,14 +25,30 @@ if TYPE_CHECKING:
     from tasks.servers.guard import Guard
 
 LOOPBACK = "127.0.0.1"
-HURRIED = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
+IMPATIENT = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
 
 
 def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
-    """Serve the pages; UsageError for a port that cannot be had or a folder that is no data folder."""
-    folder = _existing(data)
+    """Serve the pages of a data folder until Ctrl-C.
+
+    Parameters
+    ----------
+    data
+        The data folder.
+    port
+        A port from 1 to 65535, or 0 for any free one.
+    open_browser
+        Whether to open the dashboard in a browser, if the output is a terminal.
+
+    Raises
+    ------
+    UsageError
+        The port cannot be used, or the folder is no data folder.
+
+    """
+    folder = _existing_folder(data)
     if not 0 <= port <= 65535:
-        raise UsageError(f"Port is {port}: give 0 (any that is free) to 65535.")
+        raise UsageError(f"Port is {port}: give 1 to 65535, or 0 for any free port.")
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -42,10 +58,10 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
         raise UsageError(
             f"Port {port} cannot be used ({error.strerror}): give another --port, or 0."
         ) from None
-    import uvicorn  # late: with the application a second
+    import uvicorn  # late: together with the application it takes a second to import
 
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
-    for name, value in HURRIED.items():
+    for name, value in IMPATIENT.items():
         os.environ.setdefault(name, value)
     retrainings = partial(_retrainings, Registry(folder))
     threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
@@ -59,21 +75,21 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
 
 
 def guarded_dashboard(data: DataFolder, retrainings: Retrainings) -> Guard:
-    """The application over a data folder, and what the registry knows of it."""
-    from dashboards.web.app import dashboard_app  # late, as Uvicorn
+    """The dashboard of a data folder behind the guard; ``retrainings`` reads the registry."""
+    from dashboards.web.app import dashboard_app  # late, like Uvicorn
     from tasks.servers.guard import Guard
 
     return Guard(dashboard_app(data, retrainings), auth(), hosts())
 
 
 def _retrainings(registry: Registry) -> Sequence[Retrained]:
-    """Every version of a memory, in order; a NoticeError where the registry does not answer."""
+    """Each version of each memory, oldest first. Raises NoticeError if the registry does not answer."""
     try:
-        found = []
+        versions = []
         for name in registry.names():
             champion = registry.aliased(name)
-            found += [_retrained(each, champion) for each in registry.versions(name)]
-        return found
+            versions += [_retrained(version, champion) for version in registry.versions(name)]
+        return versions
     except RunError as error:
         raise NoticeError(str(error)) from None
 
@@ -101,16 +117,16 @@ def _retrained(version: Version, champion: Version | None) -> Retrained:
 
 
 def _read_ahead(retrainings: Retrainings) -> None:
-    """Load MLflow, some seconds, before a page asks it."""
+    """Import MLflow, which takes seconds, before a page needs it."""
     with suppress(NoticeError):
         retrainings()
 
 
-def _existing(data: Path) -> DataFolder:
-    """A data folder that is there: looking at one makes none."""
+def _existing_folder(data: Path) -> DataFolder:
+    """The data folder at a path; it is not made if it does not exist."""
     folder = data.expanduser().absolute()
     if not folder.is_dir():
-        raise UsageError(f"{folder} is not there; give --data and the folder that holds your runs.")
+        raise UsageError(f"{folder} does not exist; give --data the folder that holds your runs.")
     if not (folder / MARK).is_file() and any(folder.iterdir()):
-        raise UsageError(f"{folder} has no {MARK}, so it is no data folder; give one that `run` has made.")
+        raise UsageError(f"{folder} has no {MARK}, so it is no data folder; give one that `run` made.")
     return open_data_folder(folder) if (folder / MARK).is_file() else DataFolder(folder)

@@ -1,4 +1,4 @@
-"""Serve a memory over HTTP: worker processes behind one port, which opens when the first is ready."""
+"""Serve a memory over HTTP: worker processes share one port, which opens when the first is ready."""
 
 from __future__ import annotations
 
@@ -20,27 +20,49 @@ from tasks.settings.run_settings import check_known
 
 
 def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) -> None:
-    """Serve until Ctrl-C or SIGTERM. UsageError, RunError, StorageError: nothing is served, and why."""
+    """Serve until Ctrl-C or SIGTERM.
+
+    Parameters
+    ----------
+    memory
+        The folder of a memory, the folder of a run with one memory, or a model in MLflow.
+    vehicle
+        The vehicle's name.
+    host, port
+        The address to listen on; port 0 takes any free one.
+    workers
+        The number of worker processes.
+
+    Raises
+    ------
+    UsageError
+        The vehicle is unknown, or the address is malformed or not protected.
+    RunError
+        The address cannot be used, or there is no such memory in MLflow.
+    StorageError
+        The memory is missing, damaged, or made for another vehicle.
+
+    """
     check_known("vehicle", [vehicle], VEHICLES)
     check_address(host)
     for name, value in (ENVIRONMENT | auth_environment()).items():
         os.environ.setdefault(name, value)
-    with memory_at(memory) as folder, bound(host, port) as place:
-        found = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
+    with memory_at(memory) as folder, bound(host, port) as listener:
+        archive = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
 
-        def tell() -> None:
-            print(f"memory   {memory}: {len(found.plans)} plans of class {found.class_name}, {vehicle}")
-            print(f"serving  {address_of(place)}/invocations, workers: {workers}; Ctrl-C stops")
+        def print_addresses() -> None:
+            print(f"memory   {memory}: {len(archive.plans)} plans of class {archive.class_name}, {vehicle}")
+            print(f"serving  {address_of(listener)}/invocations, workers: {workers}; Ctrl-C stops")
             print(f"access   {access()}", flush=True)
 
-        serve_with(functools.partial(scoring_app, str(folder), vehicle), place, workers, tell)
+        serve_with(functools.partial(scoring_app, str(folder), vehicle), listener, workers, print_addresses)
 
 
 def scoring_app(folder: str, vehicle: str) -> Guard:
-    """What a worker serves: loaded, compiled, asked once. It ends with the process that started it."""
+    """What a worker serves, loaded, compiled and tried once. The worker ends with its parent process."""
     end_with_parent()
     from tasks.serving.scoring import Scoring
-    from tasks.tracking.memory_model import (  # MLflow and pandas: only where it is served
+    from tasks.tracking.memory_model import (  # late: imports MLflow and pandas
         MemoryModel,
         pyfunc_of,
     )
@@ -53,7 +75,7 @@ def scoring_app(folder: str, vehicle: str) -> Guard:
 
 
 def sample_request(memory: Memory) -> bytes:
-    """A request that needs all kernels: of the memory's scale, askew, around a notched obstacle."""
+    """A request that needs all kernels: it has the memory's scale, a turned start and a notched obstacle."""
     scale = memory.scales[0]
     notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]
     problem = {

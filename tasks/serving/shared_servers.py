@@ -1,8 +1,8 @@
-"""Prefect's and MLflow's servers for several people or machines: one address, one password, one folder.
+"""The command ``servers``: Prefect and MLflow for several people or machines, on one data folder.
 
-They hold what a command's own servers hold; other databases, and places for artifacts, by the variables that
-Prefect and MLflow have for that. Commands use them by PREFECT_API_URL and MLFLOW_TRACKING_URI. Whoever can
-change Prefect's records decides what its clients run, so these servers always ask for a password.
+The servers use the same databases as a command's own servers; environment variables of Prefect and MLflow
+choose others. Commands find the servers by PREFECT_API_URL and MLFLOW_TRACKING_URI. Whoever can change
+Prefect's records decides what its clients run, so these servers always need a password.
 """
 
 from __future__ import annotations
@@ -30,38 +30,53 @@ from tasks.settings.environment import environment
 from tasks.settings.run_settings import RunError
 from tasks.tracking.mlflow_database import ready_database
 
-LOOK_SECONDS: Final = 0.2  # between two looks at whether they live
+POLL_SECONDS: Final = 0.2  # between two checks that the processes are alive
 
 
 def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     """Serve until Ctrl-C or SIGTERM.
 
-    UsageError, RunError: an address or a port cannot be used, or a server ended.
+    Parameters
+    ----------
+    data
+        The data folder; it is made if it does not exist.
+    host
+        The address to listen on.
+    prefect_port, mlflow_port
+        The ports; 0 takes any free one.
+
+    Raises
+    ------
+    UsageError
+        The address is malformed or not protected.
+    RunError
+        A port cannot be used, or a server ended.
+
     """
     check_address(host)
     folder = open_data_folder(data)
     with (
-        password_set(folder) as admitted,
-        bound(host, prefect_port) as one,
-        bound(host, mlflow_port) as other,
+        password_set(folder) as access_line,
+        bound(host, prefect_port) as prefect_socket,
+        bound(host, mlflow_port) as mlflow_socket,
     ):
         set_environment(folder.path)
         apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
-            "Prefect": (prefect_app, one),
-            "MLflow": (functools.partial(mlflow_app, folder), other),
+            "Prefect": (prefect_app, prefect_socket),
+            "MLflow": (functools.partial(mlflow_app, folder), mlflow_socket),
         }
-        healthy = (f"{address_of(one)}/api", address_of(other))
+        healthy = (f"{address_of(prefect_socket)}/api", address_of(mlflow_socket))
         with _running(apps) as wait:
             wait(lambda: all(is_healthy(url) for url in healthy), START_SECONDS)
-            print(f"Prefect  {address_of(one)}  PREFECT_API_URL={healthy[0]}")
-            print(f"MLflow   {address_of(other)}  MLFLOW_TRACKING_URI={healthy[1]}")
-            print(f"access   {admitted}; Ctrl-C stops", flush=True)
+            print(f"Prefect  {address_of(prefect_socket)}  PREFECT_API_URL={healthy[0]}")
+            print(f"MLflow   {address_of(mlflow_socket)}  MLFLOW_TRACKING_URI={healthy[1]}")
+            print(f"access   {access_line}; Ctrl-C stops", flush=True)
             wait(lambda: False, float("inf"))
 
 
 @contextmanager
 def password_set(folder: DataFolder) -> Iterator[str]:
-    """See that a password is set, MOTION_MEMORY_AUTH or one that is made; how clients come by it."""
+    """Make a password unless MOTION_MEMORY_AUTH is set; yields the line that tells clients how to get it."""
     if auth() is not None:
         yield access()
         return
@@ -74,7 +89,7 @@ def password_set(folder: DataFolder) -> Iterator[str]:
 
 
 def mlflow_app(data: DataFolder) -> Guard:
-    """MLflow's server behind the guard; it hands out artifacts, so that clients need no access to them."""
+    """MLflow's server behind the guard; it serves artifacts, so clients need no access to their folder."""
     os.environ["MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE"] = "true"  # read on import; the guard does more
     from mlflow.server import constants
 
@@ -84,13 +99,13 @@ def mlflow_app(data: DataFolder) -> Guard:
         store = f"sqlite:///{data.mlflow_database}"
     artifacts = os.environ.get("MLFLOW_ARTIFACTS_DESTINATION") or data.mlflow_artifacts.as_uri()
     root = "mlflow-artifacts:/"
-    os.environ.pop("MLFLOW_TRACKING_URI", None)  # it is the server, not its client
+    os.environ.pop("MLFLOW_TRACKING_URI", None)  # this process is the server, not a client
     os.environ |= {
         constants.BACKEND_STORE_URI_ENV_VAR: store,
         constants.ARTIFACT_ROOT_ENV_VAR: root,
         constants.SERVE_ARTIFACTS_ENV_VAR: "true",
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
-        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # ten processes more, for what nobody here asks of it
+        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # would start ten processes that nobody needs
     }
     from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores
@@ -103,7 +118,11 @@ def mlflow_app(data: DataFolder) -> Guard:
 def _running(
     apps: dict[str, tuple[Callable[[], Any], socket.socket]],
 ) -> Iterator[Callable[[Callable[[], bool], float], None]]:
-    """Processes that serve; what is yielded waits for a condition or the user, or says which ended."""
+    """Run a process for each server; yields a function that waits for a condition or the end.
+
+    The function takes a condition and a limit in seconds. It raises RunError if a process ends or the time
+    runs out.
+    """
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -111,14 +130,14 @@ def _running(
     processes = {name: context.Process(target=_serve, args=args, name=name) for name, args in apps.items()}
 
     def wait(until: Callable[[], bool], seconds: float) -> None:
-        last = time.monotonic() + seconds
+        deadline = time.monotonic() + seconds
         while not (stop.is_set() or until()):
             ended = [name for name, process in processes.items() if not process.is_alive()]
             if ended:
-                raise RunError(f"{ended[0]}'s server ended; what it printed says why.")
-            if time.monotonic() > last:
-                raise RunError(f"The servers were not up after {seconds:.0f} s; what they printed says why.")
-            stop.wait(LOOK_SECONDS)
+                raise RunError(f"{ended[0]}'s server ended; see what it printed.")
+            if time.monotonic() > deadline:
+                raise RunError(f"The servers did not start within {seconds:.0f} s; see what they printed.")
+            stop.wait(POLL_SECONDS)
 
     for process in processes.values():
         process.start()
@@ -132,8 +151,8 @@ def _running(
             process.kill()
 
 
-def _serve(app: Callable[[], Any], place: socket.socket) -> None:
+def _serve(app: Callable[[], Any], listener: socket.socket) -> None:
     from uvicorn import Server
 
     end_with_parent()
-    Server(config_of(app)).run(sockets=[place])
+    Server(config_of(app)).run(sockets=[listener])

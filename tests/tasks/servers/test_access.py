@@ -60,7 +60,7 @@ def test_a_malformed_password_is_refused_without_being_shown(
 def test_what_is_no_address_is_refused_with_and_without_a_password(monkeypatch: pytest.MonkeyPatch) -> None:
     for secret in ("", SECRET):
         monkeypatch.setenv(AUTH, secret)
-        with pytest.raises(UsageError, match="No address is known of"):
+        with pytest.raises(UsageError, match="has no address"):
             check_address("")
 
 
