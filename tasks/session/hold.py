@@ -1,4 +1,4 @@
-"""Who works in a data folder holds it: a command, or a flow that Prefect itself has started."""
+"""Lock a data folder for one process: a command, or a flow that Prefect itself has started."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 Flow = Callable[Concatenate[RunSettings, str, Rest], Result]
 
-_held: set[Path] = set()  # by this process
+_locked: set[Path] = set()  # by this process
 
 
 @contextmanager
 def hold(data: Path | str) -> Iterator[DataFolder]:
-    """Hold a data folder for this process, which may hold it already.
+    """Lock a data folder for this process, which may have locked it already.
 
-    StorageError: another process holds it; the message says which.
+    Yields the folder. Raises InUseError, which names the other process, if that has locked it.
     """
     folder = open_data_folder(data)
-    if folder.path in _held:
+    if folder.path in _locked:
         yield folder
         return
     with folder.lock():
-        _held.add(folder.path)
+        _locked.add(folder.path)
         try:
             yield folder
         finally:
-            _held.discard(folder.path)
+            _locked.discard(folder.path)
 
 
 def holding(flow: Flow[Rest, Result]) -> Flow[Rest, Result]:
-    """Wrap a flow so that it holds its data folder, whoever has started it."""
+    """Wrap a flow so that it locks its data folder, whoever starts the flow."""
 
     @functools.wraps(flow)
-    def wrapped(settings: RunSettings, data: str, *rest: Rest.args, **named: Rest.kwargs) -> Result:
+    def locked_flow(settings: RunSettings, data: str, *rest: Rest.args, **named: Rest.kwargs) -> Result:
         with hold(data):
             return flow(settings, data, *rest, **named)
 
-    return cast("Flow[Rest, Result]", wrapped)
+    return cast("Flow[Rest, Result]", locked_flow)

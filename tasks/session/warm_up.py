@@ -1,4 +1,4 @@
-"""Compile the kernels while servers start: Numba keeps what it compiled, so later processes only load it."""
+"""Compile the kernels while servers start; Numba caches them, so later processes only load them."""
 
 from __future__ import annotations
 
@@ -27,46 +27,49 @@ from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
 
 @contextmanager
 def warm_up(cluster: Any, vehicle: str) -> Iterator[None]:
-    """Have the workers of a cluster compile for a vehicle, beside other work, in this context.
+    """Let the workers of a cluster compile the kernels while the context lasts.
 
-    Args:
-        cluster: what ``tasks.fan_out.fan_out.cluster`` yields.
-        vehicle: its name.
+    Parameters
+    ----------
+    cluster
+        What ``tasks.fan_out.fan_out.cluster`` yields.
+    vehicle
+        Name of the vehicle to compile for.
 
     """
     with Client(cluster, set_as_default=False) as client:
-        work = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
+        futures = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
         yield
-        client.cancel(work)
+        client.cancel(futures)
 
 
 def _compile_collecting(vehicle: Vehicle) -> None:
-    """The collecting planner."""
+    """Compile the planner that collects experiences."""
     solve(EMPTY, COLLECTOR, vehicle=vehicle)
 
 
 def _compile_hallucination(vehicle: Vehicle) -> None:
-    """Drawing problems, and what hallucinate makes of them unless it is asked for another mixture."""
+    """Compile the drawing of problems and the default mixture of hallucination."""
     controls = np.tile([vehicle.max_acceleration, 0.0], (140, 1))
     plan = Plan(simulate(start_state(EMPTY, vehicle), controls, vehicle), controls)
     end = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
     experience = Experience(replace(EMPTY, goal=end), plan, vehicle)
     for name in CLASSES:
         draw = problem_class(name, vehicle=vehicle).draw_obstacles
-        made = next(hallucinate(experience, dict(DEFAULT_MIXTURE), draw, generator(0)))
-        label_problems([made.problem], experience.sweep)
+        hallucinated = next(hallucinate(experience, dict(DEFAULT_MIXTURE), draw, generator(0)))
+        label_problems([hallucinated.problem], experience.sweep)
         no_plan(experience.sweep, draw, generator(0), name, 0)
 
 
 def _compile_rest(vehicle: Vehicle) -> None:
-    """What only the benchmark needs."""
+    """Compile what only the benchmark needs."""
     compile_assists(vehicle)
     for planner in PLANNERS:
         for assist in ("none", "fresh"):
             solve(EMPTY, planner, assist, vehicle=vehicle)
 
 
-# In the order of need: of two workers each compiles one of the first two, and whoever is free the last.
+# In the order of need: of two workers each compiles one of the first two, and the first to finish the last.
 GROUPS: Final[tuple[Callable[[Vehicle], object], ...]] = (
     _compile_collecting,
     _compile_hallucination,
