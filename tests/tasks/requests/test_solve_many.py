@@ -182,7 +182,10 @@ def test_a_killed_command_goes_on_with_two_workers_to_the_same_rows(
     undisturbed: pd.DataFrame, problems: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "rows.parquet"
-    script = "from tasks import parts; parts.PART_PROBLEMS = 1; from flows.cli.main import main; main()"
+    script = (
+        "from flows.cli.main import main; from tasks.requests import problem_parts; "
+        "problem_parts.PART_PROBLEMS = 1; main()"
+    )
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
     command = [sys.executable, "-c", script, "solve", str(problems), "--out", str(out), "--workers", "2"]
     begun = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.DEVNULL)
