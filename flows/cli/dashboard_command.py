@@ -1,4 +1,4 @@
-"""The dashboard: what runs found, as pages in a browser."""
+"""The command ``dashboard``: the results of runs as pages in a browser."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = Tru
     data
         Data folder; default $MOTION_MEMORY_DATA or ./data. Nothing in it is changed.
     port
-        Where it listens; 0: any port that is free.
+        Port to listen on; 0 takes any free one.
     browser
-        Open it in the browser where there is a terminal.
+        Open the dashboard in a browser, if the output is a terminal.
 
     """
     from tasks.serving.serve_dashboard import serve_dashboard

@@ -1,4 +1,4 @@
-"""The command line, ``motion-memory``: its commands, exit codes, and what an error or Ctrl-C looks like."""
+"""The command line ``motion-memory``: its commands, its exit codes, and how it reports errors and Ctrl-C."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tasks.settings.redaction import redacted
 FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
-GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to tell the server and to take workers along
+GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and to end the workers
 
 app = App(
     name="motion-memory",
@@ -46,7 +46,7 @@ for command in (
 
 
 def call(arguments: Sequence[str] | None = None) -> int:
-    """Run a command; its exit code. A failure is one line on the error stream."""
+    """Run a command and return its exit code; a failure prints one line to the error stream."""
     debug = os.environ.get("MOTION_MEMORY_DEBUG") == "1"
     try:
         app(
@@ -84,15 +84,15 @@ def main() -> None:
     code = call()
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(code)  # threads of Prefect and Dask would wait for servers that are gone
+    os._exit(code)  # threads of Prefect and Dask would wait for servers that have ended
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    """End in order, but soon: what hangs is left, and dies with this process."""
-    last = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
-    last.daemon = True
-    last.start()
-    print("Interrupted; the same command goes on where it stopped.", file=sys.stderr)
+    """End in an orderly way, but exit after ``GRACE_SECONDS`` if something hangs."""
+    forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
+    forced_exit.daemon = True
+    forced_exit.start()
+    print("Interrupted; give the same command again to continue.", file=sys.stderr)
     raise KeyboardInterrupt
 
 

@@ -1,4 +1,4 @@
-"""Maps and worlds of one's own: made into problems, driven over."""
+"""Commands for the user's own worlds and maps: import problems, plan a route."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def import_worlds(
     picture: Path | None = None,
     reading: MapOptions = _AS_IT_IS,
 ) -> None:
-    """Make problems of worlds, or cut them from a map.
+    """Make problems from worlds, or cut them from a map.
 
     Parameters
     ----------
@@ -40,11 +40,11 @@ def import_worlds(
     part
         train, test, validation, or both of the first two.
     problems
-        How many of each part; of a map 1,000 by default, of worlds all.
+        Problems of each part; default 1,000 of a map, all of worlds.
     seed
-        Where on a map problems are cut follows from it.
+        Decides where problems are cut from a map.
     vehicle
-        Who must have room to start: car, differential-drive, car-1-trailer or car-2-trailers.
+        Vehicle that must have room to start: car, differential-drive, car-1-trailer or car-2-trailers.
     strict
         Stop at a bad world instead of skipping it.
     picture
@@ -71,35 +71,35 @@ def route(
     options: SolveOptions = _USUAL,
     reading: MapOptions = _AS_IT_IS,
 ) -> None:
-    """Drive over a map: local plans from memory where it knows them, one feasible plan in the end.
+    """Plan a drive over a map, made of local plans, from memory where possible.
 
     Parameters
     ----------
     path
         A map: .map, .yaml (ROS), .npy, .npz.
     begin
-        Where the vehicle stands in the map's frame: x,y,heading, in metres and radians.
+        Pose of the vehicle in the map's frame: x,y,heading, in metres and radians.
     end
-        Where it should go: x,y in metres. Given several times: through all of these, in order.
+        Goal: x,y in metres. Can be repeated: the drive then passes all goals in this order.
     format
         moving-ai, ros or numpy; by default recognised by the file's ending.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. By default repair
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
         with a memory, fresh without.
     out
         Where to write the plan, .json.
     picture
         Where to draw the route, .png, .svg or .pdf.
     options
-        How local problems are solved.
+        How to solve local problems.
     reading
         How the map is read.
 
     """
-    from tasks.requests import drive_route as task
     from tasks.requests.assistant import Assistant
+    from tasks.requests.drive_route import drive_route
     from tasks.requests.import_worlds import import_settings
 
     assistant = Assistant(*options.way(assist or ("fresh" if options.memory is None else "repair")))
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))
-    task.route(path, format, begin, end, assistant, settings, out, picture)
+    drive_route(path, format, begin, end, assistant, settings, out, picture)

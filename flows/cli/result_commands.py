@@ -1,4 +1,4 @@
-"""What runs have left: checked, exported, compared."""
+"""Commands for the results of runs: check, export, compare."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
     folder
         The data folder.
     sample
-        Share of the benchmark's problems whose attempts are made again, 0 to 1.
+        Share of the benchmark's problems that are attempted again, 0 to 1.
     workers
-        Worker processes; default one a core.
+        Worker processes; default one for each core.
 
     """
     from tasks.requests.verify import verify as task
@@ -26,7 +26,7 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
 
 
 def export(run: Path, *, format: str, out: Path) -> None:
-    """Write the attempts of a run for other tools.
+    """Write the attempts of a run in a format of other tools.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def export(run: Path, *, format: str, out: Path) -> None:
     format
         ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv (.csv).
     out
-        Where to write it.
+        The file or folder to write.
 
     """
     from tasks.reports.export import export_run
@@ -44,14 +44,14 @@ def export(run: Path, *, format: str, out: Path) -> None:
 
 
 def compare(*runs: Path, out: Path | None = None) -> None:
-    """Compare runs with the first of them, paired by problem: times, checks, solved, with intervals.
+    """Compare runs with the first one, paired by problem: times, checks, solved, with intervals.
 
     Parameters
     ----------
     runs
-        Two folders of runs or more, in the data folder's runs.
+        Two or more folders of runs, in the data folder's runs.
     out
-        Where to write the comparison too: .md, .json or .csv.
+        A file that the comparison is also written to: .md, .json or .csv.
 
     """
     from tasks.reports.compare import compare as task

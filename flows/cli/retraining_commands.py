@@ -1,4 +1,4 @@
-"""Operating memories: retrain them now or on a schedule, approve a challenger, go back."""
+"""Commands to operate memories: retrain now or on a schedule, approve a challenger, roll back."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Flag = Annotated[bool, Parameter(negative=())]
 
 
 def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = NO_OPTIONS) -> None:
-    """Make challengers of what was learned since the champions; promote those that are better.
+    """Train challengers with the experiences learned since the champions; promote those that are better.
 
     Parameters
     ----------
     approve
         A challenger that is better waits for `motion-memory promote`.
     dry_run
-        Say what would be done, and write nothing.
+        Print what would be done, and write nothing.
     options
         What a run is and where it happens.
 
@@ -57,14 +57,14 @@ def serve(
     approve: Flag = False,
     options: Options = NO_OPTIONS,
 ) -> None:
-    """Retrain on a schedule, one at a time, and when incoming problems are answered less often; until Ctrl-C.
+    """Retrain on a schedule, and when the memory answers fewer of the incoming problems; until Ctrl-C.
 
     Parameters
     ----------
     every
-        Seconds between two retrainings; 86,400, a day, where neither this nor --cron is given.
+        Seconds between two retrainings; 86,400 (a day) if neither this nor --cron is given.
     cron
-        When to retrain, like "0 3 * * *": at three each night.
+        When to retrain, such as "0 3 * * *" for three each night.
     approve
         A challenger that is better waits for `motion-memory promote`.
     options
@@ -79,12 +79,12 @@ def serve(
 
 
 def promote(*, memory: str | None = None, data: Path | None = None) -> None:
-    """Approve challengers that are better: they become champions.
+    """Approve better challengers: they become champions.
 
     Parameters
     ----------
     memory
-        Of this memory, like trap; by default all that await it.
+        Approve the challenger of this memory, such as trap; by default all that wait.
     data
         Data folder; default $MOTION_MEMORY_DATA or ./data.
 
@@ -96,12 +96,12 @@ def promote(*, memory: str | None = None, data: Path | None = None) -> None:
 
 
 def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
-    """Make the champion before champion again.
+    """Make the champion before the current one champion again.
 
     Parameters
     ----------
     memory
-        Of this memory, like trap; by default of all that the last retraining promoted.
+        Roll back this memory, such as trap; by default all that the last retraining promoted.
     data
         Data folder; default $MOTION_MEMORY_DATA or ./data.
 
@@ -116,5 +116,5 @@ def _settings(options: Options) -> RunSettings:
     from tasks.settings.run_settings import UsageError
 
     if options.learned is not None:
-        raise UsageError("--learned is not for retraining, which freezes what was learned by itself.")
+        raise UsageError("--learned is not for retraining, which itself freezes what was learned.")
     return replace(settings_of(options), continual="none")

@@ -1,4 +1,4 @@
-"""Servers: of a memory, of the records that several people and machines share."""
+"""Commands that serve a memory, or Prefect and MLflow for several people and machines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def serve_memory(
     port: int = 5001,
     workers: int = 1,
 ) -> None:
-    """Answer problems over HTTP, by MLflow's protocol, with ranked and checked plans of a memory.
+    """Answer problems over HTTP, in MLflow's protocol, with ranked and checked plans of a memory.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def serve_memory(
     host
         Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
     port
-        Port to listen on; 0: a free one.
+        Port to listen on; 0 takes any free one.
     workers
         Worker processes.
 
@@ -46,12 +46,12 @@ def servers(
     prefect_port: int = 4200,
     mlflow_port: int = 5000,
 ) -> None:
-    """Run Prefect's and MLflow's servers for all who share them, until Ctrl-C.
+    """Run shared servers of Prefect and MLflow until Ctrl-C.
 
     Parameters
     ----------
     data
-        Data folder whose records they show; default $MOTION_MEMORY_DATA or ./data.
+        Data folder whose records the servers show; default $MOTION_MEMORY_DATA or ./data.
     host
         Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
     prefect_port

@@ -14,16 +14,16 @@ if TYPE_CHECKING:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class SolveOptions:
-    """How problems are solved, but for the assist: ``plan``, ``solve``, ``route``.
+    """How ``plan``, ``solve`` and ``route`` solve problems, except for the assist.
 
     Parameters
     ----------
     planner
         rrt, gust or follow.
     top_k
-        How many plans are recalled.
+        How many plans to recall.
     recall
-        How they are found: exhaustive, mask, hybrid, centroid, random; by default the best for the memory.
+        How to recall them: exhaustive, mask, hybrid, centroid, random; default the best for the memory.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
@@ -59,19 +59,19 @@ class SolveOptions:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class MapOptions:
-    """How a map is read: ``import-worlds``, ``route``.
+    """How ``import-worlds`` and ``route`` read a map.
 
     Parameters
     ----------
     scale
-        Metres of the map in a canonical metre, as the memory's: 2 for a robot twice as large with goals twice
-        as far.
+        Metres of the map in a canonical metre, as in the memory: 2 for a robot twice as large, with goals
+        twice as far away.
     resolution
-        Metres a cell of a .map or NumPy map; default 1.
+        Metres in a cell of a .map or NumPy map; default 1.
     unknown
-        What unknown cells of the map are: occupied or free.
+        What unknown cells of the map count as: occupied or free.
     tolerance
-        Metres that the outline of what is occupied may move, for fewer pieces; 0: it is exact.
+        Metres that outlines of obstacles may move to have fewer pieces; 0 keeps them exact.
 
     """
 

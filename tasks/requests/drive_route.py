@@ -1,4 +1,4 @@
-"""Route: one drive over a map, from a pose through goals, made of local plans that a memory may know."""
+"""The command ``route``: one drive over a map, from a pose through goals, made of local plans."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of an att
 
 @dataclass
 class _Solver:
-    """Solves a route's local problems, and remembers what that took."""
+    """Solves a route's local problems, and notes the planning time of each."""
 
     assistant: Assistant
     scale: float
-    seconds: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)  # planning time of each attempt
 
     def recalled(self, problem: Problem) -> Attempt:
-        """With the memory, as the assistant was asked to."""
+        """Solve a problem with a canonical goal, with the assistant's own assist."""
         return self._solved(problem, self.assistant.assist)
 
     def searched(self, problem: Problem) -> Attempt:
-        """A goal that is not canonical: along a fresh way over the grid, no memory."""
+        """Solve a problem whose goal is not canonical: the memory has no plans for it."""
         return self._solved(problem, "none" if self.assistant.assist == "none" else "fresh")
 
     def _solved(self, problem: Problem, assist: str) -> Attempt:
@@ -53,8 +53,8 @@ class _Solver:
         return attempt
 
 
-def numbers_of(text: str, count: int, option: str, wanted: str) -> tuple[float, ...]:
-    """Numbers between commas; UsageError with one line where they are not ``count`` finite ones."""
+def _numbers_of(text: str, count: int, option: str, wanted: str) -> tuple[float, ...]:
+    """The numbers in a text like ``1,2``. Raises UsageError unless there are ``count``, all finite."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
@@ -64,24 +64,52 @@ def numbers_of(text: str, count: int, option: str, wanted: str) -> tuple[float, 
     return numbers
 
 
-def route(
+def drive_route(
     path: Path,
-    named: str | None,
-    begin: str,
-    ends: list[str],
+    map_format: str | None,
+    start: str,
+    goals: list[str],
     assistant: Assistant,
     settings: ImportSettings,
     out: Path | None,
     drawing: Path | None,
 ) -> None:
-    """Find a route, have it checked, write plan and picture, and print a table of its legs."""
+    """Plan a route over a map, check it as one plan, write plan and picture, and print a table of its legs.
+
+    Parameters
+    ----------
+    path
+        The map's file.
+    map_format
+        The file's format, or None to recognise it by the file's ending.
+    start
+        The first pose as ``x,y,heading``, in metres and radians, in the map's frame.
+    goals
+        The goals in the order of the drive, each as ``x,y`` in metres.
+    assistant
+        Solves the local problems.
+    settings
+        How the map is read, and its scale.
+    out, drawing
+        Where to write the plan and a picture, or None.
+
+    Raises
+    ------
+    UsageError
+        An option is malformed, or start or goal cannot be used.
+    RunError
+        There is no route.
+    PlanFaultError
+        The independent judge refuses the route.
+
+    """
     check_picture(drawing)
-    check_known("format", [] if named is None else [named], FORMATS)
-    start = numbers_of(begin, 3, "--from", "x,y,heading in metres and radians")
-    goals = [(x, y) for x, y in (numbers_of(end, 2, "--to", "x,y in metres") for end in ends)]
-    if not goals:
+    check_known("format", [] if map_format is None else [map_format], FORMATS)
+    pose = _numbers_of(start, 3, "--from", "x,y,heading in metres and radians")
+    goals_m = [(x, y) for x, y in (_numbers_of(goal, 2, "--to", "x,y in metres") for goal in goals)]
+    if not goals_m:
         raise UsageError("No goal. Give --to x,y, once or several times.")
-    source = source_at(path, named)
+    source = source_at(path, map_format)
     if not source.is_map:
         raise UsageError(f"{path} holds worlds; a route needs a map: .map, .yaml (ROS), .npy or .npz.")
     world = load_map(source, settings)
@@ -96,32 +124,32 @@ def route(
     router = Router(
         canonical, solver.recalled, solver.searched, assistant.vehicle, settings.tolerance_m / scale
     )
-    x, y, heading = world.grid_pose(start[0], start[1], start[2])
-    places = [world.grid_pose(*goal, 0.0)[:2] for goal in goals]
-    asked = ((x / scale, y / scale, heading), [(right / scale, up / scale) for right, up in places])
-    router.route(*asked)  # code is warm before the time counts
+    x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
+    grid_goals = [world.grid_pose(*goal, 0.0)[:2] for goal in goals_m]
+    request = ((x / scale, y / scale, heading), [(right / scale, up / scale) for right, up in grid_goals])
+    router.route(*request)  # compiles and fills caches before the time counts
     solver.seconds.clear()
     began = time.perf_counter()
-    found = router.route(*asked)
+    route = router.route(*request)
     seconds = time.perf_counter() - began
-    if isinstance(found, Stuck):
-        raise _refusal(found, world, scale)
-    plan = found.plan(assistant.vehicle)
-    _check(found, plan, assistant)
+    if isinstance(route, Stuck):
+        raise _refusal(route, world, scale)
+    plan = route.plan(assistant.vehicle)
+    _check(route, plan, assistant)
     if out is not None:
-        write_plan(out, _record(found, plan, world, assistant, solver, scale))
-    lines = _summary(found, plan, solver, assistant, scale, seconds)
+        write_plan(out, _record(route, plan, world, assistant, solver, scale))
+    lines = _summary(route, plan, solver, assistant, scale, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
 
-        figure = route_picture(world, found, goals, scale, lines[0], assistant.vehicle)
+        figure = route_picture(world, route, goals_m, scale, lines[0], assistant.vehicle)
         with whole_file(drawing) as temporary:
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
-    Console(highlight=False).print(_table(found, assistant, scale))
+    Console(highlight=False).print(_table(route, assistant, scale))
     print(*lines, sep="\n")
-    for what, place in (("plan", out), ("picture", drawing)):
-        if place is not None:
-            print(f"{what:8} {place}")
+    for label, path_written in (("plan", out), ("picture", drawing)):
+        if path_written is not None:
+            print(f"{label:8} {path_written}")
 
 
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
@@ -134,20 +162,20 @@ def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
     )
 
 
-def _check(found: Route, plan: Plan, assistant: Assistant) -> None:
-    """PlanFaultError where the authority refuses the whole."""
-    wrong = faults(found.problem, plan, assistant.vehicle)
-    if wrong:
-        raise PlanFaultError(f"The route over {found.problem.id}, seed {assistant.seed}: {wrong[0]}")
+def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
+    """Raise PlanFaultError if the independent judge refuses the route as one plan."""
+    route_faults = faults(route.problem, plan, assistant.vehicle)
+    if route_faults:
+        raise PlanFaultError(f"The route over {route.problem.id}, seed {assistant.seed}: {route_faults[0]}")
 
 
 def _record(
-    found: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, solver: _Solver, scale: float
+    route: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, solver: _Solver, scale: float
 ) -> PlanRecord:
-    """The plan in the map's frame; its source is that of its least remembered leg."""
+    """The plan in the map's frame; "searched" or "repaired" if any leg is, in this order."""
     left, bottom, turn = world.origin
-    placed = from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
-    sources = [leg.source for leg in found.legs]
+    in_map_frame = from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
+    sources = [leg.source for leg in route.legs]
     return PlanRecord(
         f"{world.name}-route",
         "solved",
@@ -155,7 +183,7 @@ def _record(
         assistant.planner,
         assistant.assist,
         sum(solver.seconds),
-        placed,
+        in_map_frame,
         assistant.vehicle,
         scale,
     )
@@ -167,15 +195,15 @@ def _driven_m(leg: Leg, assistant: Assistant) -> float:
     return Plan(states, leg.controls[: leg.driving]).length_m
 
 
-def _table(found: Route, assistant: Assistant, scale: float) -> Table:
+def _table(route: Route, assistant: Assistant, scale: float) -> Table:
     table = Table("leg", "source", "driven m", "turning m", "s", "planning ms", "retrieval ms", box=None)
     for column in table.columns[2:]:
         column.justify = "right"
-    for number, leg in enumerate(found.legs, start=1):
+    for number, leg in enumerate(route.legs, start=1):
         states, driven = leg.states(assistant.vehicle), _driven_m(leg, assistant)
         whole = Plan(states, leg.controls, assistant.vehicle.dt)
         retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
-        asked = leg.attempt.assist not in WITHOUT_MEMORY
+        used_memory = leg.attempt.assist not in WITHOUT_MEMORY
         table.add_row(
             f"{number}",
             leg.source,
@@ -183,23 +211,23 @@ def _table(found: Route, assistant: Assistant, scale: float) -> Table:
             f"{scale * (whole.length_m - driven):.1f}",
             f"{whole.duration_s:.1f}",
             f"{1000.0 * leg.attempt.planning_seconds:.2f}",
-            f"{1000.0 * retrieval:.2f}" if asked else "-",
+            f"{1000.0 * retrieval:.2f}" if used_memory else "-",
         )
     return table
 
 
 def _summary(
-    found: Route, plan: Plan, solver: _Solver, assistant: Assistant, scale: float, seconds: float
+    route: Route, plan: Plan, solver: _Solver, assistant: Assistant, scale: float, seconds: float
 ) -> list[str]:
-    """The whole in a line, and how much of it came from memory."""
-    legs = found.legs
+    """Lines about the whole route, the share that came from memory, and the planning times."""
+    legs = route.legs
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
     }
-    known = len(by_source["recalled"]) + len(by_source["repaired"])
-    told = [
+    from_memory = len(by_source["recalled"]) + len(by_source["repaired"])
+    lines = [
         f"{scale * plan.length_m:.0f} m in {plan.duration_s:.0f} s, {_count(len(legs), 'leg')}, "
-        f"{known} from memory"
+        f"{from_memory} from memory"
     ]
     parts = [
         f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
@@ -208,18 +236,18 @@ def _summary(
     ]
     parts.append(f"turning and braking {scale * (plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
     share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
-    told.append("; ".join(parts))
+    lines.append("; ".join(parts))
     if legs:
-        told.append(
-            f"from memory: {known / len(legs):.0%} of the legs, {share:.0%} of the metres "
+        lines.append(
+            f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
             "(a repaired leg counts whole)"
         )
-    told.append(
+    lines.append(
         f"planning {1000.0 * sum(solver.seconds):.2f} ms in {_count(len(solver.seconds), 'attempt')}; "
         f"of {seconds:.2f} s for the whole route; checked from end to end"
     )
-    return told
+    return lines
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + "s" * (number != 1)
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + "s" * (number != 1)

@@ -33,20 +33,18 @@ from tasks.settings.run_settings import UsageError, check_known
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What came of a problem."""
+    """The result of planning for one problem."""
 
     problem_id: str
     status: str  # "solved", or how planning failed (planners.search.outcome.Status)
     source: str | None  # "recalled", "repaired" or "searched"; None when not solved
-    plan: Plan | None  # in the frame and the lengths of the problem as given; None when not solved
-    planning_seconds: (
-        float  # from the obstacles to the plan, without reading the problem and judging the plan
-    )
+    plan: Plan | None  # in the frame and units of the given problem; None when not solved
+    planning_seconds: float  # without reading the problem and judging the plan
 
 
 @dataclass(frozen=True, eq=False)
 class RobotPlanner:
-    """Plans for a problem in whatever thread it is asked; several threads plan at the same time."""
+    """Plans with one memory. Several threads may plan at the same time."""
 
     memory: Memory
     planner: str
@@ -55,35 +53,45 @@ class RobotPlanner:
     recall: str
     seed: int
     judged: bool
-    _idle: list[Workspace] = field(default_factory=list, repr=False)  # that no thread uses at the moment
+    _idle: list[Workspace] = field(default_factory=list, repr=False)  # not lent to a thread
 
     def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
-        """Plan for a problem, or for the contract's object (or its JSON text) that describes one.
+        """Plan for one problem; if there is no plan, the answer says so.
 
-        ValueError with one line: the problem is malformed, impossible, or of a scale that the memory is not
-        made for. No plan is an answer. PlanFaultError: the independent judge refuses the plan.
+        Parameters
+        ----------
+        problem
+            A ``Problem``, or a problem in the exchange format (docs/contract.md) as a mapping or JSON text.
+
+        Raises
+        ------
+        ValueError
+            The problem is malformed or impossible, or the memory is not made for its scale.
+        PlanFaultError
+            The independent judge refuses the plan.
+
         """
         vehicle = self.memory.vehicle
         if isinstance(problem, str):
             problem = _parsed(problem)
         if not isinstance(problem, Problem):
             problem = problem_of(problem, "problem", vehicle)
-        asked, alignment = to_canonical(problem)
+        canonical, alignment = to_canonical(problem)
         with self._workspace() as workspace:
             attempt = solve(
-                *(asked, self.planner, self.assist, self.top_k, self.memory, self.seed),
+                *(canonical, self.planner, self.assist, self.top_k, self.memory, self.seed),
                 vehicle=vehicle,
                 strategy=self.recall,
                 workspace=workspace,
             )
         if self.judged:
-            check_attempt(asked, attempt, set(), vehicle)
+            check_attempt(canonical, attempt, set(), vehicle)
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
         return Answer(problem.id, attempt.status, attempt.source, plan, attempt.planning_seconds)
 
     @contextmanager
     def _workspace(self) -> Iterator[Workspace]:
-        """Lend a workspace to one thread: one that another has given back, or a new one."""
+        """Lend a workspace to the calling thread: an idle one, or a new one."""
         try:
             workspace = self._idle.pop()
         except IndexError:
@@ -112,13 +120,31 @@ def load_planner(
     seed: int = 1,
     judged: bool = True,
 ) -> RobotPlanner:
-    """A planner that is ready: the memory read and checked, kernels compiled, one problem planned.
+    """Read and check a memory, compile the kernels and plan once, so that the first real call is fast.
 
-    ``memory``: a folder of one, of a run with one, or a model in MLflow. ``judged``: each plan is simulated
-    and swept again by code that shares nothing with the planners, some milliseconds beside the planning.
+    Parameters
+    ----------
+    memory
+        The folder of a memory, the folder of a run with one memory, or a model in MLflow.
+    vehicle, planner, assist, recall
+        Names; ``recall`` None takes the strategy that suits the memory.
+    top_k
+        How many plans to recall, at least 1.
+    seed
+        Seed of the search.
+    judged
+        Whether code that shares nothing with the planners simulates and sweeps each plan again, which takes
+        some milliseconds.
 
-    UsageError: an unknown name. StorageError: the memory is missing, damaged or of another vehicle. RunError:
-    MLflow does not have it, or there are several.
+    Raises
+    ------
+    UsageError
+        A name is unknown, or ``top_k`` is below 1.
+    StorageError
+        The memory is missing, damaged, or made for another vehicle.
+    RunError
+        MLflow does not have the memory, or the run has several.
+
     """
     check_known("vehicle", [vehicle], VEHICLES)
     check_known("planner", [planner], PLANNERS)
@@ -127,9 +153,9 @@ def load_planner(
     if top_k < 1:
         raise UsageError(f"Top k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
-        found = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
-    strategy = recall or default_recall(found)
-    compile_assists(found.vehicle, planner, [strategy])
-    ready = RobotPlanner(found, planner, assist, top_k, strategy, seed, judged)
-    ready.plan(replace(EMPTY, scale=found.scales[0]))
+        archive = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
+    strategy = recall or default_recall(archive)
+    compile_assists(archive.vehicle, planner, [strategy])
+    ready = RobotPlanner(archive, planner, assist, top_k, strategy, seed, judged)
+    ready.plan(replace(EMPTY, scale=archive.scales[0]))
     return ready

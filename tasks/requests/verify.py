@@ -1,4 +1,4 @@
-"""Verify a data folder, once it is known to be one and the libraries are told where to write."""
+"""The command ``verify``: check that there is a data folder, set the environment, and verify the folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,25 @@ from tasks.settings.run_settings import RunError, UsageError
 
 
 def verify(folder: Path, sample: float, workers: int) -> None:
-    """Check what lies in a data folder; nothing is written where there is none."""
+    """Check the files of a data folder.
+
+    Parameters
+    ----------
+    folder
+        The data folder.
+    sample
+        Share of the benchmark's problems that are attempted again, 0 to 1.
+    workers
+        The number of worker processes.
+
+    Raises
+    ------
+    UsageError
+        The sample is not a share.
+    RunError
+        The folder is no data folder, or something in it is wrong.
+
+    """
     if not 0.0 <= sample <= 1.0:
         raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")
     if not fetch(local_place(folder) / MARK).is_file():
