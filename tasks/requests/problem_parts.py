@@ -97,8 +97,8 @@ def parts_of(asked: Asked) -> list[Part]:
 
 @functools.lru_cache(maxsize=1)
 def _parts_of(asked: Asked, _changed: tuple[int, int] | None) -> list[Part]:
-    longest = max(1, int(PART_SECONDS / asked.way.improve_seconds)) if asked.way.improve_seconds else FLAT
-    pieces = slices_of(asked.problems, min(PART_PROBLEMS, longest))
+    longest = PART_SECONDS / asked.way.improve_seconds if asked.way.improve_seconds else PART_PROBLEMS
+    pieces = slices_of(asked.problems, max(1, int(min(PART_PROBLEMS, longest))))
     if not pieces:
         raise StorageError(f"{asked.problems} holds no problems; nothing to solve.")
     many = sum(piece.count for piece in pieces) > FLAT

@@ -54,6 +54,15 @@ def undisturbed(problems: Path) -> pd.DataFrame:
     return read_attempts(out)
 
 
+@pytest.mark.parametrize(("seconds", "size"), [(0.0, SIZE), (1e-320, SIZE), (4.0, 2), (100.0, 1), (1e308, 1)])
+def test_parts_are_so_small_that_improving_one_takes_seconds(
+    problems: Path, tmp_path: Path, seconds: float, size: int
+) -> None:
+    way = WAY._replace(improve_seconds=seconds)
+    pieces = parts.parts_of(parts.Asked(problems, tmp_path / "rows.parquet", way, ""))
+    assert pieces[0].piece.count == size
+
+
 class StoppedError(Exception):
     """As by Ctrl-C."""
 
