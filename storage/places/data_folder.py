@@ -111,13 +111,26 @@ class RunFolder:
         """The folder of the memory that a retraining begins from and is judged against."""
         return self.path / "champions" / checked_name(class_name)
 
+    def memory_names(self) -> list[str]:
+        """The memories that are there."""
+        headers = (self.path / "memories").glob("*/memory.json")
+        return sorted(path.parent.name for path in headers if NAME.fullmatch(path.parent.name))
+
+    def rows(self, table: Table, class_name: str) -> Path:
+        """The folder of a table's chunks for one class."""
+        return self.path / table / checked_name(class_name)
+
+    def classes_in(self, table: Table) -> list[str]:
+        """The classes that a table has a folder for."""
+        return [path.name for path in folders_in(self.path / table) if NAME.fullmatch(path.name)]
+
     def shard(self, table: Table, class_name: str, index: int) -> Path:
-        """Chunk ``index`` of a table: ``<table>/<class>/NNNN.parquet``."""
-        return self.path / table / checked_name(class_name) / f"{index:04d}.parquet"
+        """Chunk ``index`` of a table for one class: ``<table>/<class>/NNNN.parquet``."""
+        return self.rows(table, class_name) / f"{index:04d}.parquet"
 
     def shards(self, table: Table, class_name: str) -> list[Path]:
-        """The chunks of a table that are there, in order."""
-        return files_in(self.path / table / checked_name(class_name), "[0-9]*.parquet")
+        """The chunks of a table for one class that are there, in order."""
+        return files_in(self.rows(table, class_name), "[0-9]*.parquet")
 
 
 @dataclass(frozen=True)
@@ -158,6 +171,10 @@ class DataFolder:
     def learned(self, vehicle: str) -> Path:
         """The folder of what was learned on the job for a vehicle (``learned.py``)."""
         return self.path / "learned" / checked_name(vehicle)
+
+    def learned_folders(self) -> list[Path]:
+        """The folders of ``learned`` that are there, one a vehicle."""
+        return folders_in(self.path / "learned")
 
     @property
     def watched(self) -> Path:

@@ -51,6 +51,14 @@ def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configur
     return attempts.assign(configuration=labels.take(place)), known
 
 
+def configurations_in(table: pd.DataFrame) -> list[Configuration]:
+    """The distinct configurations in a ``table`` with columns ``assist, recall, top_k``, in reading order."""
+    if table.empty:
+        return []
+    rows = table[list(Configuration._fields)].drop_duplicates().itertuples(index=False, name=None)
+    return sorted((Configuration(*row) for row in rows), key=lambda configuration: configuration.rank)
+
+
 def _understood(assist: str, top_k: float, recall: object) -> Configuration:
     """The configuration that a row's fields mean, whichever version wrote it."""
     if assist in _WITHOUT_MEMORY:
