@@ -1,4 +1,4 @@
-"""Tables and their cells: how a figure is written, for a terminal and as Markdown."""
+"""How names and numbers are written, and tables of them: for a terminal and as Markdown."""
 
 from __future__ import annotations
 
@@ -11,58 +11,75 @@ from rich import box
 from rich.console import Group
 from rich.table import Table
 
+from dashboards.statistics.panels import COMBINED
 from planners.world.arrays import Floats
 
 NOTHING: Final = "–"
-NAMES: Final = {  # headings of columns to the left
+NAMES: Final = {  # headings of columns that are aligned to the left
     "stage", "planner", "configuration", "panel", "class", "memory", "protocol", "recall", "setting",
     "verdict",
 }  # fmt: skip
+PLANNING_TIME: Final = (
+    "Planning time is everything from receiving the obstacles to returning a plan: drawing the grid, "
+    "encoding, recall, checking recalled plans, guides and repair, the planner's own structures, search. One "
+    "problem at a time, one thread, compiled code warm. Failures count with the time they took."
+)
+_PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
 
 Rows = list[list[str]]
 
 
+def planner_title(planner: str) -> str:
+    """The name of a ``planner`` as people write it."""
+    return _PLANNERS.get(planner, planner)
+
+
+def panel_title(panel: str, planner: str) -> str:
+    """The title of what a ``planner`` did in a ``panel``, which is a class or the combined memory."""
+    return f"{planner_title(planner)}, {'combined memory' if panel == COMBINED else panel}"
+
+
 def percent(fraction: float) -> str:
-    """A fraction in per cent, without the sign."""
-    return f"{100.0 * fraction:.1f}"
-
-
-def share(fraction: float) -> str:
-    """The same, where there may be none."""
-    return NOTHING if math.isnan(fraction) else percent(fraction)
+    """A ``fraction`` in per cent without the sign, like ``12.3``; a dash for NaN."""
+    return NOTHING if math.isnan(fraction) else f"{100.0 * fraction:.1f}"
 
 
 def p_value(value: float) -> str:
-    """A p-value to three places."""
+    """A p-value to three decimals; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
     return "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
 def decimals_of(milliseconds: Floats) -> int:
-    """Decimals for all times of a panel, so that their points align: two digits of the least, 3 at most."""
+    """How many decimals all times of a table get: two digits of the least of ``milliseconds``, 3 at most."""
     least, most = float(np.nanmin(milliseconds)), float(np.nanmax(milliseconds))
     wanted = 3 if least <= 0.0 else 1 - math.floor(math.log10(least))
     return max(0, min(wanted, 3 if most < 1000.0 else 2))
 
 
 def count(value: float) -> str:
-    """A mean count in at most six places: 834, 47.3 k, 163 M."""
+    """A mean count in at most six characters: 834, 47.3 k, 163 M."""
     for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
         if value >= 0.9995 * size:
             return f"{value / size:.3g} {unit}"
     return f"{value:.0f}"
 
 
-def reduction(value: float, low: float, high: float) -> str:
-    """A reduction in per cent and its interval, where there is one."""
+def with_interval(value: float, low: float, high: float, decimals: int = 0) -> str:
+    """A fraction and its interval from ``low`` to ``high`` in per cent; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
-    return f"{100.0 * value:.1f} [{100.0 * low:5.1f}, {100.0 * high:5.1f}]"
+    ends = (f"{100.0 * end:{4 + decimals}.{decimals}f}" for end in (low, high))  # which align in a column
+    return f"{100.0 * value:.{decimals}f} [{', '.join(ends)}]"
 
 
 def rich_table(title: str, headings: Sequence[str], groups: Sequence[Rows]) -> Table:
-    """A table with numbers to the right and a gap after groups of several lines, named on the first only."""
+    """A table for a terminal.
+
+    ``title``, ``headings``: its texts; a heading of ``NAMES`` aligns its column to the left. ``groups``: rows
+    of cells; a group of several rows shows its first cell once, and a gap after it.
+    """
     table = Table(
         title=title,
         title_justify="left",
@@ -80,12 +97,12 @@ def rich_table(title: str, headings: Sequence[str], groups: Sequence[Rows]) -> T
 
 
 def titled_tables(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> Group:
-    """For a terminal: a table under each title."""
+    """Tables for a terminal under the same ``headings``, of pairs of a title and groups of rows."""
     return Group(*[rich_table(title, headings, groups) for title, groups in titled])
 
 
 def titled_markdown(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> str:
-    """As Markdown: a heading and a table for each title."""
+    """Like ``titled_tables``, as Markdown."""
     return "\n".join(
         f"### {title}\n\n{markdown_table(headings, [cells for group in groups for cells in group])}"
         for title, groups in titled
@@ -93,7 +110,7 @@ def titled_markdown(headings: Sequence[str], titled: Iterable[tuple[str, Sequenc
 
 
 def markdown_table(headings: Sequence[str], rows: Rows) -> str:
-    """A Markdown table whose source is aligned too."""
+    """A Markdown table of ``rows`` of cells whose source is aligned too."""
     widths = [max(len(cells[i]) for cells in [headings, *rows]) for i in range(len(headings))]
 
     def line(cells: Sequence[str]) -> str:

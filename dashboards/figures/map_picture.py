@@ -1,4 +1,4 @@
-"""A map as a picture: what is occupied, the blocks of each part, and problems cut from it where they lie."""
+"""A map as a picture: what is occupied, the blocks of each part, and where problems are cut from it."""
 
 from __future__ import annotations
 
@@ -16,24 +16,28 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.transforms import Affine2D
 
 from dashboards.figures.pictures import draw_problem
-from dashboards.figures.style import BLUE, INK, NOTE_SIZE, ORANGE, new_figure
+from dashboards.figures.style import legend_below, new_figure
+from dashboards.palette import BLUE, INK, OBSTACLE, ORANGE
 from planners.maps.cutting import Cut
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Blocks, blocks_of
 from planners.maps.surroundings import WINDOW
 from planners.world.arrays import Floats
-from planners.world.problem import BOUNDS, CANONICAL_START, Problem
+from planners.world.problem import BOUNDS, CANONICAL_START
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"train": BLUE, "test": ORANGE}
 SHOWN_WINDOWS: Final = 4  # of each part; more hide the map
-OCCUPIED: Final = "#6B7280"
 
 
 def map_picture(
     world: OccupancyMap, cuts: Mapping[str, Sequence[Cut]], scale: float, vehicle: Vehicle = CAR
 ) -> Figure:
-    """The map in its own frame with its blocks and the poses cut by part, beside a window of each part."""
+    """A figure of a map in its own frame, with its blocks and cuts, beside a window of each part.
+
+    ``world``: the map. ``cuts``: problems cut from it, by part. ``scale``: metres of the map in a metre of
+    these problems. ``vehicle``: that stands at their starts.
+    """
     parts = [part for part in cuts if cuts[part]]
     figure = new_figure(7.4 + 3.0 * bool(parts), 7.2, f"Problems cut from {world.name}")
     grid = figure.add_gridspec(
@@ -45,27 +49,24 @@ def map_picture(
     for row, part in enumerate(parts):
         _draw_cuts(axes, [cut.pose for cut in cuts[part]], scale, COLOURS[part])
         beside = figure.add_subplot(grid[row, 1])
-        shown = max((cut.problem for cut in cuts[part][:SHOWN_WINDOWS]), key=_pieces)
+        problems = [cut.problem for cut in cuts[part][:SHOWN_WINDOWS]]
+        shown = max(problems, key=lambda problem: len(problem.obstacles.piece_starts))
         draw_problem(beside, shown, vehicle)
         beside.set_title(shown.id, fontsize=9, color=COLOURS[part], pad=4)
     handles: list[Line2D | Patch] = [
-        Patch(facecolor=OCCUPIED, label="occupied"),
+        Patch(facecolor=OBSTACLE, label="occupied"),
         *(Patch(facecolor=COLOURS[part], alpha=0.15, label=f"blocks of {part}") for part in COLOURS),
         *(
             Line2D([], [], color=COLOURS[part], label=f"{len(cuts[part]):,} starts of {part}, some windows")
             for part in parts
         ),
     ]
-    figure.legend(handles=handles, loc="outside lower left", ncols=3, frameon=False, fontsize=NOTE_SIZE + 0.5)
+    legend_below(figure, handles, 3)
     return figure
 
 
-def _pieces(problem: Problem) -> int:
-    return len(problem.obstacles.piece_starts)
-
-
-def draw_map(axes: Axes, world: OccupancyMap, colour: str = OCCUPIED) -> None:
-    """What is occupied, in the map's frame, on axes in metres."""
+def draw_map(axes: Axes, world: OccupancyMap, colour: str = OBSTACLE) -> None:
+    """Draw what is occupied in ``world`` on axes in metres of the map's frame, in a ``colour``."""
     width, height = world.size
     picture = np.ma.masked_equal(world.occupied, False)
     axes.imshow(
@@ -87,13 +88,13 @@ def draw_map(axes: Axes, world: OccupancyMap, colour: str = OCCUPIED) -> None:
 
 
 def _frame(world: OccupancyMap) -> Affine2D:
-    """From grid coordinates to the map's frame."""
+    """The transform from grid metres to the map's frame."""
     left, bottom, turn = world.origin
     return Affine2D().rotate(turn).translate(left, bottom)
 
 
 def _draw_blocks(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
-    place = _frame(world) + axes.transData
+    to_axes = _frame(world) + axes.transData
     for column in range(blocks.columns):
         for row in range(blocks.rows):
             corner = np.array([column * blocks.width, row * blocks.height])
@@ -101,14 +102,14 @@ def _draw_blocks(axes: Axes, world: OccupancyMap, blocks: Blocks) -> None:
                 [[0, 0], [blocks.width, 0], [blocks.width, blocks.height], [0, blocks.height]]
             )
             colour = COLOURS["test" if (column + row) % 2 else "train"]
-            axes.add_patch(Polygon(square, facecolor=colour, alpha=0.12, transform=place, zorder=0))
+            axes.add_patch(Polygon(square, facecolor=colour, alpha=0.12, transform=to_axes, zorder=0))
 
 
 def _draw_cuts(axes: Axes, poses: Sequence[tuple[float, float, float]], scale: float, colour: str) -> None:
-    """Every start as a short line along its heading; of some the window and the way ahead."""
-    places = np.array(poses)
-    ahead = np.column_stack((np.cos(places[:, 2]), np.sin(places[:, 2])))
-    ticks = np.stack([places[:, :2], places[:, :2] + 3.0 * scale * ahead], axis=1)
+    """Draw every start as a short line along its heading; of some also the window and the way ahead."""
+    starts, headings = np.array(poses)[:, :2], np.array(poses)[:, 2]
+    ahead = np.column_stack((np.cos(headings), np.sin(headings)))
+    ticks = np.stack([starts, starts + 3.0 * scale * ahead], axis=1)
     axes.add_collection(LineCollection(list(ticks), colors=colour, linewidths=0.9, alpha=0.8, zorder=3))
     windows = [_window(pose, scale) for pose in poses[:SHOWN_WINDOWS]]
     axes.add_collection(PolyCollection(windows, facecolor="none", edgecolor=colour, linewidth=1.4, zorder=4))

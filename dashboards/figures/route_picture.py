@@ -1,4 +1,4 @@
-"""A route as a picture: the map, the shortest way, and the legs in the colours of where they came from."""
+"""A route as a picture: the map, the shortest way, and the legs, coloured by where they came from."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from dashboards.figures.map_picture import draw_map
-from dashboards.figures.style import BLUE, GREEN, INK, NOTE_SIZE, ORANGE, VERMILLION, new_figure
+from dashboards.figures.style import legend_below, new_figure
+from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Route
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
-_OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere: the legs are what is to be seen
+_OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
 _WIDTH: Final = 7.4  # inches
-_TALLEST: Final = 9.0
+_TALLEST: Final = 9.0  # inches
 
 
 def route_picture(
@@ -31,7 +32,11 @@ def route_picture(
     caption: str,
     vehicle: Vehicle = CAR,
 ) -> Figure:
-    """The map in its own frame with a route of canonical lengths; ``goals`` and ``world`` are in metres."""
+    """A figure of a map in its own frame and a route over it.
+
+    ``world``: the map, metres. ``route``: in canonical metres, ``scale`` metres of the map each. ``goals``:
+    x, y in metres of the map. ``caption``: above the map. ``vehicle``: that drives the route.
+    """
     width, height = _extent(world)
     figure = new_figure(_WIDTH, min(_WIDTH * height / width, _TALLEST) + 0.9, f"Route over {world.name}")
     axes = figure.add_subplot()
@@ -42,16 +47,16 @@ def route_picture(
     sources = []
     for leg in route.legs:
         states = leg.states(vehicle)
-        places = _placed(world, scale * states[:, :2])
+        points = _placed(world, scale * states[:, :2])
         last = leg.turning + leg.driving
         for drawn, colour, linewidth, zorder in (
-            (places[: leg.turning + 1], INK, 1.6, 6),
-            (places[leg.turning : last + 1], COLOURS[leg.source], 2.6, 5),
-            (places[last:], INK, 1.6, 6),
+            (points[: leg.turning + 1], INK, 1.6, 6),
+            (points[leg.turning : last + 1], COLOURS[leg.source], 2.6, 5),
+            (points[last:], INK, 1.6, 6),
         ):
             axes.plot(*drawn.T, color="white", linewidth=linewidth + 1.6, zorder=4)
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
-        axes.plot(*places[-1], marker="o", color="white", markeredgecolor=INK, markersize=4.5, zorder=7)
+        axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=4.5, zorder=7)
         sources.append(leg.source)
     several = len(goals) > 1
     for number, goal in enumerate(goals, start=1):
@@ -67,9 +72,8 @@ def route_picture(
         if several:
             axes.annotate(f"{number}", goal, ha="center", va="center_baseline", color="white", zorder=11,
                           fontsize=9, fontweight="bold", annotation_clip=False)  # fmt: skip
-    x, y, heading = world.pose(
-        scale * route.problem.start[0], scale * route.problem.start[1], route.problem.start[2]
-    )
+    x, y, heading = route.problem.start
+    x, y, heading = world.pose(scale * x, scale * y, heading)
     axes.plot(x, y, marker=(3, 0, math.degrees(heading) - 90.0), color=INK, markersize=12, zorder=9)
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=INK, marker=(3, 0, -90), linestyle="none", markersize=9, label="start"),
@@ -85,7 +89,7 @@ def route_picture(
         Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
         Patch(facecolor=_OCCUPIED, label="occupied"),
     ]  # fmt: skip
-    figure.legend(handles=handles, loc="outside lower left", ncols=4, frameon=False, fontsize=NOTE_SIZE + 0.5)
+    legend_below(figure, handles, 4)
     return figure
 
 
@@ -102,7 +106,7 @@ def _extent(world: OccupancyMap) -> tuple[float, float]:
 
 
 def _placed(world: OccupancyMap, points: Floats) -> Floats:
-    """Grid metres ``[n, 2]`` in the map's frame."""
+    """``points [n, 2]`` in grid metres, in the map's frame."""
     left, bottom, turn = world.origin
     cos, sin = math.cos(turn), math.sin(turn)
     placed: Floats = points @ np.array([[cos, sin], [-sin, cos]]) + (left, bottom)

@@ -1,51 +1,42 @@
-"""How every figure looks, and how it is saved: colours, axes, notes, files."""
+"""How every figure looks, and how it is saved: titles, axes, panels, notes, files."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import matplotlib
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator, PercentFormatter, StrMethodFormatter
 
+from dashboards.cells import planner_title
+from dashboards.palette import GREY, INK, PALE
+from dashboards.statistics.panels import PLANNERS, ranked
 from storage.places.files import whole_file
 
-# Okabe and Ito's colours, told apart with any colour vision.
-SKY: Final = "#56B4E9"
-BLUE: Final = "#0072B2"
-ORANGE: Final = "#E69F00"
-VERMILLION: Final = "#D55E00"
-GREEN: Final = "#009E73"
-PURPLE: Final = "#CC79A7"
-YELLOW: Final = "#F0E442"
-GREY: Final = "#8C8C8C"
-INK: Final = "#333333"
-PALE: Final = "#E4E4E4"
-
-NOTE_SIZE: Final = 8.0
-PLANNER_TITLES: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
+NO_ATTEMPTS: Final = "No attempts to show: run the benchmark first."
+PANEL_WIDTH: Final = 2.6  # inches: four panels across a page stay readable in print
+_NOTE_SIZE: Final = 8.0
+_LEGEND_SIZE: Final = 8.5
 _LEGEND_LINE: Final = 0.55  # inches of an entry beside its label
 _LEGEND_HEIGHT: Final = 0.2  # inches of a line of entries
 _LEGEND_LETTER: Final = 0.075  # inches
 _DPI: Final = 160
-_NOTE_LETTERS_AN_INCH: Final = 16.5  # at NOTE_SIZE, with room to spare
+_NOTE_LETTERS_AN_INCH: Final = 16.5  # at _NOTE_SIZE, with room to spare
 
 # Identifiers in an SVG are drawn from this instead of the clock: the same rows give the same file.
 matplotlib.rcParams["svg.hashsalt"] = "motion-memory"
 
 
-def planner_title(planner: str) -> str:
-    """A planner's name as it is written."""
-    return PLANNER_TITLES.get(planner, planner)
-
-
 def new_figure(width: float, height: float, title: str, note: str = "") -> Figure:
-    """An empty figure, size in inches, with a title above and a wrapped note below.
+    """An empty figure of ``width`` by ``height`` inches with a ``title`` above and a wrapped ``note`` below.
 
     It belongs to no window system and no global list of figures, so any thread may draw it.
     """
@@ -55,30 +46,12 @@ def new_figure(width: float, height: float, title: str, note: str = "") -> Figur
     if note:
         letters = int(_NOTE_LETTERS_AN_INCH * (width - 0.2))
         note = "\n".join(textwrap.fill(paragraph, letters) for paragraph in note.splitlines())
-        figure.supxlabel(note, x=0.012, ha="left", fontsize=NOTE_SIZE, color="#555555", linespacing=1.4)
+        figure.supxlabel(note, x=0.012, ha="left", fontsize=_NOTE_SIZE, color="#555555", linespacing=1.4)
     return figure
 
 
-def panels_below_legend(figure: Figure, rows: int, columns: int, entries: Mapping[str, Any]) -> Any:
-    """Axes ``[rows, columns]`` below a legend of ``entries``, by label, which adds to the height."""
-    widest = max(len(label) for label in entries)
-    fit = max(1, int((figure.get_figwidth() - 0.8) / (_LEGEND_LINE + widest * _LEGEND_LETTER)))
-    lines = math.ceil(len(entries) / fit)
-    height = figure.get_figheight()
-    strip = _LEGEND_HEIGHT * lines / (height / rows)
-    figure.set_figheight(height + _LEGEND_HEIGHT * lines)
-    layout = figure.add_gridspec(rows + 1, columns, height_ratios=[strip, *[1.0] * rows])
-    legend = figure.add_subplot(layout[0, :])
-    legend.set_axis_off()
-    legend.legend(
-        list(entries.values()), list(entries), loc="center left", ncols=fit, frameon=False,
-        fontsize=NOTE_SIZE + 0.5, borderaxespad=0.0,
-    )  # fmt: skip
-    return np.array([[figure.add_subplot(layout[i + 1, j]) for j in range(columns)] for i in range(rows)])
-
-
 def message_figure(title: str, message: str) -> Figure:
-    """A figure that says in words why there is nothing to draw."""
+    """A figure with a ``title`` and a ``message`` that says why there is nothing to draw."""
     figure = new_figure(8.0, 2.4, title)
     axes = figure.add_subplot()
     axes.set_axis_off()
@@ -86,23 +59,107 @@ def message_figure(title: str, message: str) -> Figure:
     return figure
 
 
-def tidy(axes: Axes) -> None:
-    """Quiet axes: a grid of pale horizontal lines behind the data, no box."""
+def planner_grid(
+    table: pd.DataFrame,
+    title: str,
+    note: str,
+    draw: Callable[[Axes, str, pd.DataFrame], None],
+    *,
+    x: str = "",
+    y: str = "",
+    size: tuple[float, float] = (PANEL_WIDTH, 1.9),
+    entries: Mapping[str, Any] | None = None,
+) -> Figure:
+    """A figure with a row of panels for each planner and a column for each class.
+
+    ``table``: rows with columns ``planner, panel``, and ``problems`` if panels are to say how many there are.
+    ``title``, ``note``, ``x``, ``y``: texts of the figure and its axes. ``draw``: draws a planner's rows of a
+    class. ``size``: width and height of a panel, inches. ``entries``: what a legend shows, by label.
+    """
+    planners, panels = ranked(table["planner"], PLANNERS), list(table["panel"].unique())
+    width = max(5.6, size[0] * len(panels) + 0.6)
+    figure = new_figure(width, size[1] * len(planners) + 1.5, title, note)
+    if entries is None:
+        grid = figure.subplots(len(planners), len(panels), squeeze=False)
+    else:
+        grid = _panels_below_legend(figure, len(planners), len(panels), entries)
+    for i, planner in enumerate(planners):
+        for j, panel in enumerate(panels):
+            of_panel = table[table["panel"] == panel]
+            count = f"\n{of_panel['problems'].max():,} problems" if "problems" in table else ""
+            draw(grid[i, j], planner, of_panel[of_panel["planner"] == planner])
+            name = planner_title(planner) + (f"\n{y}" if y else "")
+            tidy(
+                grid[i, j],
+                title=f"{panel}{count}" if i == 0 else "",
+                x=x if i == len(planners) - 1 else "",
+                y=name if j == 0 else "",
+            )
+            grid[i, j].tick_params(labelsize=8)
+    return figure
+
+
+def panel_row(panels: Sequence[str], title: str, note: str) -> tuple[Figure, list[Axes]]:
+    """A figure with a ``title`` and ``note`` and a row of square panels, and the axes of these."""
+    figure = new_figure(max(5.6, 3.3 * len(panels) + 0.5), 3.9, title, note)
+    return figure, list(figure.subplots(1, len(panels), squeeze=False)[0])
+
+
+def tidy(axes: Axes, title: str = "", x: str = "", y: str = "") -> None:
+    """Quiet axes without a box, pale horizontal lines behind the data, with a title and names of x and y."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GREY)
     axes.tick_params(labelsize=9, colors=INK, length=3)
     axes.grid(axis="y", color=PALE, linewidth=0.8)
     axes.set_axisbelow(True)
+    axes.set_title(title, fontsize=10, color=INK, pad=8)
+    axes.set_xlabel(x, fontsize=9, color=INK)
+    axes.set_ylabel(y, fontsize=9, color=INK)
+
+
+def in_percent(axis: Axis) -> None:
+    """Write the ticks of an ``axis`` of fractions in per cent."""
+    axis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+
+
+def logarithmic(axes: Axes, steps: Sequence[float] = (1.0,)) -> None:
+    """Make the x axis of ``axes`` logarithmic, with plain numbers at ``steps`` of each power of ten."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=steps, numticks=6))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def legend_below(figure: Figure, handles: Sequence[Any], columns: int) -> None:
+    """A legend of ``handles`` in some ``columns`` at the lower edge of a ``figure``."""
+    figure.legend(
+        handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=_LEGEND_SIZE
+    )
+
+
+def legend_alone(axes: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int) -> None:
+    """A legend of ``handles`` and their ``labels`` that fills ``axes`` of its own."""
+    axes.set_axis_off()
+    axes.legend(
+        handles,
+        labels,
+        loc="center left",
+        ncols=columns,
+        frameon=False,
+        fontsize=_LEGEND_SIZE,
+        borderaxespad=0.0,
+    )
 
 
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write ``name.png`` (160 dots an inch) and ``name.svg`` into ``folder``; returns both paths.
+    """Write a ``figure`` as ``name.png`` (160 dots an inch) and ``name.svg`` into ``folder``.
 
-    A file appears whole or not at all, and the same figure gives the same bytes. StorageError: no room, no
-    permission.
+    A file appears whole or not at all, and the same figure gives the same bytes.
+
+    Returns both paths. Raises StorageError if there is no room or no permission to write.
     """
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # the layout is found: it takes longer than the drawing
+    figure.set_layout_engine("none")  # it was applied just now; that takes longer than drawing
     paths = []
     for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None})):
         path = folder / f"{name}.{kind}"
@@ -110,3 +167,14 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             figure.savefig(temporary, format=kind, dpi=_DPI, metadata=metadata)
         paths.append(path)
     return paths
+
+
+def _panels_below_legend(figure: Figure, rows: int, columns: int, entries: Mapping[str, Any]) -> Any:
+    """Axes ``[rows, columns]`` below a legend of ``entries``, which adds to the figure's height."""
+    widest = max(len(label) for label in entries)
+    fit = max(1, int((figure.get_figwidth() - 0.8) / (_LEGEND_LINE + widest * _LEGEND_LETTER)))
+    height, legend = figure.get_figheight(), _LEGEND_HEIGHT * math.ceil(len(entries) / fit)
+    figure.set_figheight(height + legend)
+    layout = figure.add_gridspec(rows + 1, columns, height_ratios=[legend * rows / height, *[1.0] * rows])
+    legend_alone(figure.add_subplot(layout[0, :]), list(entries.values()), list(entries), fit)
+    return np.array([[figure.add_subplot(layout[i + 1, j]) for j in range(columns)] for i in range(rows)])

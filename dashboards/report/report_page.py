@@ -1,4 +1,4 @@
-"""The report as one page of HTML that needs nothing else: tables, claims, figures, and how it was made."""
+"""The report as one HTML page that needs no other file: claims, tables, figures, and how it was made."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dashboards.cells import NAMES
+from dashboards.palette import style_sheet
 from dashboards.report.tables import (
     FULL_HEADINGS,
     RETRIEVAL_HEADINGS,
@@ -24,29 +25,29 @@ from dashboards.verdicts.claim_rules import FAILS, HOLDS, OPEN, Claim
 _KINDS: Final = {HOLDS: "holds", FAILS: "fails", OPEN: "open"}
 _MIME: Final = {".svg": "image/svg+xml", ".png": "image/png"}
 _TIMES_NOTE: Final = (
-    "Milliseconds from receiving the obstacles to returning a plan, failures with the time they took. "
-    "Intervals are bootstrap 95 % intervals that resample problems. Reduction: of the mean against the same "
-    "planner without memory, paired by problem. Slower: share of problems in which that planner was faster "
-    "alone (a failure is slower than every success), and how many times as long they took, median. p: "
-    "two-sided sign test, corrected by Holm for all comparisons on this page."
+    "Milliseconds from receiving the obstacles to returning a plan; failures count with the time they took. "
+    "Intervals are 95 % bootstrap intervals over problems. Reduction: of the mean, against the same planner "
+    "without memory, paired by problem. Slower: the share of problems in which that planner was faster alone "
+    "(a failure is slower than every success). Slowdown: how many times as long these problems took, median. "
+    "p: two-sided sign test, corrected for all comparisons on this page (Holm)."
 )
 _RETRIEVAL_NOTE: Final = (
     "Per cent of problems. hit@k: a free plan is among the first k; origin@k: the plan that the problem was "
     "made for is. Fresh: new draws of the class. Held-out: hallucinated problems kept from training. "
-    "Popularity: plans ranked by how often they are free; random: picked blindly. Oracle: any stored plan is "
-    "free. None: the memory said that no plan fits."
+    "Popularity: plans are ranked by how often they are free. Random: plans are picked blindly. Oracle: any "
+    "stored plan is free. None: the memory said that no plan fits."
 )
 _CLAIMS_NOTE: Final = (
     "Decided by the stated rules from the rows of this run, with 95 % intervals. A claim of several figures "
-    "fails where one of them speaks against it with an interval widened for their number (Bonferroni). What "
-    "the intervals leave open, or this run did not measure, cannot be compared."
+    "fails if one of them speaks against it with an interval widened for their number (Bonferroni). A claim "
+    "cannot be compared if the intervals leave it open, or if this run did not measure it."
 )
 
 
 class Picture(NamedTuple):
     """A figure of the page."""
 
-    path: Path  # .svg or .png
+    path: Path  # ends in .svg or .png
     caption: str
 
 
@@ -61,10 +62,13 @@ def page(
     pictures: Sequence[Picture],
     made: Mapping[str, Mapping[str, str]],
 ) -> str:
-    """The page as HTML, for light and dark screens from 390 pixels on; it loads nothing and runs nothing.
+    """The page as HTML, for light and dark screens from 390 pixels on. It loads nothing and runs nothing.
 
-    ``summary, retrieval, endings``: tables of ``statistics``, ``retrieval`` and ``distributions``; ``made``:
-    titled lists of what made the run. OSError where a picture cannot be read.
+    ``title``, ``introduction``: its first texts. ``summary``: of ``panels.summarise``. ``retrieval``: of
+    ``retrieval_rates.summarise_retrieval``. ``endings``: of ``distributions.endings``. ``claims``,
+    ``pictures``: in the order of the page. ``made``: names and values of what made the run, by title.
+
+    Raises OSError if a picture cannot be read.
     """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -75,10 +79,11 @@ def page(
     )
     counts = Counter(claim.verdict for claim in claims)
     return environment.get_template("page.html.jinja").render(
+        colours=style_sheet(),
         title=title,
         introduction=introduction,
         words=NAMES,
-        keys=("configuration", "class"),  # stay in sight where a table is scrolled
+        keys=("configuration", "class"),  # which stay in sight when a table is scrolled
         claims=[claim._asdict() | {"kind": _KINDS[claim.verdict]} for claim in claims],
         verdicts=[(verdict, counts[verdict]) for verdict in _KINDS],
         claims_note=_CLAIMS_NOTE,
@@ -101,5 +106,5 @@ def page(
 
 
 def _inline(path: Path) -> str:
-    """A picture as a data address."""
+    """A picture as a data URL."""
     return f"data:{_MIME[path.suffix]};base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"

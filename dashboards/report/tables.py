@@ -1,9 +1,9 @@
-"""The summaries of a run as tables: for a terminal, for a Markdown page, for a spreadsheet."""
+"""The tables of a run and of its stages: for a terminal, as Markdown, as comma-separated values."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import pandas as pd
@@ -18,15 +18,16 @@ from dashboards.cells import (
     markdown_table,
     p_value,
     percent,
-    reduction,
     rich_table,
-    share,
     titled_markdown,
     titled_tables,
+    with_interval,
 )
 from dashboards.statistics.panels import PLANNERS, ranked
 from dashboards.verdicts.claim_rules import Claim
-from storage.tables.configurations import Configuration
+from storage.tables.configurations import configurations_in
+
+Row = Mapping[Any, Any]  # of a summary
 
 _HEADINGS: Final = (
     "planner", "configuration", "solved", "mean", "median", "90 %", "reduction % [95 %]", "slower",
@@ -36,6 +37,9 @@ FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
     "interquartile mean ms [95 %]", "recalled %", "collision checks",
+)  # fmt: skip
+_SWEEP_HEADINGS: Final = (
+    "class", "rate", "channels", "hidden", "parameters", "hit@1", "hit@5", "seconds"
 )  # fmt: skip
 RETRIEVAL_HEADINGS: Final = (
     "class", "memory", "protocol", "recall", "origin@1", "origin@5", "hit@1", "hit@5", "oracle", "none",
@@ -47,7 +51,7 @@ STAGE_HEADINGS: Final = (
 
 
 def summary_table(summary: pd.DataFrame) -> Group:
-    """The summary (``statistics.summarise``) for a terminal at least 110 columns wide: a table a class."""
+    """The ``summary`` of ``panels.summarise`` for a terminal of 110 columns or more: a table a panel."""
     titled = titled_rows(summary, _cells)
     return titled_tables(
         _HEADINGS, [(f"{title}; times in ms; solved, slower, hits in %", groups) for title, groups in titled]
@@ -55,28 +59,60 @@ def summary_table(summary: pd.DataFrame) -> Group:
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
-    """The whole summary as Markdown: a heading and a table a class."""
+    """The whole ``summary`` of ``panels.summarise`` as Markdown: a heading and a table a panel."""
     return titled_markdown(FULL_HEADINGS, titled_rows(summary, full_cells))
 
 
 def retrieval_table(retrieval: pd.DataFrame) -> Table:
-    """Retrieval (``retrieval.summarise_retrieval``) for a terminal, in per cent of the problems."""
+    """The rows of ``retrieval_rates.summarise_retrieval`` for a terminal, in per cent of the problems."""
     return rich_table("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
-    """Retrieval as a Markdown table, in per cent of the problems."""
+    """The rows of ``retrieval_rates.summarise_retrieval`` as Markdown, in per cent of the problems."""
     lines = [cells for group in retrieval_groups(retrieval) for cells in group]
     return markdown_table(RETRIEVAL_HEADINGS, lines)
 
 
 def stages_table(rows: Sequence[Sequence[str]]) -> Table:
-    """Stages of a run for a terminal: rows of ``STAGE_HEADINGS``."""
+    """The stages of a run for a terminal; ``rows`` of cells under ``STAGE_HEADINGS``."""
     return rich_table("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
 
 
+def sweep_table(rows: pd.DataFrame) -> Table:
+    """The variants of a sweep, ``rows`` of ``stages.sweep.sweep_rows``, for a terminal: the best first."""
+    groups = [
+        [
+            [
+                str(name), f"{row['learning_rate']:g}", row["channels"], row["hidden"] or "none",
+                f"{row['parameters']:,}", percent(row["hit@1"]), percent(row["hit@5"]),
+                f"{row['seconds']:.0f}",
+            ]
+            for row in of_class.sort_values("hit@1", ascending=False, kind="stable").to_dict("records")
+        ]
+        for name, of_class in rows.groupby("class", sort=False)
+    ]  # fmt: skip
+    return rich_table("Validation problems, % of what the stored plans solve", _SWEEP_HEADINGS, groups)
+
+
+def experience_table(rows: pd.DataFrame) -> Table:
+    """The ``rows`` of ``experience_rows`` for a terminal: a line a number of experiences."""
+    panels = list(rows["panel"].unique())
+    lines = []
+    for plans, of_count in rows.groupby("plans"):
+        by_panel = of_count.set_index("panel")
+        of_panels = [by_panel.loc[panel] for panel in panels]
+        cells = [
+            f"{with_interval(row['hit'], row['low'], row['high'], 1)} of {percent(row['oracle'])}"
+            for row in of_panels
+        ]
+        lines.append([str(plans), *cells])
+    title = "Fresh hit@5 [95 %] and oracle, % of problems"
+    return rich_table(title, ["experiences", *panels], [[line] for line in lines])
+
+
 def claims_markdown(claims: Sequence[Claim]) -> str:
-    """What became of each claim of the paper, as a Markdown list."""
+    """The ``claims`` of the paper and their verdicts, as a Markdown list."""
     return "".join(
         f"- **{claim.verdict}**: {claim.text} ({claim.where}) Here: {claim.ours}. *Rule: {claim.rule}*\n"
         for claim in claims
@@ -84,45 +120,44 @@ def claims_markdown(claims: Sequence[Claim]) -> str:
 
 
 def as_csv(table: pd.DataFrame) -> str:
-    """Either summary as comma-separated values, unrounded."""
+    """A ``table`` as comma-separated values, unrounded."""
     return str(table.to_csv(index=False, lineterminator="\n"))
 
 
 def titled_rows(
-    summary: pd.DataFrame, cells: Callable[[pd.Series[Any], int], list[str]]
+    summary: pd.DataFrame, cells: Callable[[Row, int], list[str]]
 ) -> list[tuple[str, list[Rows]]]:
-    """Per panel its title and its rows of cells, grouped by planner; ``cells`` gives those after the names.
+    """Of each panel in ``summary`` a title, and a group of rows of cells for each planner.
 
-    Every planner appears in every panel with every configuration that any panel has for it, so that what was
-    not attempted is seen to be missing.
+    Every planner appears in every panel with every configuration that any panel has for it, so that one sees
+    what was not attempted. ``cells``: gives the cells after the names, from a row of ``summary`` and the
+    number of decimals of times.
     """
     titled = []
     for panel in summary["panel"].unique():
         rows = summary[summary["panel"] == panel]
         decimals = decimals_of(rows[["mean_ms", "median_ms"]].to_numpy(dtype=float))
-        by_key = {(row["planner"], row["configuration"]): row for _, row in rows.iterrows()}
-        width = len(cells(rows.iloc[0], decimals))
+        by_key = {(row["planner"], row["configuration"]): row for row in rows.to_dict("records")}
+        width = len(cells(rows.iloc[0].to_dict(), decimals))
         groups = []
         for planner in ranked(summary["planner"], PLANNERS):
-            wanted = summary.loc[summary["planner"] == planner, list(Configuration._fields)].drop_duplicates()
-            asked = [Configuration(*each) for each in wanted.itertuples(index=False, name=None)]
-            groups.append(
-                [
-                    [planner, each.label]
-                    + ([NOTHING] * width if (row := by_key.get((planner, each.label))) is None
-                       else cells(row, decimals))
-                    for each in sorted(asked, key=lambda each: each.rank)
-                ]
-            )  # fmt: skip
+            group = []
+            for configuration in configurations_in(summary[summary["planner"] == planner]):
+                row = by_key.get((planner, configuration.label))
+                numbers = [NOTHING] * width if row is None else cells(row, decimals)
+                group.append([planner, configuration.label, *numbers])
+            groups.append(group)
         titled.append((f"{panel}, {int(rows['problems'].max()):,} problems", groups))
     return titled
 
 
-def full_cells(row: pd.Series[Any], decimals: int) -> list[str]:
-    """All figures of one configuration, as ``FULL_HEADINGS`` without the two names."""
-    baseline = row["assist"] == "none"
+def full_cells(row: Row, decimals: int) -> list[str]:
+    """All figures of a ``row`` of a summary, as in ``FULL_HEADINGS`` after the two names.
 
-    def with_interval(name: str) -> str:
+    ``decimals``: of times.
+    """
+
+    def time(name: str) -> str:
         value, low, high = (
             f"{row[column]:,.{decimals}f}" for column in (f"{name}_ms", f"{name}_low_ms", f"{name}_high_ms")
         )
@@ -130,32 +165,41 @@ def full_cells(row: pd.Series[Any], decimals: int) -> list[str]:
 
     return [
         percent(row["solved"]),
-        with_interval("mean"),
-        NOTHING if baseline else reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
-        share(row["slower"]),
+        time("mean"),
+        reduction_cell(row),
+        percent(row["slower"]),
         NOTHING if math.isnan(row["slowdown"]) else f"{row['slowdown']:.2f} ×",
         p_value(row["p_value"]),
-        *[with_interval(name) for name in ("median", "p90", "interquartile_mean")],
-        NOTHING if baseline else percent(row["recalled"]),
+        *[time(name) for name in ("median", "p90", "interquartile_mean")],
+        NOTHING if row["assist"] == "none" else percent(row["recalled"]),
         count(row["collision_checks"]),
     ]
 
 
-def _cells(row: pd.Series[Any], decimals: int) -> list[str]:
+def reduction_cell(row: Row) -> str:
+    """The reduction in a ``row`` of a summary with its interval; a dash for the planner alone."""
+    if row["assist"] == "none":
+        return NOTHING
+    return with_interval(row["reduction"], row["reduction_low"], row["reduction_high"], 1)
+
+
+def _cells(row: Row, decimals: int) -> list[str]:
     """The figures of one configuration that fit a terminal."""
-    baseline = row["assist"] == "none"
     return [
         percent(row["solved"]),
         *[f"{row[column]:,.{decimals}f}" for column in ("mean_ms", "median_ms", "p90_ms")],
-        NOTHING if baseline else reduction(row["reduction"], row["reduction_low"], row["reduction_high"]),
-        share(row["slower"]),
-        NOTHING if baseline else percent(row["recalled"]),
+        reduction_cell(row),
+        percent(row["slower"]),
+        NOTHING if row["assist"] == "none" else percent(row["recalled"]),
         count(row["collision_checks"]),
     ]
 
 
 def retrieval_groups(retrieval: pd.DataFrame) -> list[Rows]:
-    """Lines of a class and memory; under the ways to recall, what plans picked blindly reach."""
+    """The cells of ``retrieval_rates.summarise_retrieval``, a group a class and memory.
+
+    After the rankings of a protocol comes a row of what plans picked blindly reach.
+    """
     groups = []
     for _, of_memory in retrieval.groupby(["panel", "memory"], sort=False):
         lines = []

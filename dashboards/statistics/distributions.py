@@ -1,4 +1,4 @@
-"""From attempt rows to the curves behind the means: solved against time, performance profiles, time split."""
+"""What lies behind the mean planning times: their distributions, their parts, and how attempts ended."""
 
 from __future__ import annotations
 
@@ -14,34 +14,37 @@ from planners.world.arrays import Floats
 from storage.tables.configurations import Configuration
 
 POINTS: Final = 160  # of a curve: finer than a figure shows
-MOST_RATIO: Final = 1000.0  # a profile ends there: what is slower still counts as not solved
+MOST_RATIO: Final = 1000.0  # where a profile ends: what is slower counts as not solved
 
 
-class Part(NamedTuple):
-    """A part of planning time, and the columns whose seconds belong to it."""
+class TimePart(NamedTuple):
+    """A part of the planning time, and the columns of seconds that add up to it."""
 
     name: str
     columns: tuple[str, ...]
 
 
-PARTS: Final = (
-    Part("draw grid", ("occupancy_seconds",)),
-    Part("encode", ("encode_seconds",)),
-    Part("recall", ("recall_seconds",)),
-    Part("obstacles", ("scene_seconds",)),
-    Part("check", ("check_seconds",)),
-    Part("guide, repair", ("guide_seconds", "repair_seconds")),
-    Part("roadmap", ("roadmap_seconds",)),
-    Part("search", ("search_seconds",)),
+TIME_PARTS: Final = (
+    TimePart("draw grid", ("occupancy_seconds",)),
+    TimePart("encode", ("encode_seconds",)),
+    TimePart("recall", ("recall_seconds",)),
+    TimePart("obstacles", ("scene_seconds",)),
+    TimePart("check", ("check_seconds",)),
+    TimePart("guide, repair", ("guide_seconds", "repair_seconds")),
+    TimePart("roadmap", ("roadmap_seconds",)),
+    TimePart("search", ("search_seconds",)),
 )
-REST: Final = "rest"  # of the planning time, which is measured around everything
+REST: Final = "rest"  # the planning time, which is measured around everything, less its parts
+_SPLIT: Final = ("panel", "planner", "configuration", "part", "ms")
 
 
 def solved_against_time(attempts: pd.DataFrame) -> pd.DataFrame:
-    """Share of all problems solved within a time: ``panel, planner, assist, recall, top_k, ms, solved``.
+    """Share of the problems of ``attempts`` that are solved within a time.
 
-    A failure is censored: it never counts as solved, however long the planner tried. Of each assist and
-    recall only the configuration with most plans gets a curve, and none where plans are picked blindly.
+    A failure never counts as solved, however long the planner tried. Of the configurations that differ only
+    in their number of plans, the one with most gets a curve; those that pick plans blindly get none.
+
+    Returns rows of ``panel, planner, assist, recall, top_k, ms, solved``.
     """
     return _curves(attempts, "ms", _reached_by_time)
 
@@ -49,58 +52,48 @@ def solved_against_time(attempts: pd.DataFrame) -> pd.DataFrame:
 def performance_profile(attempts: pd.DataFrame) -> pd.DataFrame:
     """Share of problems solved within a multiple of the fastest configuration's time (Dolan and Moré 2002).
 
-    Columns ``panel, planner, assist, recall, top_k, ratio, solved``. The fastest is among those of the
-    same planner that get a curve; problems that a configuration was not given are left out of its curve.
+    Configurations of ``attempts`` get curves as in ``solved_against_time``; the fastest is among those of the
+    same planner. A curve leaves out the problems that its configuration did not attempt.
+
+    Returns rows of ``panel, planner, assist, recall, top_k, ratio, solved``.
     """
     return _curves(attempts, "ratio", _reached_by_ratio)
 
 
 def time_split(attempts: pd.DataFrame) -> pd.DataFrame:
-    """Mean milliseconds of each part of planning time: ``panel, planner, configuration, part, ms``."""
+    """Mean time of each part of planning: rows of ``panel, planner, configuration, part, ms``."""
     tables = []
     for panel in panels(attempts):
         parts = {
-            part.name: np.sum([_mean_ms(panel, name) for name in part.columns], axis=0) for part in PARTS
+            part.name: np.sum([_mean_ms(panel, name) for name in part.columns], axis=0) for part in TIME_PARTS
         }
         measured = np.sum(list(parts.values()), axis=0)
         parts[REST] = np.maximum(_mean_ms(panel, "planning_seconds") - measured, 0.0)
-        labels = [(planner, each.label) for planner, each in panel.columns]
-        tables += [
-            pd.DataFrame(labels, columns=["planner", "configuration"]).assign(
-                panel=panel.name, part=part, ms=milliseconds
-            )
-            for part, milliseconds in parts.items()
-        ]
-    names = ["panel", "planner", "configuration", "part", "ms"]
-    return pd.concat(tables, ignore_index=True)[names] if tables else pd.DataFrame(columns=names)
+        tables += [panel.labels().assign(part=part, ms=means) for part, means in parts.items()]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=list(_SPLIT))
 
 
 def endings(attempts: pd.DataFrame) -> pd.DataFrame:
-    """How attempts ended: one row per panel, planner and configuration, a column of counts per status."""
+    """How ``attempts`` ended: a row a panel, planner and configuration, a column of counts a status."""
     tables = []
     for panel in panels(attempts):
         columns = panel.rows["cell"] % len(panel.columns)
-        counts = pd.crosstab(columns, panel.rows["status"])
-        labels = pd.DataFrame(
-            [(panel.name, planner, each.label) for planner, each in panel.columns],
-            columns=["panel", "planner", "configuration"],
-        )
-        tables.append(labels.join(counts))
+        tables.append(panel.labels().join(pd.crosstab(columns, panel.rows["status"])))
     if not tables:
-        return pd.DataFrame(columns=["panel", "planner", "configuration"])
-    found = pd.concat(tables, ignore_index=True)
-    names = ranked(found.columns[3:], ("solved",))
-    return found[["panel", "planner", "configuration"]].join(found[names].fillna(0).astype(int))
+        return pd.DataFrame(columns=list(_SPLIT[:3]))
+    counts = pd.concat(tables, ignore_index=True)
+    statuses = ranked(counts.columns[3:], ("solved",))
+    return counts[list(_SPLIT[:3])].join(counts[statuses].fillna(0).astype(int))
 
 
 def _leading(panel: Panel) -> list[int]:
-    """The columns worth a curve: of each assist and recall that with most plans, nothing picked blindly."""
+    """The columns that get a curve: of each assist and recall the one with most plans, none if blind."""
     most = {(planner, each.assist, each.recall): i for i, (planner, each) in enumerate(panel.columns)}
     return [i for (_, _, recall), i in most.items() if recall != "random"]
 
 
 def _mean_ms(panel: Panel, column: str) -> Floats:
-    """Mean of some seconds as milliseconds ``[columns]``; 0 where the rows do not tell them."""
+    """Means ``[columns]`` of a column of seconds, in milliseconds; 0 where the rows do not hold it."""
     if column not in panel.rows:
         return np.zeros(len(panel.columns))
     values = 1e3 * panel.matrix(column)
@@ -109,11 +102,11 @@ def _mean_ms(panel: Panel, column: str) -> Floats:
 
 
 def _reached_by_time(censored: Floats) -> tuple[Floats, Floats]:
-    """Milliseconds ``[P]``, and the shares ``[P, C]`` of problems that are solved by then."""
-    found = censored[np.isfinite(censored)]
-    if not len(found):
+    """Times ``[P]`` in milliseconds, and the shares ``[P, C]`` of problems that are solved by then."""
+    times = censored[np.isfinite(censored)]
+    if not len(times):
         return np.empty(0), np.empty((0, censored.shape[1]))
-    points = np.geomspace(found.min(), found.max(), POINTS)
+    points = np.geomspace(times.min(), times.max(), POINTS)
     return points, _shares_within(censored, points)
 
 
@@ -121,13 +114,13 @@ def _reached_by_ratio(censored: Floats) -> tuple[Floats, Floats]:
     """Multiples ``[P]`` of the fastest time, and the shares ``[P, C]`` of problems solved within them."""
     fastest = np.fmin.reduce(censored, axis=1, keepdims=True)
     ratios = np.divide(censored, fastest, out=censored.copy(), where=np.isfinite(censored))
-    found = ratios[np.isfinite(ratios)]
-    points = np.geomspace(1.0, min(float(found.max(initial=1.0)), MOST_RATIO), POINTS)
+    most = float(ratios[np.isfinite(ratios)].max(initial=1.0))
+    points = np.geomspace(1.0, min(most, MOST_RATIO), POINTS)
     return points, _shares_within(ratios, points)
 
 
 def _shares_within(values: Floats, points: Floats) -> Floats:
-    """Share ``[P, C]`` of the numbers in each column ``[n, C]`` up to each point; NaN is no number."""
+    """Share ``[P, C]`` of the numbers in each column of ``values [n, C]`` up to each point, without NaN."""
     columns = [np.sort(column[~np.isnan(column)]) for column in values.T]
     within = [np.searchsorted(column, points, side="right") / max(len(column), 1) for column in columns]
     return np.column_stack(within)
@@ -136,7 +129,7 @@ def _shares_within(values: Floats, points: Floats) -> Floats:
 def _curves(
     attempts: pd.DataFrame, x: str, reached: Callable[[Floats], tuple[Floats, Floats]]
 ) -> pd.DataFrame:
-    """Shares ``solved`` against ``x`` of every planner and configuration, a panel after the other."""
+    """A curve of the shares ``solved`` against ``x`` for every planner and configuration, panel by panel."""
     tables = []
     for panel in panels(attempts):
         censored = panel.censored()

@@ -1,4 +1,4 @@
-"""Bootstrap 95 % intervals (Efron 1979) that resample problems, the same ones for all that is compared."""
+"""Bootstrap 95 % intervals (Efron 1979). Problems are resampled, the same ones for all that is compared."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ _COUNTS_AT_ONCE: Final = 400_000  # a few MB: they stay in the processor's cache
 
 
 class Resampled(NamedTuple):
-    """What each resample of the problems gives; NaN where a resample holds nothing to go by."""
+    """What each resample of the problems gives; NaN where it holds no attempt to go by."""
 
     means: Floats  # [resamples, C]
     reductions: Floats  # [resamples, C] 1 - mean / mean of the baseline, over problems that both attempted
-    interquartile_means: Floats  # [resamples, C]; empty [0, C] where they were not asked for
+    interquartile_means: Floats  # [resamples, C], or empty [0, C]
 
 
 def bootstrap(
     values: Floats, baseline: Floats, seed: int, resamples: int, interquartile: bool = False
 ) -> Resampled:
-    """Resample the problems of ``values`` and ``baseline``, both ``[n, C]``, NaN where not attempted.
+    """Resample problems. A resample draws the same problems for all columns, so hard ones fall on all alike.
 
-    Every resample draws the same problems for all columns, so what a problem is hard for falls on all alike.
+    ``values [n, C]``: of n problems, NaN where not attempted. ``baseline [n, C]``: what each column is
+    compared with, in the same unit. ``seed``, ``resamples``: of the drawing, and how often.
+    ``interquartile``: whether interquartile means are wanted, which take longest.
     """
     there = ~np.isnan(values)
     both = there & ~np.isnan(baseline)
@@ -52,9 +54,9 @@ def bootstrap(
 
 
 def resampled_interquartile_mean(values: Floats, counts: Floats) -> Floats:
-    """Mean of the middle half ``[R]`` of ``values [n]``, taken ``counts [n, R]`` times each.
+    """Means ``[R]`` of the middle half of ``values [n]``, each there ``counts [n, R]`` times in a resample.
 
-    The quarters are cut off exactly, a value at the cut counting in part. NaN values are not there.
+    A value at the cut of a quarter counts in part. NaN values are left out.
     """
     order = np.argsort(values)[: int(np.count_nonzero(~np.isnan(values)))]
     if not len(order):
@@ -69,12 +71,12 @@ def resampled_interquartile_mean(values: Floats, counts: Floats) -> Floats:
 
 
 def interquartile_mean(values: Floats) -> float:
-    """Mean of the middle half of ``values [n]``, which neither the fastest nor the slowest quarter moves."""
+    """Mean of the middle half of ``values [n]``: neither the fastest nor the slowest quarter moves it."""
     return float(resampled_interquartile_mean(values, np.ones((len(values), 1)))[0])
 
 
 def interval(resampled: Floats) -> tuple[Floats, Floats]:
-    """Ends ``[C]`` of the percentile interval of ``[resamples, C]``; NaN for a column without data."""
+    """Ends ``[C]`` of the percentile intervals of ``resampled [resamples, C]``; NaN for an empty column."""
     ends = np.full((2, resampled.shape[1]), np.nan)
     filled = ~np.isnan(resampled).all(axis=0)
     if filled.any():
@@ -83,10 +85,11 @@ def interval(resampled: Floats) -> tuple[Floats, Floats]:
 
 
 def quantile_interval(values: Floats, share: float) -> tuple[float, float]:
-    """Ends of the bootstrap interval of a quantile of ``values [n]``, as of infinitely many resamples.
+    """Ends of the bootstrap interval of a quantile of ``values [n]``, as infinitely many resamples give it.
 
-    The k-th smallest of n draws is at most the j-th smallest value when at least k draws are among the first
-    j: a binomial law, so the ends are values themselves and nothing need be drawn. NaN values are not there.
+    The k-th smallest of n draws is at most the j-th smallest value if at least k draws are among the first j.
+    That is a binomial law, so nothing need be drawn. ``share``: which quantile, 0 to 1. NaN values are left
+    out.
     """
     ranked = np.sort(values[~np.isnan(values)])
     n = len(ranked)
@@ -98,14 +101,14 @@ def quantile_interval(values: Floats, share: float) -> tuple[float, float]:
 
 
 def ratio(above: Floats, below: Floats) -> Floats:
-    """``above / below``, NaN where there is nothing below."""
+    """``above / below``, both of one shape; NaN where ``below`` is not above 0."""
     quotient = np.full(above.shape, np.nan)
     np.divide(above, below, out=quotient, where=below > 0.0)
     return quotient
 
 
 def _resamples(n: int, seed: int, resamples: int) -> Iterator[Floats]:
-    """How often each of n problems is drawn, ``[n, some]`` at a time."""
+    """How often each of n problems is drawn in each resample, ``[n, some resamples]`` at a time."""
     generator = np.random.default_rng(seed)
     size = max(1, _COUNTS_AT_ONCE // max(n, 1))
     for first in range(0, resamples, size):

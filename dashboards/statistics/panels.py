@@ -1,7 +1,7 @@
-"""What the attempt rows say: times, solved shares and reductions, paired by problem.
+"""What attempt rows say: planning times, shares solved and reductions, paired by problem.
 
-Failures stay in every figure: with the time they took in means and quantiles, as slower than every success
-where two attempts are compared. A mean over survivors is never formed.
+Failures stay in every figure. Means and quantiles count them with the time they took; where two attempts are
+compared, a failure is slower than every success. There is no mean over the solved problems alone.
 """
 
 from __future__ import annotations
@@ -24,21 +24,26 @@ from dashboards.statistics.sign_tests import holm, signs
 from planners.world.arrays import Floats
 from storage.tables.configurations import BASELINE, Configuration, configured
 
-COMBINED: Final = "combined"  # the memory of all classes; its attempts form a panel of their own
+COMBINED: Final = "combined"  # the memory of all classes, whose attempts form a panel of their own
 PANELS: Final = ("curves", "random", "trap")
 PLANNERS: Final = ("rrt", "gust", "follow")
 
 
 class Panel(NamedTuple):
-    """All attempts of one class with its own memory, or of all classes with the combined one."""
+    """All attempts at one class with its own memory, or at all classes with the combined one."""
 
     name: str
-    rows: pd.DataFrame  # with a column ``cell``: the flat place in [problems, columns] that the row is for
+    rows: pd.DataFrame  # with a column ``cell``: the row's index in a flattened [problems, columns]
     problems: int
     columns: list[tuple[str, Configuration]]  # planner and configuration, in reading order
 
+    def labels(self) -> pd.DataFrame:
+        """A row a column of the panel: ``panel, planner, configuration``."""
+        names = [(self.name, planner, configuration.label) for planner, configuration in self.columns]
+        return pd.DataFrame(names, columns=["panel", "planner", "configuration"])
+
     def matrix(self, column: str) -> Floats:
-        """A number of each row, ``[problems, columns]``; NaN where not attempted, the mean where repeated."""
+        """A ``column`` of the rows as ``[problems, columns]``: NaN if not attempted, the mean if repeated."""
         size = self.problems * len(self.columns)
         cells = self.rows["cell"].to_numpy()
         sums = np.bincount(cells, self.rows[column].to_numpy(float), minlength=size).astype(np.float64)
@@ -46,31 +51,32 @@ class Panel(NamedTuple):
         return ratio(sums, counts).reshape(self.problems, -1)
 
     def milliseconds(self) -> Floats:
-        """Planning times, failures with the time they took."""
+        """Planning times ``[problems, columns]``, failures with the time they took."""
         return 1e3 * self.matrix("planning_seconds")
 
     def censored(self) -> Floats:
-        """Planning times in milliseconds, infinite where an attempt failed: all that is known is "longer"."""
+        """Planning times in milliseconds ``[problems, columns]``, infinite where an attempt failed."""
         solved = self.matrix("solved")
         return np.where(solved < 1.0, np.inf, self.milliseconds())
 
-    def column(self, planner: str, wanted: Configuration) -> int | None:
-        """The place of a planner's configuration, if it was attempted."""
-        return self.columns.index((planner, wanted)) if (planner, wanted) in self.columns else None
+    def column(self, planner: str, configuration: Configuration) -> int | None:
+        """The index of a planner's configuration; None if it was not attempted."""
+        wanted = (planner, configuration)
+        return self.columns.index(wanted) if wanted in self.columns else None
 
     def baseline(self, values: Floats) -> Floats:
-        """Each column's values ``[problems, columns]`` of its planner without memory; NaN if not there."""
-        places = [self.column(planner, BASELINE) for planner, _ in self.columns]
+        """``values [problems, columns]`` of each column's planner without memory; NaN if not attempted."""
+        indices = [self.column(planner, BASELINE) for planner, _ in self.columns]
         nothing = np.full(self.problems, np.nan)
-        return np.column_stack([nothing if i is None else values[:, i] for i in places])
+        return np.column_stack([nothing if i is None else values[:, i] for i in indices])
 
 
 def panels(attempts: pd.DataFrame) -> Iterator[Panel]:
-    """Attempt rows by panel: each class with its own memory, then all with the combined memory, if any.
+    """Sort ``attempts`` into panels: each class with its own memory, then all with the combined one, if any.
 
     Attempts without memory belong to both.
     """
-    rows, known = configured(attempts)
+    rows, configurations = configured(attempts)
     combined = (rows["memory"] == COMBINED).to_numpy(bool)
     alone = rows["memory"].isna().to_numpy()
     planners, classes = rows["planner"].astype("category"), rows["problem_class"].astype("category")
@@ -79,18 +85,21 @@ def panels(attempts: pd.DataFrame) -> Iterator[Panel]:
     for name in ranked(classes.cat.categories, PANELS):
         of_class = own[own["problem_class"] == name]
         if len(of_class):
-            yield _panel(name, of_class, known)
+            yield _panel(name, of_class, configurations)
     if (combined & ~alone).any():
-        yield _panel(COMBINED, rows[alone | combined], known)
+        yield _panel(COMBINED, rows[alone | combined], configurations)
 
 
 def summarise(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
-    """One row per panel, planner and configuration, in reading order, with the columns of ``COLUMNS``.
+    """Summarise ``attempts``: a row a panel, planner and configuration, in reading order.
 
-    Times are milliseconds; ``_low`` and ``_high`` are the ends of bootstrap 95 % intervals; shares and
-    reductions are fractions. ``reduction``: of mean planning time against the same planner without memory on
-    the problems that both attempted (NaN where there are none). ``slower, slowdown, p_value``: of
-    ``signs.Signs``, the last corrected by Holm for all comparisons of the table.
+    ``seed``, ``resamples``: of the bootstrap.
+
+    Returns the columns of ``COLUMNS``. Times are milliseconds, ``_low`` and ``_high`` the ends of bootstrap
+    95 % intervals, shares and reductions fractions. ``reduction`` is that of the mean planning time against
+    the same planner without memory, on the problems that both attempted (NaN if there are none). ``slower``,
+    ``slowdown`` and ``p_value`` are those of ``sign_tests.Signs``, the last corrected for all comparisons of
+    the table (Holm).
     """
     tables = [_summarise(panel, seed, resamples) for panel in panels(attempts)]
     if not tables:
@@ -100,7 +109,7 @@ def summarise(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES)
 
 
 def summarise_continual(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
-    """``summarise`` for each number of experiences in the column ``experiences``, and that column before."""
+    """``summarise`` for each number in the column ``experiences``, which comes first in the table."""
     tables = [
         summarise(rows, seed, resamples).assign(experiences=count)
         for count, rows in attempts.groupby("experiences")
@@ -116,46 +125,42 @@ def compare(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> pd.DataFrame:
-    """How much less of ``column`` the second configuration of each pair needs than the first.
+    """How much less of ``column``, a column of ``attempts``, the second configuration of each pair needs.
 
-    One row per panel, planner and pair of which both were attempted: ``panel, planner, before, after``
+    ``pairs``: configurations, the first of a pair is what the second is compared with. ``seed``,
+    ``resamples``: of the bootstrap.
+
+    Returns a row a panel, planner and pair of which both were attempted: ``panel, planner, before, after``
     (labels), ``reduction`` of the mean on the same problems as a fraction, ``reduction_low, reduction_high``.
     """
     tables = []
     for panel in panels(attempts):
-        found = [
-            (planner, before, after, i, j)
+        columns = [
+            (planner, before.label, after.label, i, j)
             for planner in dict.fromkeys(planner for planner, _ in panel.columns)
             for before, after in pairs
             if (i := panel.column(planner, before)) is not None
             and (j := panel.column(planner, after)) is not None
         ]
-        if found:
+        if columns:
             values = panel.matrix(column)
-            first = values[:, [i for *_, i, _ in found]]
-            second = values[:, [j for *_, j in found]]
+            first, second = (values[:, np.array([each[side] for each in columns], int)] for side in (3, 4))
             low, high = interval(bootstrap(second, first, seed, resamples).reductions)
-            tables.append(
-                pd.DataFrame(
-                    {
-                        "panel": panel.name,
-                        "planner": [each[0] for each in found],
-                        "before": [each[1].label for each in found],
-                        "after": [each[2].label for each in found],
-                        "reduction": _reduction(second, first),
-                        "reduction_low": low,
-                        "reduction_high": high,
-                    }
-                )
-            )
+            table = pd.DataFrame([each[:3] for each in columns], columns=["planner", "before", "after"])
+            reductions = {
+                "reduction": _reduction(second, first),
+                "reduction_low": low,
+                "reduction_high": high,
+            }
+            tables.append(table.assign(panel=panel.name, **reductions))
     names = ["panel", "planner", "before", "after", "reduction", "reduction_low", "reduction_high"]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=names)
+    return pd.concat(tables, ignore_index=True)[names] if tables else pd.DataFrame(columns=names)
 
 
-def ranked(names: Iterable[Hashable], known: tuple[str, ...]) -> list[str]:
-    """The distinct names: known ones in their order, then the others alphabetically."""
+def ranked(names: Iterable[Hashable], order: tuple[str, ...]) -> list[str]:
+    """The distinct ``names``: those in ``order`` first, in that order, then the others alphabetically."""
     distinct = {str(name) for name in names}
-    return [name for name in known if name in distinct] + sorted(distinct.difference(known))
+    return [name for name in order if name in distinct] + sorted(distinct.difference(order))
 
 
 COLUMNS: Final = (
@@ -168,19 +173,19 @@ COLUMNS: Final = (
 )  # fmt: skip
 
 
-def _panel(name: str, rows: pd.DataFrame, known: dict[str, Configuration]) -> Panel:
-    """Find each row's place; problems are sorted, so that the order of the rows cannot change a result."""
-    meant = list(known.values())
+def _panel(name: str, rows: pd.DataFrame, configurations: dict[str, Configuration]) -> Panel:
+    """Give each row its cell; problems are sorted, so that the order of the rows cannot change a result."""
+    known = list(configurations.values())
     planners = ranked(rows["planner"].unique(), PLANNERS)
-    place = {planner: i for i, planner in enumerate(planners)}
-    first = rows["planner"].cat.rename_categories(
-        {each: place.get(each, -1) for each in rows["planner"].cat.categories}
-    )
-    wanted = first.astype(int).to_numpy() * len(meant) + rows["configuration"].cat.codes.to_numpy(int)
-    there, column = np.unique(wanted, return_inverse=True)
+    numbers = {
+        each: planners.index(each) if each in planners else -1 for each in rows["planner"].cat.categories
+    }
+    planner = rows["planner"].cat.rename_categories(numbers).astype(int).to_numpy()
+    pair = planner * len(known) + rows["configuration"].cat.codes.to_numpy(int)
+    attempted, column = np.unique(pair, return_inverse=True)
     problem, problems = pd.factorize(rows["problem_id"], sort=True)
-    cells = problem * len(there) + column
-    columns = [(planners[i // len(meant)], meant[i % len(meant)]) for i in there.tolist()]
+    cells = problem * len(attempted) + column
+    columns = [(planners[i // len(known)], known[i % len(known)]) for i in attempted.tolist()]
     return Panel(name, rows.assign(cell=cells), len(problems), columns)
 
 
@@ -189,10 +194,7 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     times = panel.milliseconds()
     baseline = panel.baseline(times)
     resampled = bootstrap(times, baseline, seed, resamples, interquartile=True)
-    table = pd.DataFrame([each._asdict() for _, each in panel.columns])
-    table["configuration"] = [each.label for _, each in panel.columns]
-    table["planner"] = [planner for planner, _ in panel.columns]
-    table["panel"] = panel.name
+    table = panel.labels().join(pd.DataFrame([each._asdict() for _, each in panel.columns]))
     table["problems"] = (~np.isnan(times)).sum(axis=0)
     table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
     recalled = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
@@ -222,6 +224,6 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
 
 
 def _reduction(values: Floats, baseline: Floats) -> Floats:
-    """One less the ratio of the means ``[C]`` over the problems that both attempted."""
+    """1 less the ratio of the means ``[C]`` of ``values`` and ``baseline`` where both have a number."""
     both = ~np.isnan(values) & ~np.isnan(baseline)
     return 1.0 - ratio(np.where(both, values, 0.0).sum(axis=0), np.where(both, baseline, 0.0).sum(axis=0))

@@ -1,4 +1,4 @@
-"""How good recall is, whatever planner uses it: hit@k between choosing at random and the oracle."""
+"""How good recall is, whatever planner uses it: hit@k, between picking at random and the oracle."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ _COLUMNS: Final = (*_KEYS, "k", "problems", "plans", "seeds", *_SHARES, "hit_sd"
 
 
 def retrieval_curve(recalls: pd.DataFrame, max_k: int = MAX_K) -> pd.DataFrame:
-    """Retrieval by k, from recall rows (``order``: plan numbers, best first; ``free``: a truth value a plan).
+    """Retrieval against k, the number of plans that are recalled.
 
-    One row per class, memory, protocol, way to recall and k in 1 .. min(max_k, N), with columns ``panel,
-    memory, protocol, recall, k, problems, plans, seeds, hit, origin, random, oracle, nothing_recalled,
-    hit_sd, origin_sd``; all but the counts are shares of problems, the mean over training seeds; ``_sd``:
-    their standard deviation over these, NaN for one.
-    ``hit``: one of the first k plans of the ranking is free. ``origin``: the plan that the problem was made
-    for is among them; NaN where there is none. ``random``: what k distinct plans picked blindly reach on
-    average. ``oracle``: any of the N is free. ``nothing_recalled``: the memory said there is none.
+    ``recalls``: rows as ``storage.tables.recalls`` reads them. ``max_k``: the largest k, if there are so many
+    plans.
+
+    Returns a row a class, memory, protocol, ranking and k. Columns but the counts are shares of problems,
+    means over training seeds, and with ``_sd`` the standard deviation over these (NaN for one). ``hit``: one
+    of the first k plans is free. ``origin``: the plan that the problem was made for is among them; NaN if
+    there is none.
+    ``random``: what k distinct plans picked blindly reach on average. ``oracle``: any plan is free.
+    ``nothing_recalled``: the memory said that none is.
     """
     tables = []
     for panel in ranked(recalls["class"], PANELS):
@@ -46,11 +48,11 @@ def retrieval_curve(recalls: pd.DataFrame, max_k: int = MAX_K) -> pd.DataFrame:
 
 
 def summarise_retrieval(curve: pd.DataFrame) -> pd.DataFrame:
-    """One row per class, memory, protocol and way to recall: the curve at k of 1 and 5.
+    """The ``curve`` of ``retrieval_curve`` at k of 1 and 5: a row a class, memory, protocol and ranking.
 
-    Columns ``panel, memory, protocol, recall, problems, plans, seeds, oracle, nothing_recalled``, and at both
-    k ``hit, hit_sd, origin, origin_sd, random``, as ``hit@1``. With fewer than five plans, ``@5``
-    stands for all of them.
+    Returns ``panel, memory, protocol, recall, problems, plans, seeds, oracle, nothing_recalled``, and ``hit,
+    hit_sd, origin, origin_sd, random`` at both k, named like ``hit@1``. With fewer than five plans ``@5`` is
+    of all of them.
     """
     single = [*_KEYS, "problems", "plans", "seeds", "oracle", "nothing_recalled"]
     by_k = ["hit", "hit_sd", "origin", "origin_sd", "random"]
@@ -64,9 +66,9 @@ def summarise_retrieval(curve: pd.DataFrame) -> pd.DataFrame:
 
 
 def random_hit(free: Floats, plans: Floats, max_k: int) -> Floats:
-    """Chance ``[n, max_k]`` that k of N plans, drawn without replacement, hold one of the F free ones.
+    """Chances ``[n, max_k]`` that k of N plans, drawn without replacement, hold one of the F free ones.
 
-    ``free [n]`` is F, ``plans [n]`` is N: 1 - C(N - F, k) / C(N, k), the hypergeometric law.
+    ``free [n]``: F of each problem. ``plans [n]``: N. By the hypergeometric law 1 - C(N - F, k) / C(N, k).
     """
     taken = np.arange(max_k)
     blocked = np.maximum(plans[:, None] - free[:, None] - taken, 0.0)
@@ -75,7 +77,7 @@ def random_hit(free: Floats, plans: Floats, max_k: int) -> Floats:
 
 
 def _over_seeds(rows: pd.DataFrame, max_k: int) -> pd.DataFrame:
-    """The curve of one memory, protocol and way to recall: mean and deviation over training seeds."""
+    """The curve of one memory, protocol and ranking: mean and deviation over training seeds."""
     curves = [_curve(of_seed, max_k) for _, of_seed in rows.groupby("training_seed")]
     together = pd.concat(curves).groupby("k")
     mean = together.mean().reset_index().astype({"problems": int, "plans": int})
@@ -106,7 +108,7 @@ def _curve(rows: pd.DataFrame, max_k: int) -> pd.DataFrame:
     )
 
 
-def _share_by(found: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], max_k: int) -> Floats:
-    """Share of the lines that hold a true value by column k."""
-    share: Floats = np.logical_or.accumulate(found[:, :max_k], axis=1).mean(axis=0)
+def _share_by(hits: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], max_k: int) -> Floats:
+    """Share ``[max_k]`` of the rows of ``hits`` that hold a true value in their first k columns."""
+    share: Floats = np.logical_or.accumulate(hits[:, :max_k], axis=1).mean(axis=0)
     return share

@@ -1,4 +1,4 @@
-"""Paired sign tests: in how many problems memory made planning slower, by how much, and is that chance."""
+"""Paired sign tests: in how many problems planning became slower, by how much, and whether by chance."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from planners.world.arrays import Floats
 
 
 class Signs(NamedTuple):
-    """Times against those of the baseline on the same problems; a failure is slower than every success."""
+    """Times beside those of a baseline on the same problems; a failure is slower than every success."""
 
     compared: int  # problems that both attempted
     slower: float  # share of them in which the baseline was faster
-    slowdown: float  # among those the median of time / baseline; infinite where most of them failed
-    p_value: float  # two-sided sign test that slower and faster are equally likely, ties left out
+    slowdown: float  # in those, the median of time / baseline; infinite if most of them failed
+    p_value: float  # of a two-sided sign test that slower and faster are equally likely, without ties
 
 
 def signs(times: Floats, baseline: Floats) -> Signs:
-    """Compare ``times [n]`` with ``baseline [n]``: NaN where not attempted, infinite where not solved."""
+    """Compare ``times [n]`` with ``baseline [n]``: NaN is not attempted, infinite not solved."""
     both = ~np.isnan(times) & ~np.isnan(baseline)
     mine, other = times[both], baseline[both]
     slower, faster = mine > other, mine < other
@@ -35,7 +35,7 @@ def signs(times: Floats, baseline: Floats) -> Signs:
 
 
 def holm(p_values: Floats) -> Floats:
-    """P-values ``[m]`` corrected for there being m of them (Holm 1979); NaN is no test and stays NaN."""
+    """``p_values [m]`` corrected for their number (Holm 1979); NaN, where nothing was tested, stays NaN."""
     corrected = np.full(p_values.shape, np.nan)
     tested = np.flatnonzero(~np.isnan(p_values))
     order = tested[np.argsort(p_values[tested], kind="stable")]

@@ -1,8 +1,8 @@
-"""When a claim holds: decided from its figures and their intervals, and told in words.
+"""When a claim holds, decided from estimates and their intervals.
 
-A figure decides when its 95 % interval lies on one side. A claim holds when all its figures say so; it does
-not when one says the opposite, with an interval widened for their number (Bonferroni). Where an interval
-reaches over the line, or a figure was not measured, nothing is decided: "cannot be compared".
+An estimate decides if its 95 % interval lies on one side. A claim holds if all its estimates say so. It does
+not if one says the opposite, with an interval widened for their number (Bonferroni). If an interval reaches
+over the line, or something was not measured, the claim cannot be compared.
 """
 
 from __future__ import annotations
@@ -10,61 +10,63 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from dashboards.verdicts.evidence import Figure
+from dashboards.verdicts.evidence import Estimate
 
 HOLDS: Final = "holds"
 FAILS: Final = "does not hold"
 OPEN: Final = "cannot be compared"
-_SHOWN: Final = 3  # figures that are written out, those that matter most first
+_SHOWN: Final = 3  # estimates that are written out, those that matter most first
 
 
 class Claim(NamedTuple):
-    """A claim of the paper and what became of it."""
+    """A claim of the paper, and whether it holds here."""
 
     text: str
-    where: str  # in the paper
-    rule: str  # how it is decided
-    ours: str  # what was measured
+    where: str  # section of the paper
+    rule: str  # by which it is decided
+    ours: str  # what was measured, in words
     verdict: str  # HOLDS, FAILS or OPEN
 
 
 class Statement(NamedTuple):
-    """A figure, None where it was not measured, and when it says what the claim says."""
+    """An estimate, None if it was not measured, and whether it says what the claim says."""
 
-    figure: Figure | None
-    says: Callable[[Figure], bool | None]
+    estimate: Estimate | None
+    says: Callable[[Estimate], bool | None]
 
     def holds(self, together: int) -> bool | None:
-        """Whether it says so, beside as many others; None where it is undecided or not measured."""
-        if self.figure is None:
+        """Whether it says so, one of so many estimates ``together``; None if that is open or not measured."""
+        if self.estimate is None:
             return None
-        said = self.says(self.figure)
-        return self.says(self.figure.widened(together)) if said is False else said
+        truth = self.says(self.estimate)
+        return self.says(self.estimate.widened(together)) if truth is False else truth
 
 
 def decided(text: str, where: str, rule: str, statements: list[Statement]) -> Claim:
-    """All statements must hold; one that is false settles it."""
-    measured = [each for each in statements if each.figure is not None]
-    truths = [each.holds(len(measured)) for each in statements]
+    """Decide a claim by its ``statements``, all of which must hold.
+
+    ``text``, ``where``, ``rule``: as in ``Claim``.
+    """
+    together = sum(statement.estimate is not None for statement in statements)
+    truths = [statement.holds(together) for statement in statements]
     verdict = FAILS if False in truths else OPEN if None in truths or not truths else HOLDS
-    figures = [each.figure for each in statements]
-    return Claim(text, where, rule, _told(figures, truths), verdict)
+    return Claim(text, where, rule, _in_words([each.estimate for each in statements], truths), verdict)
 
 
-def _told(figures: list[Figure | None], truths: list[bool | None]) -> str:
-    """The figures in words: how many say what the claim says, and the ones that speak against it most."""
-    measured = [(figure, holds) for figure, holds in zip(figures, truths, strict=True) if figure is not None]
-    missing = len(figures) - len(measured)
+def _in_words(estimates: list[Estimate | None], truths: list[bool | None]) -> str:
+    """How many estimates say what the claim says, and those that speak against it most."""
+    measured = [(each, truth) for each, truth in zip(estimates, truths, strict=True) if each is not None]
+    missing = len(estimates) - len(measured)
     if not measured:
         return "not measured"
     if len(measured) <= _SHOWN:
-        told = "; ".join(str(figure) for figure, _ in measured)
+        words = "; ".join(str(estimate) for estimate, _ in measured)
     else:
-        sorts = ((True, "as claimed"), (False, "against it"), (None, "undecided"))
-        found = {name: [figure for figure, holds in measured if holds is truth] for truth, name in sorts}
-        counts = ", ".join(f"{len(named)} {name}" for name, named in found.items() if named)
-        weakest = found["against it"] or found["undecided"] or found["as claimed"]
-        shown = sorted(weakest, key=lambda figure: abs(figure.value), reverse=weakest is found["against it"])
-        told = f"of {len(measured)} figures {counts}; {'; '.join(map(str, shown[:_SHOWN]))}"
-        told += "; …" if len(weakest) > _SHOWN else ""
-    return f"{told}; {missing} not measured" if missing else told
+        kinds = ((True, "as claimed"), (False, "against it"), (None, "undecided"))
+        of_kind = {name: [each for each, truth in measured if truth is kind] for kind, name in kinds}
+        counts = ", ".join(f"{len(estimates)} {name}" for name, estimates in of_kind.items() if estimates)
+        weakest = of_kind["against it"] or of_kind["undecided"] or of_kind["as claimed"]
+        shown = sorted(weakest, key=lambda each: abs(each.value), reverse=weakest is of_kind["against it"])
+        words = f"of {len(measured)} figures {counts}; {'; '.join(map(str, shown[:_SHOWN]))}"
+        words += "; …" if len(weakest) > _SHOWN else ""
+    return f"{words}; {missing} not measured" if missing else words

@@ -1,10 +1,9 @@
-"""The paper's claims one by one, each with the rule by which a run's figures decide it."""
+"""The paper's claims, each with the rule by which the measurements of a run decide it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Final
 
 from dashboards.statistics.panels import COMBINED
@@ -17,8 +16,8 @@ from dashboards.verdicts.evidence import (
     RANDOM_1,
     RANDOM_5,
     WITH_MEMORY,
+    Estimate,
     Evidence,
-    Figure,
 )
 from storage.tables.configurations import BASELINE
 
@@ -27,7 +26,7 @@ PLANNERS: Final = ("rrt", "gust", "follow")
 MOST_REDUCTION: Final = 0.89
 FEW_EXPERIENCES: Final = (20, 40)
 ALL_EXPERIENCES: Final = 100
-RECALL: Final = (  # class, memory, share first, share among the first five
+RECALL: Final = (  # published: class, memory, share in which the plan is first, and among the first five
     ("curves", "curves", 0.950, 0.999),
     ("random", "random", 0.250, 0.614),
     ("trap", "trap", 0.750, 0.943),
@@ -35,77 +34,75 @@ RECALL: Final = (  # class, memory, share first, share among the first five
     ("random", COMBINED, 0.618, 0.906),
     ("trap", COMBINED, 0.431, 0.776),
 )
+_PANELS: Final = tuple(product((*CLASSES, COMBINED), PLANNERS))
 _IN_TURN: Final = (BASELINE, CLOSED_1, CLOSED_5, OPEN_1, OPEN_5)
 
 
 def claims(evidence: Evidence) -> list[Claim]:
-    """All claims, decided."""
-    of_planning = [decided(text, where, rule, ask(evidence)) for text, where, rule, ask in _CLAIMS]
-    return of_planning + [_of_recall(evidence, *published) for published in RECALL]
+    """All claims of the paper, decided by ``evidence``."""
+    of_planning = [
+        decided(text, where, rule, statements(evidence)) for text, where, rule, statements in _CLAIMS
+    ]
+    return of_planning + [_recall_claim(evidence, *published) for published in RECALL]
 
 
-def _of_recall(evidence: Evidence, name: str, memory: str, first: float, five: float) -> Claim:
+def _recall_claim(evidence: Evidence, name: str, memory: str, first: float, five: float) -> Claim:
     whose = "the memory of all classes" if memory == COMBINED else "its own memory"
     text = (
         f"Recall on {name} with {whose}: the plan that a held-out problem was made for is first in "
         f"{100 * first:.1f} %, among the first five in {100 * five:.1f} %."
     )
-    published = ((1, first), (5, five))
-    hits = [(evidence.origin_hits(name, memory, k), share) for k, share in published]
-    statements = [Statement(hit, partial(Figure.reaches, line=share)) for hit, share in hits]
+    statements = [
+        Statement(evidence.origin_hits(name, memory, k), partial(Estimate.reaches, line=share))
+        for k, share in ((1, first), (5, five))
+    ]
     rule = "The interval of each share lies above the published share or reaches it."
     return decided(text, "published figures", rule, statements)
 
 
 def _most(evidence: Evidence) -> list[Statement]:
     best = evidence.best((*CLASSES, COMBINED), PLANNERS)
-    return [Statement(best, lambda figure: figure.above(MOST_REDUCTION))]
+    return [Statement(best, lambda estimate: estimate.above(MOST_REDUCTION))]
 
 
 def _faster_but_for_one(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.reduction(name, planner, asked), Figure.above)
-        for name in CLASSES
-        for planner in PLANNERS
-        for asked in WITH_MEMORY
-        if not (name == "trap" and planner == "follow" and asked.assist == "closed")
+        Statement(evidence.reduction(name, planner, configuration), Estimate.above)
+        for name, planner, configuration in product(CLASSES, PLANNERS, WITH_MEMORY)
+        if not (name == "trap" and planner == "follow" and configuration.assist == "closed")
     ]
 
 
-def _slower_there(evidence: Evidence) -> list[Statement]:
-    return [
-        Statement(evidence.reduction("trap", "follow", each), Figure.below) for each in (CLOSED_1, CLOSED_5)
-    ]
+def _closed_is_slower(evidence: Evidence) -> list[Statement]:
+    slower = (evidence.reduction("trap", "follow", configuration) for configuration in (CLOSED_1, CLOSED_5))
+    return [Statement(estimate, Estimate.below) for estimate in slower]
 
 
 def _left_to_right(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.reduction(name, planner, after, before), Figure.above)
-        for name, planner in _panels()
-        for before, after in pairwise(_IN_TURN)
+        Statement(evidence.reduction(name, planner, after, before), Estimate.above)
+        for (name, planner), (before, after) in product(_PANELS, list(pairwise(_IN_TURN)))
     ]
 
 
 def _open_not_worse(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.reduction(name, planner, after, before), Figure.reaches)
-        for name, planner in _panels()
-        for before, after in ((CLOSED_1, OPEN_1), (CLOSED_5, OPEN_5))
+        Statement(evidence.reduction(name, planner, after, before), Estimate.reaches)
+        for (name, planner), (before, after) in product(_PANELS, ((CLOSED_1, OPEN_1), (CLOSED_5, OPEN_5)))
     ]
 
 
 def _five_mostly_better(evidence: Evidence) -> list[Statement]:
-    """One statement: the share of panels in which five plans are faster, undecided ones on either side."""
-    found = [
-        figure.above()
-        for name, planner in _panels()
-        for before, after in ((CLOSED_1, CLOSED_5), (OPEN_1, OPEN_5))
-        if (figure := evidence.reduction(name, planner, after, before))
+    """One statement: the share of panels in which five plans are faster, which undecided ones would raise."""
+    are_faster = [
+        estimate.above()
+        for (name, planner), (before, after) in product(_PANELS, ((CLOSED_1, CLOSED_5), (OPEN_1, OPEN_5)))
+        if (estimate := evidence.reduction(name, planner, after, before))
     ]
-    n, faster, undecided = len(found), found.count(True), found.count(None)
+    n, faster, undecided = len(are_faster), are_faster.count(True), are_faster.count(None)
     what = f"five faster in {faster} of {n}, undecided in {undecided}"
-    share = Figure(what, faster / n, faster / n, (faster + undecided) / n) if found else None
-    return [Statement(share, lambda figure: figure.above(0.5))]
+    share = Estimate(what, faster / n, faster / n, (faster + undecided) / n) if n else None
+    return [Statement(share, lambda estimate: estimate.above(0.5))]
 
 
 def _most_on_curves_or_trap(evidence: Evidence) -> list[Statement]:
@@ -119,33 +116,29 @@ def _most_on_curves_or_trap(evidence: Evidence) -> list[Statement]:
 
 def _combined_faster(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.reduction(COMBINED, planner, asked), Figure.above)
-        for planner in PLANNERS
-        for asked in WITH_MEMORY
+        Statement(evidence.reduction(COMBINED, planner, configuration), Estimate.above)
+        for planner, configuration in product(PLANNERS, WITH_MEMORY)
     ]
 
 
 def _most_for_gust(evidence: Evidence) -> list[Statement]:
     return [
         _compared(evidence.best([name], ["gust"]), evidence.best([name], [other]))
-        for name in CLASSES
-        for other in ("follow", "rrt")
+        for name, other in product(CLASSES, ("follow", "rrt"))
     ]
 
 
 def _five_cost_more(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.recall_costs_more(name, planner), Figure.above)
-        for name in CLASSES
-        for planner in PLANNERS
+        Statement(evidence.recall_costs_more(name, planner), Estimate.above)
+        for name, planner in product(CLASSES, PLANNERS)
     ]
 
 
 def _few_are_slower(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.grown(count, asked), Figure.below)
-        for count in FEW_EXPERIENCES
-        for asked in (CLOSED_1, CLOSED_5)
+        Statement(evidence.grown(count, configuration), Estimate.below)
+        for count, configuration in product(FEW_EXPERIENCES, (CLOSED_1, CLOSED_5))
     ]
 
 
@@ -153,28 +146,24 @@ def _more_are_faster(evidence: Evidence) -> list[Statement]:
     few, many = FEW_EXPERIENCES[0], ALL_EXPERIENCES
     return [
         statement
-        for asked in (CLOSED_1, CLOSED_5)
+        for configuration in (CLOSED_1, CLOSED_5)
         for statement in (
-            Statement(evidence.grown(many, asked), Figure.above),
-            _compared(evidence.grown(many, asked), evidence.grown(few, asked)),
+            Statement(evidence.grown(many, configuration), Estimate.above),
+            _compared(evidence.grown(many, configuration), evidence.grown(few, configuration)),
         )
     ]
 
 
 def _blind_is_slower(evidence: Evidence) -> list[Statement]:
-    return [
-        Statement(evidence.reduction("curves", "gust", each), Figure.below) for each in (RANDOM_1, RANDOM_5)
-    ]
+    blind = (evidence.reduction("curves", "gust", configuration) for configuration in (RANDOM_1, RANDOM_5))
+    return [Statement(estimate, Estimate.below) for estimate in blind]
 
 
-def _compared(mine: Figure | None, other: Figure | None) -> Statement:
-    if mine is None or other is None:
-        return Statement(None, Figure.above)
-    return Statement(mine._replace(what=f"{other} against {mine.what}"), lambda mine: mine.exceeds(other))
-
-
-def _panels() -> Iterator[tuple[str, str]]:
-    return ((name, planner) for name in (*CLASSES, COMBINED) for planner in PLANNERS)
+def _compared(larger: Estimate | None, other: Estimate | None) -> Statement:
+    if larger is None or other is None:
+        return Statement(None, Estimate.above)
+    named = larger._replace(what=f"{other} against {larger.what}")
+    return Statement(named, lambda estimate: estimate.exceeds(other))
 
 
 _EACH: Final = "The interval of each reduction of mean planning time, paired by problem, lies "
@@ -195,7 +184,7 @@ _CLAIMS: Final = (
         "Closed box with Follow on Trap is slower than Follow alone.",
         "IV-B",
         _EACH + "below 0, with one plan and with five.",
-        _slower_there,
+        _closed_is_slower,
     ),
     (
         "In each of the 12 panels planning becomes ever faster: none, closed 1, closed 5, open 1, open 5.",

@@ -1,4 +1,4 @@
-"""Runs side by side: what each attempts faster or slower than the first of them, paired by problem."""
+"""Two runs side by side, paired by problem: what the second does faster or slower than the first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ import numpy as np
 import pandas as pd
 from rich.console import Group
 
-from dashboards.cells import NOTHING, Rows, decimals_of, percent, share, titled_markdown, titled_tables
+from dashboards.cells import (
+    NOTHING,
+    Rows,
+    decimals_of,
+    percent,
+    titled_markdown,
+    titled_tables,
+    with_interval,
+)
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval, ratio
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
@@ -19,7 +27,7 @@ from storage.tables.configurations import BASELINE, Configuration
 
 FASTER: Final = "faster"
 SLOWER: Final = "slower"
-OPEN: Final = "open"  # the interval reaches over "no difference"
+OPEN: Final = "open"  # the interval reaches over 0
 HEADINGS: Final = (
     "planner", "configuration", "first ms", "ms", "less time %", "fewer checks %", "slower %", "solved %",
     "verdict",
@@ -34,14 +42,18 @@ COLUMNS: Final = (
 def compare_runs(
     first: pd.DataFrame, other: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES
 ) -> pd.DataFrame:
-    """One row per panel, planner and configuration that both attempted, with the columns of ``COLUMNS``.
+    """Compare two runs by the problems that both attempted.
 
-    Only problems that are in both count. A machine may be faster on another day, so a planner's times are
-    taken relative to what it needed without memory in the same run: ``reduction`` is 1 less the ratio of the
-    two relative means (of the means themselves where there is nothing to relate them to, and for the attempts
-    without memory, which show how much the machines differ). ``slower``: share of problems in which the other
-    run took longer, in these terms; ``p_value``: sign test, corrected by Holm; ``verdict``: FASTER or SLOWER
-    where the 95 % interval of the reduction says so, else OPEN.
+    A machine may be faster on another day, so a planner's times are taken relative to what it needed without
+    memory in the same run. Attempts without memory, and those of a planner that has none of these, are
+    compared as they are: the former show how much the machines differ.
+
+    ``first``, ``other``: attempt rows of the runs. ``seed``, ``resamples``: of the bootstrap.
+
+    Returns a row a panel, planner and configuration that both attempted, with the columns of ``COLUMNS``:
+    ``reduction`` is 1 less the ratio of the relative means, ``slower`` the share of problems in which the
+    other run took relatively longer, ``p_value`` that of a sign test, corrected (Holm), ``verdict`` FASTER or
+    SLOWER if the 95 % interval of the reduction says so, else OPEN.
     """
     shared = np.intersect1d(first["problem_id"], other["problem_id"])
     before = {panel.name: panel for panel in panels(first[first["problem_id"].isin(shared)])}
@@ -62,19 +74,20 @@ class _Side(NamedTuple):
     """What one run measured in the columns that both have; ``[problems, columns]`` each."""
 
     times: Floats  # ms
-    alone: Floats  # ms of the same planner without memory; 1 where there is nothing to relate times to
+    alone: Floats  # ms of the same planner without memory; 1 for columns that are compared as they are
     censored: Floats  # times, infinite where an attempt failed
     checks: Floats
     solved: Floats
 
 
 def _side(panel: Panel, columns: list[tuple[str, Configuration]]) -> _Side:
-    places = [panel.columns.index(column) for column in columns]
+    indices = [panel.columns.index(column) for column in columns]
     times = panel.milliseconds()
-    alone = panel.baseline(times)[:, places]
-    unrelated = np.isnan(alone).all(axis=0) | np.array([each == BASELINE for _, each in columns])
+    alone = panel.baseline(times)[:, indices]
+    is_baseline = np.array([configuration == BASELINE for _, configuration in columns])
+    as_it_is = np.isnan(alone).all(axis=0) | is_baseline
     matrices = (panel.censored(), panel.matrix("collision_checks"), panel.matrix("solved"))
-    return _Side(times[:, places], np.where(unrelated, 1.0, alone), *(each[:, places] for each in matrices))
+    return _Side(times[:, indices], np.where(as_it_is, 1.0, alone), *(each[:, indices] for each in matrices))
 
 
 def _compare(first: Panel, other: Panel, seed: int, resamples: int) -> pd.DataFrame:
@@ -118,23 +131,24 @@ def _compare(first: Panel, other: Panel, seed: int, resamples: int) -> pd.DataFr
 
 
 def comparison_table(rows: pd.DataFrame) -> Group:
-    """``compare_runs`` for a terminal: a table a panel."""
-    return titled_tables(HEADINGS, _titled(rows))
+    """The ``rows`` of ``compare_runs`` for a terminal: a table a panel."""
+    return titled_tables(HEADINGS, comparison_cells(rows))
 
 
 def comparison_markdown(rows: pd.DataFrame) -> str:
-    """The same as Markdown: a heading and a table a panel."""
-    return titled_markdown(HEADINGS, _titled(rows))
+    """The ``rows`` of ``compare_runs`` as Markdown: a heading and a table a panel."""
+    return titled_markdown(HEADINGS, comparison_cells(rows))
 
 
 def verdict(rows: pd.DataFrame) -> str:
-    """How many configurations with memory are faster, slower and open, in words."""
+    """In words, how many configurations in the ``rows`` of ``compare_runs`` are faster, slower and open."""
     counts = Counter(rows["verdict"])
     named = [f"{counts[each]} {each}" for each in (FASTER, SLOWER, OPEN)]
     return f"{', '.join(named)} of {sum(counts[each] for each in (FASTER, SLOWER, OPEN))} configurations"
 
 
-def _titled(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
+def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
+    """Of each panel in the ``rows`` of ``compare_runs`` a title, and a group of cells for each planner."""
     for panel, of_panel in rows.groupby("panel", sort=False):
         decimals = decimals_of(of_panel[["first_ms", "ms"]].to_numpy(dtype=float))
         groups = [
@@ -150,10 +164,10 @@ def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
         row["configuration"],
         *[f"{row[name]:,.{decimals}f}" for name in ("first_ms", "ms")],
         *[
-            f"{100 * row[name]:.0f} [{100 * row[f'{name}_low']:4.0f}, {100 * row[f'{name}_high']:4.0f}]"
+            with_interval(row[name], row[f"{name}_low"], row[f"{name}_high"])
             for name in ("reduction", "checks_reduction")
         ],
-        share(row["slower"]),
+        percent(row["slower"]),
         percent(row["solved"]),
         row["verdict"],
     ]

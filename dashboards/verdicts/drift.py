@@ -1,8 +1,8 @@
-"""Whether a memory still fits what it is asked: hits and planning times beside those it was judged by.
+"""Whether a memory still fits the problems it gets: hits and planning times beside those of its benchmark.
 
-A hit is a problem that is answered by a recalled plan as it is. Hits have fallen where so few of so many
-would come of the benchmark's rate in one case of a thousand at most (Fisher's exact test, one-sided): so
-rarely that it may start work by itself.
+A hit is a problem that a recalled plan answers as it is. Hits have fallen if, at the benchmark's rate, so few
+would come in at most one case of a thousand (Fisher's exact test, one-sided): rare enough for a retraining
+that nobody asked for.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from scipy.stats import fisher_exact
 from storage.tables.configurations import configured
 
 SIGNIFICANCE: Final = 0.001
-FEWEST: Final = 20  # problems; of fewer nothing is said
+FEWEST: Final = 20  # problems; fewer never count as a fall
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Usefulness:
     """How useful a memory was to one planner in one configuration."""
 
     problems: int
-    hits: int  # answered by a recalled plan
+    hits: int  # problems that a recalled plan answered
     mean_ms: float
     median_ms: float
 
@@ -38,26 +38,26 @@ class Usefulness:
 
 @dataclass(frozen=True)
 class Drift:
-    """A memory's usefulness now, beside the benchmark's."""
+    """How useful a memory is now, and how useful it was in its benchmark."""
 
     memory: str
     configuration: str  # planner and configuration, like ``gust open 5 exhaustive``
     now: Usefulness
     then: Usefulness
-    p_value: float  # that hits are so few by chance
+    p_value: float  # of so few hits by chance
 
     @property
     def has_fallen(self) -> bool:
-        """Whether hits are significantly fewer."""
+        """Whether hits are significantly fewer than in the benchmark."""
         return self.now.problems >= FEWEST and self.p_value < SIGNIFICANCE
 
     def to_json(self) -> dict[str, Any]:
-        """All of it as JSON values, for an event."""
+        """The fields as JSON values, for an event."""
         rates = {"hit_rate": self.now.hit_rate, "benchmark_hit_rate": self.then.hit_rate}
         return asdict(self) | rates | {"has_fallen": self.has_fallen}
 
     def to_row(self) -> dict[str, Any]:
-        """The row of the table of watched memories (``storage.tables.schemas.WATCHED``), without its time."""
+        """The row of ``storage.tables.schemas.WATCHED``, without its time."""
         return {
             "memory": self.memory,
             "configuration": self.configuration,
@@ -81,22 +81,22 @@ class Drift:
 
 
 def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
-    """What attempts with one memory say, by planner and configuration."""
+    """How useful one memory was in ``attempts``, by planner and configuration: ``gust open 5 exhaustive``."""
     rows, _ = configured(attempts)
-    found = {}
+    by_name = {}
     for (planner, configuration), of_both in rows.groupby(["planner", "configuration"], observed=True):
         milliseconds = 1e3 * of_both["planning_seconds"].to_numpy(float)
-        found[f"{planner} {configuration}"] = Usefulness(
+        by_name[f"{planner} {configuration}"] = Usefulness(
             problems=len(of_both),
             hits=int((of_both["source"] == "recalled").sum()),
             mean_ms=float(milliseconds.mean()),
             median_ms=float(pd.Series(milliseconds).median()),
         )
-    return found
+    return by_name
 
 
 def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Usefulness]) -> Sequence[Drift]:
-    """One for each planner and configuration that both know."""
+    """The drift of a ``memory`` in each planner and configuration that is in both ``now`` and ``then``."""
     return [
         Drift(memory, name, now[name], then[name], _fewer(now[name], then[name]))
         for name in now

@@ -1,4 +1,4 @@
-"""The measured figures that the paper's claims are held against, each with its 95 % interval."""
+"""What a run measured of the paper's claims: estimates, each with its 95 % interval."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _TAIL: Final = 0.5 * (1.0 - CONFIDENCE)
 _OVERHEAD: Final = ("occupancy_seconds", "encode_seconds", "recall_seconds", "check_seconds")
 
 
-class Figure(NamedTuple):
-    """A share or a reduction, the ends of its 95 % interval, and what it is of."""
+class Estimate(NamedTuple):
+    """A share or a reduction, the ends of its 95 % interval, and what it was measured of."""
 
     what: str
     value: float
@@ -38,36 +38,36 @@ class Figure(NamedTuple):
     high: float
 
     def __str__(self) -> str:
-        """Like ``gust on trap, open 5: 53.5 % [46.5, 59.7]``."""
+        """A line like ``gust on trap, open 5: 53.5 % [46.5, 59.7]``."""
         return f"{self.what}: {100 * self.value:.1f} % [{100 * self.low:.1f}, {100 * self.high:.1f}]"
 
     def above(self, line: float = 0.0) -> bool | None:
-        """Whether it exceeds ``line``; None where its interval reaches over it."""
+        """Whether it exceeds ``line``; None if its interval reaches over it."""
         return True if self.low > line else False if self.high < line else None
 
     def below(self, line: float = 0.0) -> bool | None:
-        """Whether it is less than ``line``; None where its interval reaches over it."""
+        """Whether it is less than ``line``; None if its interval reaches over it."""
         return None if (above := self.above(line)) is None else not above
 
     def reaches(self, line: float = 0.0) -> bool:
         """Whether it exceeds ``line`` or cannot be told from it."""
         return self.high >= line
 
-    def widened(self, figures: int) -> Figure:
-        """The same with an interval for so many figures at once (Bonferroni, as of a normal law)."""
-        factor = float(norm.isf(_TAIL / max(figures, 1)) / norm.isf(_TAIL))
+    def widened(self, together: int) -> Estimate:
+        """The same with an interval for so many estimates ``together`` (Bonferroni, as of a normal law)."""
+        factor = float(norm.isf(_TAIL / max(together, 1)) / norm.isf(_TAIL))
         return self._replace(
             low=self.value - factor * (self.value - self.low),
             high=self.value + factor * (self.high - self.value),
         )
 
-    def exceeds(self, other: Figure) -> bool | None:
-        """Whether it is more than another one of other problems; None where the intervals overlap."""
+    def exceeds(self, other: Estimate) -> bool | None:
+        """Whether it exceeds an estimate of ``other`` problems; None if the intervals overlap."""
         return True if self.low > other.high else False if self.high < other.low else None
 
 
 class Evidence:
-    """What a run measured, to be asked by name; what was not measured is None."""
+    """What a run measured, by name; what it did not measure is None."""
 
     def __init__(
         self,
@@ -76,7 +76,12 @@ class Evidence:
         continual: pd.DataFrame | None = None,
         resamples: int = RESAMPLES,
     ) -> None:
-        """Of attempt rows, recall rows, and attempt rows of more runs with a column ``experiences``."""
+        """Measure from rows.
+
+        ``attempts``, ``recalls``: of the run. ``continual``: attempts of runs of growing experience, with a
+        column
+        ``experiences``. ``resamples``: of the bootstrap.
+        """
         self._faster = _reductions(attempts, "planning_seconds", resamples)
         parts = [name for name in _OVERHEAD if name in attempts]
         overhead = attempts.assign(overhead=attempts[parts].sum(axis=1))
@@ -89,31 +94,35 @@ class Evidence:
 
     def reduction(
         self, panel: str, planner: str, after: Configuration, before: Configuration = BASELINE
-    ) -> Figure | None:
-        """How much less mean planning time a planner needs, one configuration against another."""
+    ) -> Estimate | None:
+        """How much less mean planning time a planner needs in configuration ``after`` than in ``before``."""
         return self._faster.get((panel, planner, before, after))
 
-    def best(self, panels: Sequence[str], planners: Sequence[str]) -> Figure | None:
-        """The largest reduction of closed or open box, its interval widened for having been chosen."""
-        asked = product(panels, planners, WITH_MEMORY)
-        found = [each for panel, planner, how in asked if (each := self.reduction(panel, planner, how))]
-        best = max(found, key=lambda each: each.value, default=None)
-        return best and best.widened(len(found))
+    def best(self, panels: Sequence[str], planners: Sequence[str]) -> Estimate | None:
+        """The largest reduction with memory in ``panels`` for ``planners``, widened because it was chosen."""
+        reductions = [
+            estimate
+            for panel, planner, configuration in product(panels, planners, WITH_MEMORY)
+            if (estimate := self.reduction(panel, planner, configuration))
+        ]
+        best = max(reductions, key=lambda estimate: estimate.value, default=None)
+        return best and best.widened(len(reductions))
 
-    def recall_costs_more(self, panel: str, planner: str) -> Figure | None:
-        """How much more five plans cost to recall and check than one does, as a share of the first."""
-        found = self._cheaper.get((panel, planner, CLOSED_1, CLOSED_5))
-        return found and Figure(found.what, -found.value, -found.high, -found.low)
+    def recall_costs_more(self, panel: str, planner: str) -> Estimate | None:
+        """How much more it costs to recall and check five plans than one, as a share of the cost of one."""
+        less = self._cheaper.get((panel, planner, CLOSED_1, CLOSED_5))
+        return less and Estimate(less.what, -less.value, -less.high, -less.low)
 
-    def grown(self, experiences: int, after: Configuration) -> Figure | None:
-        """The reduction for GUST on curves with so many experiences."""
-        found = self._grown.get(experiences, {}).get(("curves", "gust", BASELINE, after))
-        return found and found._replace(what=f"{experiences} experiences, {after.label}")
+    def grown(self, experiences: int, after: Configuration) -> Estimate | None:
+        """The reduction for GUST on curves in configuration ``after``, with that number of experiences."""
+        estimate = self._grown.get(experiences, {}).get(("curves", "gust", BASELINE, after))
+        return estimate and estimate._replace(what=f"{experiences} experiences, {after.label}")
 
-    def origin_hits(self, class_name: str, memory: str, first: int) -> Figure | None:
-        """Share of held-out problems of which the plan they were made for is among the first recalled.
+    def origin_hits(self, class_name: str, memory: str, first: int) -> Estimate | None:
+        """How often the plan that a held-out problem was made for is among the ``first`` ones recalled.
 
-        The mean over training seeds; the interval (Wilson) is that of so many problems.
+        ``class_name``: of the problems. ``memory``: that recalls. Returns the mean share over training seeds;
+        its interval (Wilson) is that of as many problems.
         """
         rows = self._recalls
         rows = rows[(rows["class"] == class_name) & (rows["memory"] == memory)]
@@ -125,24 +134,24 @@ class Evidence:
         share, problems = float(np.mean(hits)), rows["problem_id"].nunique()
         ends = binomtest(round(share * problems), problems).proportion_ci(method="wilson")
         what = "first" if first == 1 else f"among the first {first}"
-        return Figure(what, share, float(ends.low), float(ends.high))
+        return Estimate(what, share, float(ends.low), float(ends.high))
 
 
-def _reductions(attempts: pd.DataFrame, column: str, resamples: int) -> dict[_Key, Figure]:
+def _reductions(attempts: pd.DataFrame, column: str, resamples: int) -> dict[_Key, Estimate]:
     """Every comparison of ``_PAIRS`` by panel and planner.
 
-    Where the rows hold no recall by centroid, another that ranks plans stands for it.
+    If no attempt recalled by centroid, another recall that ranks plans takes its place.
     """
-    known = [each for each in configured(attempts)[1].values() if each.recall != "exhaustive"]
+    attempted = [each for each in configured(attempts)[1].values() if each.recall != "exhaustive"]
 
-    def measured(wanted: Configuration) -> Configuration:
-        like = (each for each in known if (each.assist, each.top_k) == (wanted.assist, wanted.top_k))
+    def nearest(wanted: Configuration) -> Configuration:
+        like = (each for each in attempted if (each.assist, each.top_k) == (wanted.assist, wanted.top_k))
         return next(like, wanted)
 
-    pairs = {(measured(before), measured(after)): (before, after) for before, after in _PAIRS}
-    meant = {(before.label, after.label): pair for (before, after), pair in pairs.items()}
+    pairs = {(nearest(before), nearest(after)): (before, after) for before, after in _PAIRS}
+    by_label = {(before.label, after.label): pair for (before, after), pair in pairs.items()}
     return {
-        (row["panel"], row["planner"], *meant[row["before"], row["after"]]): Figure(
+        (row["panel"], row["planner"], *by_label[row["before"], row["after"]]): Estimate(
             f"{row['planner']} on {row['panel']}, {row['after']}{_against(row['before'])}",
             *(float(row[name]) for name in ("reduction", "reduction_low", "reduction_high")),
         )

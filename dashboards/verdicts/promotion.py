@@ -1,16 +1,16 @@
 """The rule by which a challenger takes a champion's place, and how the judgement is written.
 
 Both attempt the same held-back problems, next to each other, with every planner and every configuration that
-uses a memory. The challenger is promoted if
+uses a memory. A column is a planner and configuration on a class. The challenger is promoted if
 
-1. it is faster: a column is a planner and configuration on a class; the mean over all columns of the
-   reduction of mean planning time has a 95 % interval (paired bootstrap over problems) that lies above 0;
+1. it is faster: the mean over all columns of the reduction of mean planning time has a 95 % interval (paired
+   bootstrap over problems) above 0;
 2. it is slower nowhere: no column has an interval below 0, widened for their number (Bonferroni);
 3. it solves no fewer problems: not in all columns together, and in no column significantly fewer (exact sign
    test, corrected by Holm, 5 %).
 
-Failures count with the time they took. What is not shown is not believed: where an interval reaches 0, the
-champion stays.
+Failures count with the time they took. The challenger has to show that it is better: if an interval reaches
+0, the champion stays.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ import numpy as np
 import pandas as pd
 from rich.console import Group
 
-from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables
+from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables, with_interval
 from dashboards.statistics.intervals import CONFIDENCE, bootstrap
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
+from dashboards.verdicts.comparison import FASTER, OPEN, SLOWER
 from planners.world.arrays import Floats
 
 RESAMPLES: Final = 10_000  # the end of an interval widened for 20 columns stands on 12 of them
@@ -33,10 +34,7 @@ HEADINGS: Final = (
     "planner", "configuration", "champion ms", "challenger ms", "less time % [95 %]", "champion solved %",
     "solved %", "champion hits %", "hits %", "verdict",
 )  # fmt: skip
-FASTER: Final = "faster"
-SLOWER: Final = "slower"
 FEWER: Final = "fewer solved"
-OPEN: Final = "open"
 
 
 class Judgement(NamedTuple):
@@ -48,13 +46,16 @@ class Judgement(NamedTuple):
     reduction: float  # mean over columns, a fraction
     low: float  # ends of its 95 % interval
     high: float
-    columns: pd.DataFrame  # a row a class, planner and configuration, as ``HEADINGS`` and with its problems
+    columns: pd.DataFrame  # a row a class, planner and configuration: ``HEADINGS`` and ``problems``
 
 
 def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Judgement:
-    """Apply the rule to the attempts of both sides, each with one memory.
+    """Apply the rule to attempt rows of ``champion`` and ``challenger``, each with one memory.
 
-    ValueError: they are not of the same problems in the same configurations, or there are none.
+    ``seed``: of the bootstrap.
+
+    Raises ValueError if the rows are not of the same problems in the same configurations, or if there are
+    none.
     """
     sides = [list(panels(rows.assign(memory="own"))) for rows in (champion, challenger)]
     if not sides[0] or _attempted(champion) != _attempted(challenger):
@@ -77,7 +78,7 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
     against = _against(columns, ends)
     return Judgement(
         promoted=not against,
-        why="; ".join(against) or _told("faster", columns, ends),
+        why="; ".join(against) or _interval_line("faster", columns, ends),
         problems=int(challenger["problem_id"].nunique()),
         reduction=float(columns["reduction"].mean()),
         low=ends[0],
@@ -87,7 +88,7 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
 
 
 def judgement_line(judged: Judgement) -> str:
-    """The figures that decide, in words."""
+    """The figures by which it was ``judged``, in one line."""
     interval = f"{100 * judged.low:.1f} to {100 * judged.high:.1f}"
     counts = Counter(judged.columns["verdict"])
     named = ", ".join(f"{counts[each]} {each}" for each in (FASTER, SLOWER, FEWER, OPEN) if counts[each])
@@ -95,24 +96,24 @@ def judgement_line(judged: Judgement) -> str:
 
 
 def judgement_table(judged: Judgement) -> Group:
-    """The columns for a terminal: a table a class."""
+    """The columns by which it was ``judged``, for a terminal: a table a class."""
     return titled_tables(HEADINGS, _titled(judged))
 
 
 def judgement_markdown(judged: Judgement) -> str:
-    """Verdict, figures and columns as Markdown."""
+    """What was ``judged`` as Markdown: verdict, figures and columns."""
     verdict = "promoted" if judged.promoted else "refused"
     head = f"**{verdict}**: {judged.why}.\n\n{judgement_line(judged)}.\n\n"
     return head + titled_markdown(HEADINGS, _titled(judged))
 
 
 def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:
-    asked = rows[["problem_id", "planner", "assist", "top_k", "recall"]].astype(object)
-    return set(asked.where(asked.notna(), None).itertuples(index=False, name=None))
+    keys = rows[["problem_id", "planner", "assist", "top_k", "recall"]].astype(object)
+    return set(keys.where(keys.notna(), None).itertuples(index=False, name=None))
 
 
 def _compared(before: Panel, after: Panel) -> pd.DataFrame:
-    """The figures of a class but for intervals; p-values are of fewer or more solved, not corrected yet."""
+    """The figures of a class without intervals; p-values are of the problems solved, not corrected yet."""
     times = [panel.milliseconds().mean(0) for panel in (before, after)]
     solved = [panel.matrix("solved") for panel in (before, after)]
     hits = [
@@ -120,21 +121,16 @@ def _compared(before: Panel, after: Panel) -> pd.DataFrame:
         for panel in (before, after)
     ]
     tests = [signs(2.0 - mine, 2.0 - other) for mine, other in zip(solved[1].T, solved[0].T, strict=True)]
-    return pd.DataFrame(
-        {
-            "panel": before.name,
-            "planner": [planner for planner, _ in after.columns],
-            "configuration": [configuration.label for _, configuration in after.columns],
-            "problems": after.problems,
-            "champion_ms": times[0],
-            "ms": times[1],
-            "reduction": 1.0 - times[1] / times[0],
-            "champion_solved": solved[0].mean(0),
-            "solved": solved[1].mean(0),
-            "champion_hits": hits[0],
-            "hits": hits[1],
-            "p_value": [test.p_value for test in tests],
-        }
+    return after.labels().assign(
+        problems=after.problems,
+        champion_ms=times[0],
+        ms=times[1],
+        reduction=1.0 - times[1] / times[0],
+        champion_solved=solved[0].mean(0),
+        solved=solved[1].mean(0),
+        champion_hits=hits[0],
+        hits=hits[1],
+        p_value=[test.p_value for test in tests],
     )
 
 
@@ -146,24 +142,26 @@ def _ends(resampled: Floats, confidence: float) -> tuple[Floats, Floats]:
 
 def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
     """What speaks against a promotion, by the rule."""
-    found = []
+    reasons = []
     if ends[0] <= 0.0:
-        found.append(_told("not shown to be faster", columns, ends))
-    for verdict, said in ((SLOWER, "slower"), (FEWER, "solves fewer")):
-        named = columns[columns["verdict"] == verdict]
-        if len(named):
-            worst = named.iloc[int(named["reduction"].argmin())]
-            more = f" and {len(named) - 1} more" if len(named) > 1 else ""
-            found.append(f"{said} with {worst['planner']} {worst['configuration']} on {worst['panel']}{more}")
+        reasons.append(_interval_line("not shown to be faster", columns, ends))
+    for verdict, words in ((SLOWER, "slower"), (FEWER, "solves fewer")):
+        worse = columns[columns["verdict"] == verdict]
+        if len(worse):
+            worst = worse.iloc[int(worse["reduction"].argmin())]
+            more = f" and {len(worse) - 1} more" if len(worse) > 1 else ""
+            reasons.append(
+                f"{words} with {worst['planner']} {worst['configuration']} on {worst['panel']}{more}"
+            )
     mine, theirs = (
         round((columns[name] * columns["problems"]).sum()) for name in ("solved", "champion_solved")
     )
     if mine < theirs:
-        found.append(f"solves fewer in all: {mine:,} attempts against {theirs:,}")
-    return found
+        reasons.append(f"solves fewer in all: {mine:,} attempts against {theirs:,}")
+    return reasons
 
 
-def _told(what: str, columns: pd.DataFrame, ends: tuple[float, float]) -> str:
+def _interval_line(what: str, columns: pd.DataFrame, ends: tuple[float, float]) -> str:
     mean = 100 * columns["reduction"].mean()
     return f"{what}: {mean:.1f} % less time, 95 % interval {100 * ends[0]:.1f} to {100 * ends[1]:.1f}"
 
@@ -185,7 +183,7 @@ def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
         row["planner"],
         row["configuration"],
         *[f"{row[name]:,.{decimals}f}" for name in ("champion_ms", "ms")],
-        f"{100 * row['reduction']:.0f} [{100 * row['low']:4.0f}, {100 * row['high']:4.0f}]",
+        with_interval(row["reduction"], row["low"], row["high"]),
         *[percent(row[name]) for name in ("champion_solved", "solved", "champion_hits", "hits")],
         row["verdict"],
     ]

@@ -1,4 +1,4 @@
-"""The web application: addresses, answers, what is refused, and what a page says when something is wrong."""
+"""The web application: addresses, answers, and what a page shows when something is wrong."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from dashboards.palette import style_sheet
 from dashboards.web.chart_files import csv_file, svg_file
-from dashboards.web.notices import MissingError, NoticeError, WrongQuestionError
+from dashboards.web.data_reader import DataReader
+from dashboards.web.memory_versions import Versions
+from dashboards.web.notices import BadRequestError, MissingError, NoticeError
 from dashboards.web.page import Page, PageOf
 from dashboards.web.pages.comparison_page import comparison
 from dashboards.web.pages.memory_page import memory
@@ -29,13 +32,15 @@ from dashboards.web.pages.problems_page import problems
 from dashboards.web.pages.progress_page import progress
 from dashboards.web.pages.runs_page import runs
 from dashboards.web.pages.try_it_page import check_world, plan_world, try_it
+from dashboards.web.parameters import Parameters, link
 from dashboards.web.policy import Policy
-from dashboards.web.query import Asked, link
-from dashboards.web.retrained import Retrainings
-from dashboards.web.site import Site
 from storage.errors import StorageError
 from storage.fields import parse_json
 from storage.places.data_folder import DataFolder
+
+Answer = Callable[
+    [DataReader, Parameters, Any], dict[str, Any]
+]  # from the data, the address and what was sent
 
 LARGEST_BODY_BYTES: Final = 1 << 20
 PAGES: Final[dict[str, PageOf]] = {
@@ -48,35 +53,33 @@ PAGES: Final[dict[str, PageOf]] = {
     "/progress": progress,
     "/compare": comparison,
 }
-ANSWERS: Final[dict[str, Callable[[Site, Asked, Any], dict[str, Any]]]] = {
-    "/runs/{run}/check": check_world,
-    "/runs/{run}/plan": plan_world,
-}
-TABS: Final = ("Overview", "Problems", "Memory", "Try it", "Progress", "Compare")
+ANSWERS: Final[dict[str, Answer]] = {"/runs/{run}/check": check_world, "/runs/{run}/plan": plan_world}
 _KINDS: Final = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 _FILE_POLICY: Final = "default-src 'none'; style-src 'unsafe-inline'; sandbox"
 
 
-def dashboard_app(data: DataFolder, retrainings: Retrainings = tuple) -> Starlette:
-    """The application over a data folder, and what the registry knows of it; it writes nothing."""
-    site = Site(data, retrainings)
-    routes = [Route(path, _page_endpoint(site, page)) for path, page in PAGES.items()]
-    routes += [
-        Route(path, _answer_endpoint(site, answer), methods=["POST"]) for path, answer in ANSWERS.items()
-    ]
-    routes.append(Route("/static/{name}", _static))
+def dashboard_app(folder: DataFolder, versions: Versions = tuple) -> Starlette:
+    """The application over a data ``folder`` and the ``versions`` in the registry; it writes nothing."""
+    data = DataReader(folder, versions)
     return Starlette(
-        routes=routes,
+        routes=[
+            *(Route(path, _page_endpoint(data, page)) for path, page in PAGES.items()),
+            *(
+                Route(path, _post_endpoint(data, answer), methods=["POST"])
+                for path, answer in ANSWERS.items()
+            ),
+            Route("/static/{name}", _static),
+        ],
         middleware=[Middleware(Policy), Middleware(GZipMiddleware, minimum_size=2000)],
         exception_handlers={HTTPException: _http_error, Exception: _bug},
     )
 
 
-def rendered(page: Page, status: int = 200, asked: Asked | None = None) -> Response:
-    """A page as HTML."""
+def rendered(page: Page, status: int = 200, params: Parameters | None = None) -> Response:
+    """A ``page`` as HTML with an HTTP ``status``; its charts can be saved if there are ``params``."""
 
     def chart_address(name: str, kind: str) -> str:
-        return asked.also(**{"as": kind, "chart": name}) if asked else ""
+        return params.also(**{"as": kind, "chart": name}) if params else ""
 
     values = {"page": page, "tabs": _tabs(page.run), "chart_address": chart_address, **page.values}
     html = _templates().get_template(page.template).render(values)
@@ -94,120 +97,112 @@ def _templates() -> Environment:
     )
 
 
-def _tabs(run: str) -> list[tuple[str, str]]:
-    """Names and addresses of the pages, those of a run only where there is one."""
+def _tabs(run: str) -> dict[str, str]:
+    """Addresses of the pages by name; those of a run only if one is chosen."""
     base = f"/runs/{run}"
-    of_run = {
-        "Overview": base,
-        "Problems": f"{base}/problems",
-        "Memory": f"{base}/memory",
-        "Try it": f"{base}/try",
-    }
-    wherever = {
+    of_run = {"Overview": "", "Problems": "/problems", "Memory": "/memory", "Try it": "/try"} if run else {}
+    return {name: f"{base}{path}" for name, path in of_run.items()} | {
         "Progress": link("/progress", {"run": run}),
         "Compare": link("/compare", {"run": run, "other": run}),
     }
-    return [(name, place) for name, place in ((of_run if run else {}) | wherever).items()]
 
 
-def _page_endpoint(site: Site, page_of: PageOf) -> Callable[[Request], Response]:
+def _page_endpoint(data: DataReader, page_of: PageOf) -> Callable[[Request], Response]:
     def endpoint(request: Request) -> Response:
         try:
-            asked = _asked(request)
-            wanted = asked.one_of("as", ("page", "svg", "csv"), "page")
-            page = page_of(site, asked)
-            return rendered(page, 200, asked) if wanted == "page" else _file(page, asked, wanted)
+            params = _parameters(request)
+            kind = params.one_of("as", ("page", "svg", "csv"), "page")
+            page = page_of(data, params)
+            return rendered(page, 200, params) if kind == "page" else _file(page, params.text("chart"), kind)
         except (NoticeError, StorageError) as error:
             return _notice(error, request.path_params.get("run", ""))
 
     return endpoint
 
 
-def _file(page: Page, asked: Asked, kind: str) -> Response:
-    """A chart of a page as a file."""
-    name = asked.text("chart")
-    chart = next((each for each in page.charts if each.name == name), None)
+def _file(page: Page, name: str, kind: str) -> Response:
+    """The chart of that name on a page as a file."""
+    chart = next((chart for chart in page.charts if chart.name == name), None)
     if chart is None:
         raise MissingError(f"This page has no chart {name[:60]!r}.")
     content, media = (svg_file(chart), "image/svg+xml") if kind == "svg" else (csv_file(chart), "text/csv")
-    said = "-".join(part for part in (page.run, chart.name) if part)
+    file_name = "-".join(part for part in (page.run, chart.name) if part)
     headers = {
-        "Content-Disposition": f'attachment; filename="{said}.{kind}"',
+        "Content-Disposition": f'attachment; filename="{file_name}.{kind}"',
         "Content-Security-Policy": _FILE_POLICY,
     }
     return Response(content, media_type=f"{media}; charset=utf-8", headers=headers)
 
 
-def _answer_endpoint(
-    site: Site, answer: Callable[[Site, Asked, Any], dict[str, Any]]
-) -> Callable[[Request], Awaitable[Response]]:
+def _post_endpoint(data: DataReader, answer: Answer) -> Callable[[Request], Awaitable[Response]]:
     async def endpoint(request: Request) -> Response:
         try:
-            asked, content = _asked(request), await _content(request)
-            return JSONResponse(await run_in_threadpool(answer, site, asked, content))
-        except NoticeError as error:
-            return JSONResponse({"error": str(error)}, error.status)
-        except StorageError as error:
-            return JSONResponse({"error": str(error)}, NoticeError.status)
+            params, content = _parameters(request), await _content(request)
+            return JSONResponse(await run_in_threadpool(answer, data, params, content))
+        except (NoticeError, StorageError) as error:
+            return JSONResponse({"error": str(error)}, getattr(error, "status", NoticeError.status))
 
     return endpoint
 
 
 async def _content(request: Request) -> Any:
-    """The JSON of a request that the dashboard's own page sent."""
+    """The JSON that the dashboard's own page sent."""
     if request.headers.get("content-type", "").partition(";")[0].strip() != "application/json":
-        raise WrongQuestionError("Send JSON, with the content type application/json.")
+        raise BadRequestError("Send JSON, with the content type application/json.")
     body = bytearray()
     async for part in request.stream():
         body += part
         if len(body) > LARGEST_BODY_BYTES:
-            raise WrongQuestionError(f"A world takes at most {LARGEST_BODY_BYTES >> 20} MB; this is more.")
+            raise BadRequestError(f"A world takes at most {LARGEST_BODY_BYTES >> 20} MB; this is more.")
     try:
         return parse_json(bytes(body), "The world")
     except StorageError as error:
-        raise WrongQuestionError(str(error)) from None
+        raise BadRequestError(str(error)) from None
 
 
-def _asked(request: Request) -> Asked:
-    return Asked(request.url.path, dict(request.query_params), request.path_params.get("run", ""))
+def _parameters(request: Request) -> Parameters:
+    return Parameters(request.url.path, dict(request.query_params), request.path_params.get("run", ""))
 
 
 def _static(request: Request) -> Response:
-    """A file of the application itself; nothing else is in the list."""
+    """A file of the application itself, and no other."""
     name = request.path_params["name"]
     content = _static_files().get(name)
     if content is None:
         raise HTTPException(404)
-    kind = _KINDS[Path(name).suffix]
-    return Response(content, media_type=f"{kind}; charset=utf-8", headers={"Cache-Control": "max-age=60"})
+    media = f"{_KINDS[Path(name).suffix]}; charset=utf-8"
+    return Response(content, media_type=media, headers={"Cache-Control": "max-age=60"})
 
 
 @functools.cache
 def _static_files() -> dict[str, bytes]:
     folder = files("dashboards.web").joinpath("static")
-    return {each.name: each.read_bytes() for each in folder.iterdir() if Path(each.name).suffix in _KINDS}
+    static = {file.name: file.read_bytes() for file in folder.iterdir() if Path(file.name).suffix in _KINDS}
+    return static | {"colours.css": style_sheet().encode()}
 
 
 def _notice(error: Exception, run: str = "") -> Response:
     """A page that says what is the matter."""
     status = getattr(error, "status", NoticeError.status)
     title = getattr(error, "title", "The data cannot be read")
-    known = run if status not in (404,) else ""
-    values = {"message": str(error), "status": status}
-    return rendered(Page("notice.html.jinja", title, run=known, values=values), status)
+    return _message(status, title, str(error), "" if status == 404 else run)
+
+
+def _message(status: int, title: str, message: str, run: str = "") -> Response:
+    values = {"message": message, "status": status}
+    return rendered(Page("notice.html.jinja", title, run=run, values=values), status)
 
 
 def _http_error(request: Request, error: Exception) -> Response:
-    status = error.status_code if isinstance(error, HTTPException) else 500
-    said = {
-        404: ("Not found", "There is no page at this address."),
-        405: ("Not allowed", "This address cannot be asked in this way."),
-    }.get(status, ("This cannot be answered", "The request makes no sense here."))
-    page = Page("notice.html.jinja", said[0], values={"message": said[1], "status": status})
-    return rendered(page, status)
+    match status := error.status_code if isinstance(error, HTTPException) else 500:
+        case 404:
+            return _message(status, "Not found", "There is no page at this address.")
+        case 405:
+            return _message(status, "Not allowed", "This address does not take this kind of request.")
+        case _:
+            return _message(status, "This cannot be answered", "The request makes no sense here.")
 
 
 def _bug(request: Request, error: Exception) -> Response:
-    """A bug: the terminal has the trace, the page says so."""
-    message = "The dashboard has a fault here. What happened is written where it was started."
-    return rendered(Page("notice.html.jinja", "Fault", values={"message": message, "status": 500}), 500)
+    """A bug: the terminal shows the trace, the page says so."""
+    return _message(500, "Fault", "The dashboard has a fault; the terminal that started it shows the trace.")

@@ -1,26 +1,30 @@
-"""Charts as SVG: dots with intervals, stacked bars, lines, places; each with its legend and its numbers."""
+"""Charts as SVG: dots with intervals, stacked bars, lines, maps; each with its legend and its numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from dashboards.web.svg import Scale, element, linked, points, short, span, text, told
+from dashboards.palette import GREY
+from dashboards.statistics.embedding_plane import axis_ends
+from dashboards.web.svg import Scale, element, linked, points, short, span, text, tooltip
 from planners.world.arrays import Floats
 
-WIDTH: Final = 360.0  # pixels of a panel: fits a phone
-_ROW: Final = 21.0  # pixels a category
+FAINT: Final = "var(--line)"  # a colour that hardly shows, on a light screen or a dark one
+WIDTH: Final = 360.0  # pixels of a drawing: fits a phone
+_ROW: Final = 21.0  # pixels a row
 _LETTER: Final = 6.1  # pixels, widest
+_LAYERS: Final = ("dot", "cross", "disc", "star", "ring")  # of a map, from below
 
 
-class Panel(NamedTuple):
-    """One drawing of a chart."""
+class Drawing(NamedTuple):
+    """One of the drawings of a chart."""
 
     title: str
-    width: float
+    width: float  # pixels
     height: float
     body: str  # markup
 
@@ -30,27 +34,24 @@ class Chart(NamedTuple):
 
     name: str  # in addresses and file names
     title: str  # says what it shows
-    note: str  # what it is made of; what counts as planning time
-    panels: Sequence[Panel]
+    note: str  # says what it is made of, and what counts as planning time
+    drawings: Sequence[Drawing]
     table: pd.DataFrame  # the numbers behind it
-    legend: Sequence[tuple[str, str]] = ()  # class of a colour, and what it stands for
-    wide: bool = False  # one panel as wide as the page
+    legend: Sequence[tuple[str, str]] = ()  # colours, and what they stand for
 
 
-class Interval(NamedTuple):
-    """A dot with its 95 % interval."""
+class Dot(NamedTuple):
+    """A row of a chart: a dot with its 95 % interval, if that is finite."""
 
     label: str
-    value: float
-    low: float
-    high: float
+    estimate: tuple[float, float, float]  # the value and the ends of its interval
     colour: str
-    told: str
+    tooltip: str
     address: str | None = None
 
 
 class Line(NamedTuple):
-    """A line through places, with a band where ``low`` and ``high`` are given."""
+    """A line through points, with a band from ``low`` to ``high`` if these are given."""
 
     label: str
     x: Floats
@@ -61,40 +62,44 @@ class Line(NamedTuple):
     dots: bool = False
 
 
-def intervals(
-    title: str,
-    rows: Sequence[Interval],
-    axis: str,
-    ends: tuple[float, float],
-    written: Callable[[float], str] = short,
-) -> Panel:
-    """A row each: a dot, its interval, a line at 0 where the axis has one; arrows where it goes beyond."""
-    left = 14.0 + _LETTER * max((len(row.label) for row in rows), default=0)
-    height = 14.0 + _ROW * len(rows) + 40.0
-    scale = Scale(*ends, left, WIDTH - 16.0)
-    bottom = 8.0 + _ROW * len(rows)
-    drawn = [_x_axis(scale, bottom, axis, written)]
+class Mark(NamedTuple):
+    """A mark on a map."""
+
+    place: list[float]  # x, y
+    kind: str  # one of _LAYERS
+    colour: str
+    tooltip: str
+    address: str | None = None
+
+
+def dots(title: str, rows: Sequence[Dot], axis: str, ends: tuple[float, float]) -> Drawing:
+    """Dots with their intervals, one a row, and a line at 0; an arrow stands for a dot beyond the axis.
+
+    ``title``: of the drawing. ``axis``: name of the axis, which goes from one of the ``ends`` to the other.
+    """
+    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends)
     if ends[0] < 0.0 < ends[1]:
-        drawn.append(element("line", x1=scale.at(0.0), x2=scale.at(0.0), y1=4.0, y2=bottom, class_="zero"))
+        marks.append(element("line", x1=scale.at(0.0), x2=scale.at(0.0), y1=4.0, y2=bottom, class_="zero"))
     for i, row in enumerate(rows):
         y = 8.0 + _ROW * (i + 0.5)
+        value, low, high = row.estimate
         parts = [
             element("rect", x=0.0, y=y - _ROW / 2, width=WIDTH, height=_ROW, class_="row"),
-            text(row.label, left - 8.0, y + 4.0, class_="label", text_anchor="end"),
+            text(row.label, scale.first - 8.0, y + 4.0, class_="label", text_anchor="end"),
         ]
-        if np.isfinite([row.low, row.high]).all():
-            parts.append(
-                element("line", x1=scale.at(row.low), x2=scale.at(row.high), y1=y, y2=y,
-                        class_=f"interval s{row.colour}")
-            )  # fmt: skip
-        if np.isfinite(row.value):
-            x = scale.at(row.value)
-            if ends[0] <= row.value <= ends[1]:
-                parts.append(element("circle", cx=x, cy=y, r=4.5, class_=f"f{row.colour}"))
-            else:
-                parts.append(element("path", d=_arrow(x, y, row.value > ends[1]), class_=f"f{row.colour}"))
-        drawn.append(linked(row.address, told(row.told), *parts, label=row.told if row.address else None))
-    return Panel(title, WIDTH, height, "".join(drawn))
+        if np.isfinite([low, high]).all():
+            bar = {"x1": scale.at(low), "x2": scale.at(high), "y1": y, "y2": y}
+            parts.append(element("line", **bar, class_="interval", stroke=row.colour))
+        if np.isfinite(value):
+            x, beyond = scale.at(value), not ends[0] <= value <= ends[1]
+            length = 7 if value > ends[1] else -7
+            arrow = f"M{x - length / 2:.1f} {y - 5:.1f}l{length} 5l{-length} 5z"
+            shape: dict[str, object] = {"d": arrow} if beyond else {"cx": x, "cy": y, "r": 4.5}
+            parts.append(element("path" if beyond else "circle", **shape, fill=row.colour))
+        marks.append(
+            linked(row.address, tooltip(row.tooltip), *parts, label=row.tooltip if row.address else None)
+        )
+    return Drawing(title, WIDTH, bottom + 46.0, "".join(marks))
 
 
 def stacks(
@@ -102,27 +107,27 @@ def stacks(
     rows: Mapping[str, Sequence[tuple[str, float]]],
     colours: Mapping[str, str],
     axis: str,
-    end: float,
     unit: str,
-) -> Panel:
-    """A bar a row, its parts one after another."""
-    left = 14.0 + _LETTER * max((len(label) for label in rows), default=0)
-    scale = Scale(0.0, end, left, WIDTH - 16.0)
-    bottom = 8.0 + _ROW * len(rows)
-    drawn = [_x_axis(scale, bottom, axis, short)]
+) -> Drawing:
+    """Bars made of parts, one a row.
+
+    ``title``: of the drawing. ``rows``: names and sizes of the parts by label. ``colours``: by name of the
+    part.
+    ``axis``: its name. ``unit``: of the sizes, in tooltips.
+    """
+    end = 1.05 * max((sum(size for _, size in parts) for parts in rows.values()), default=1.0)
+    scale, bottom, marks = _rows_with_axis(list(rows), axis, (0.0, end))
     for i, (label, parts) in enumerate(rows.items()):
-        y = 8.0 + _ROW * i + 3.5
-        drawn.append(text(label, left - 8.0, y + 11.0, class_="label", text_anchor="end"))
-        at = 0.0
-        for name, value in parts:
-            first, last = scale.at(at), scale.at(at + value)
-            at += value
-            said = told(f"{label}: {name} {value:.3g} {unit}")
-            drawn.append(
-                element("rect", said, x=first, y=y, width=max(last - first, 0.0), height=_ROW - 7.0,
-                        class_=f"f{colours[name]}")
-            )  # fmt: skip
-    return Panel(title, WIDTH, 14.0 + _ROW * len(rows) + 40.0, "".join(drawn))
+        y = 11.5 + _ROW * i
+        marks.append(text(label, scale.first - 8.0, y + 11.0, class_="label", text_anchor="end"))
+        before = 0.0
+        for name, size in parts:
+            first, last = scale.at(before), scale.at(before + size)
+            words = tooltip(f"{label}: {name} {size:.3g} {unit}")
+            place = {"x": first, "y": y, "width": last - first, "height": _ROW - 7.0}
+            marks.append(element("rect", words, **place, fill=colours[name]))
+            before += size
+    return Drawing(title, WIDTH, bottom + 46.0, "".join(marks))
 
 
 def lines(
@@ -132,134 +137,120 @@ def lines(
     y_axis: str,
     *,
     height: float = 220.0,
-    width: float = WIDTH,
     x_ends: tuple[float, float] | None = None,
     y_ends: tuple[float, float] | None = None,
-    log_x: bool = False,
-    name: str | None = None,
-    x_written: Callable[[float], str] = short,
     x_ticks: Sequence[float] | None = None,
-) -> Panel:
-    """Lines over a common axis; ``name`` marks the panel for the page's script."""
-    every_x = np.concatenate([line.x for line in drawn]) if drawn else np.zeros(1)
+    has_cursor: bool = False,
+) -> Drawing:
+    """Lines over a common axis.
+
+    ``title``: of the drawing. ``drawn``: the lines. ``x_axis``, ``y_axis``: names of the axes. ``height``:
+    pixels.
+    ``x_ends``, ``y_ends``, ``x_ticks``: of the axes; else they follow from the lines. ``has_cursor``: whether
+    there is a vertical line that the page's script moves.
+    """
     bands = [band for line in drawn for band in (line.y, line.low, line.high) if band is not None]
-    every_y = np.concatenate(bands) if bands else np.zeros(1)
-    x_low, x_high = x_ends or span(every_x.tolist(), margin=0.0)
-    y_low, y_high = y_ends or span(every_y.tolist())
-    left, right, top, bottom = 50.0, width - 14.0, 22.0, height - 36.0
-    across = Scale(x_low, x_high, left, right, log_x)
-    up = Scale(y_low, y_high, bottom, top)
-    marks = [_x_axis(across, bottom, x_axis, x_written, x_ticks), _y_axis(up, left, right, y_axis)]
+    x_low, x_high = x_ends or span(np.concatenate([line.x for line in drawn]).tolist(), margin=0.0)
+    y_low, y_high = y_ends or span(np.concatenate(bands).tolist())
+    left, right, top, bottom = 50.0, WIDTH - 14.0, 22.0, height - 36.0
+    across, up = Scale(x_low, x_high, left, right), Scale(y_low, y_high, bottom, top)
+    marks = [_x_axis(across, bottom, x_axis, x_ticks), *_y_axis(up, left, right)]
+    marks.append(text(y_axis, 2.0, 12.0, class_="name"))
     for line in drawn:
         sound = np.isfinite(line.y)
-        x, y = across.places(line.x[sound]), up.places(line.y[sound])
+        x, y = across.pixels(line.x[sound]), up.pixels(line.y[sound])
         if line.low is not None and line.high is not None:
-            low, high = up.places(line.low[sound]), up.places(line.high[sound])
+            low, high = up.pixels(line.low[sound]), up.pixels(line.high[sound])
             band = np.concatenate([np.column_stack([x, high]), np.column_stack([x, low])[::-1]])
-            marks.append(element("polygon", points=points(band), class_=f"f{line.colour} band"))
-        marks.append(
-            element("polyline", told(line.label), points=points(np.column_stack([x, y])),
-                    class_=f"line s{line.colour}")
-        )  # fmt: skip
+            marks.append(element("polygon", points=points(band), class_="band", fill=line.colour))
+        way = points(np.column_stack([x, y]))
+        marks.append(element("polyline", tooltip(line.label), points=way, class_="line", stroke=line.colour))
         if line.dots:
+            values = zip(line.x[sound].tolist(), line.y[sound].tolist(), strict=True)
+            words = [tooltip(f"{line.label}: {short(value)} at {short(place)}") for place, value in values]
             marks += [
-                element("circle", told(f"{line.label}: {short(value)} at {x_written(at)}"), cx=cx, cy=cy,
-                        r=3.5, class_=f"f{line.colour}")
-                for cx, cy, at, value in zip(
-                    x.tolist(), y.tolist(), line.x[sound].tolist(), line.y[sound].tolist(), strict=True
-                )
-            ]  # fmt: skip
-    if name is not None:
-        marks.append(
-            element("line", x1=left, x2=left, y1=top, y2=bottom, class_="cursor", data_first=left,
-                    data_last=right, data_low=x_low, data_high=x_high)
-        )  # fmt: skip
-    return Panel(title, width, height, "".join(marks))
+                element("circle", said, cx=cx, cy=cy, r=3.5, fill=line.colour)
+                for said, cx, cy in zip(words, x.tolist(), y.tolist(), strict=True)
+            ]
+    if has_cursor:
+        ends = {"data_first": left, "data_last": right, "data_low": x_low, "data_high": x_high}
+        marks.append(element("line", x1=left, x2=left, y1=top, y2=bottom, class_="cursor", **ends))
+    return Drawing(title, WIDTH, height, "".join(marks))
 
 
-class Place(NamedTuple):
-    """A mark on a map of places."""
+def map_of(marks: Sequence[Mark], x_axis: str, y_axis: str, size: float = 560.0) -> Drawing:
+    """A square map of ``marks``, ``size`` pixels wide; one mark in a hundred may lie beyond an axis.
 
-    x: float
-    y: float
-    kind: str  # dot, cross, disc, star
-    colour: str
-    told: str = ""
-    address: str | None = None
-
-
-def places(title: str, found: Sequence[Place], x_axis: str, y_axis: str, size: float = 560.0) -> Panel:
-    """Marks on a square, its ends so that one in two hundred may lie beyond."""
-    everything = np.array([(each.x, each.y) for each in found] or [(0.0, 0.0)])
-    low, high = np.percentile(everything, [0.5, 99.5], axis=0)
-    room = 0.08 * np.maximum(high - low, 1e-9)
-    (x_low, y_low), (x_high, y_high) = (low - room).tolist(), (high + room).tolist()
+    ``x_axis``, ``y_axis``: names of the axes.
+    """
+    places = np.array([mark.place for mark in marks])
     left, right, top, bottom = 46.0, size - 10.0, 10.0, size - 36.0
-    across, up = Scale(x_low, x_high, left, right), Scale(y_low, y_high, bottom, top)
-    marks = [_x_axis(across, bottom, x_axis, short), _y_axis(up, left, right, y_axis, beside=True)]
-    order = {"dot": 0, "cross": 1, "disc": 2, "star": 3, "here": 4}
-    for each in sorted(found, key=lambda place: order[place.kind]):
-        x, y = across.at(each.x), up.at(each.y)
-        marks.append(linked(each.address, _mark(each, x, y), label=each.told if each.address else None))
-    return Panel(title, size, size, "".join(marks))
+    across, up = (
+        Scale(*axis_ends(places[:, 0]), left, right),
+        Scale(*axis_ends(places[:, 1]), bottom, top),
+    )
+    turn = f"translate(12 {0.5 * (top + bottom):.0f}) rotate(-90)"
+    drawn = [
+        _x_axis(across, bottom, x_axis),
+        *_y_axis(up, left, right),
+        text(y_axis, 0.0, 0.0, class_="name", text_anchor="middle", transform=turn),
+    ]
+    for mark in sorted(marks, key=lambda mark: _LAYERS.index(mark.kind)):
+        drawn.append(
+            linked(
+                mark.address,
+                _drawn(mark, across.at(mark.place[0]), up.at(mark.place[1])),
+                label=mark.tooltip if mark.address else None,
+            )
+        )
+    return Drawing("", size, size, "".join(drawn))
 
 
-def _mark(place: Place, x: float, y: float) -> str:
-    said = told(place.told) if place.told else ""
-    match place.kind:
+def _drawn(mark: Mark, x: float, y: float) -> str:
+    words = tooltip(mark.tooltip)
+    match mark.kind:
         case "dot":
-            return element("circle", said, cx=x, cy=y, r=2.2, class_=f"f{place.colour}")
+            return element("circle", words, cx=x, cy=y, r=2.2, fill=mark.colour)
         case "cross":
-            return element("path", said, d=f"M{x - 2:.1f} {y - 2:.1f}l4 4m0 -4l-4 4", class_="line s6 thin")
+            cross = f"M{x - 2:.1f} {y - 2:.1f}l4 4m0 -4l-4 4"
+            return element("path", words, d=cross, class_="line thin", stroke=GREY)
         case "disc":
-            return element("circle", said, cx=x, cy=y, r=6.0, class_=f"f{place.colour} rim")
-        case "here":
-            return element("circle", said, cx=x, cy=y, r=9.0, class_="here")
+            return element("circle", words, cx=x, cy=y, r=6.0, class_="rim", fill=mark.colour)
+        case "ring":
+            return element("circle", words, cx=x, cy=y, r=9.0, class_="ring")
         case _:
             turns = np.arange(10) * np.pi / 5 - np.pi / 2
             radii = np.where(np.arange(10) % 2, 4.0, 10.0)
             corners = np.column_stack([x + radii * np.cos(turns), y + radii * np.sin(turns)])
-            return element("polygon", said, points=points(corners), class_="star")
+            return element("polygon", words, points=points(corners), class_="star")
 
 
-def _x_axis(
-    scale: Scale,
-    y: float,
-    title: str,
-    written: Callable[[float], str],
-    ticks: Sequence[float] | None = None,
-) -> str:
-    room = abs(scale.last - scale.first)
-    chosen = list(ticks) if ticks is not None else scale.ticks(max(2, int(room / 62.0)))
+def _rows_with_axis(
+    labels: Sequence[str], axis: str, ends: tuple[float, float]
+) -> tuple[Scale, float, list[str]]:
+    """The scale beside the labels of some rows, where it lies, and its marks."""
+    left = 14.0 + _LETTER * max((len(label) for label in labels), default=0)
+    scale, bottom = Scale(*ends, left, WIDTH - 16.0), 8.0 + _ROW * len(labels)
+    return scale, bottom, [_x_axis(scale, bottom, axis)]
+
+
+def _x_axis(scale: Scale, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
+    room = scale.last - scale.first
     marks = [element("line", x1=scale.first, x2=scale.last, y1=y, y2=y, class_="axis")]
-    for value in chosen:
+    for value in scale.ticks(max(2, int(room / 62.0))) if ticks is None else ticks:
         x = scale.at(value)
         marks.append(element("line", x1=x, x2=x, y1=y, y2=y + 4.0, class_="axis"))
-        marks.append(text(written(value), x, y + 16.0, class_="tick", text_anchor="middle"))
-    middle = 0.5 * (scale.first + scale.last)
-    half = 0.5 * 5.6 * len(title)
+        marks.append(text(short(value), x, y + 16.0, class_="tick", text_anchor="middle"))
+    middle, half = 0.5 * (scale.first + scale.last), 0.5 * 5.6 * len(title)
     middle = min(max(middle, half), WIDTH - half) if scale.last <= WIDTH and half < WIDTH / 2 else middle
     marks.append(text(title, middle, y + 32.0, class_="name", text_anchor="middle"))
     return "".join(marks)
 
 
-def _y_axis(scale: Scale, x: float, right: float, title: str, beside: bool = False) -> str:
+def _y_axis(scale: Scale, left: float, right: float) -> list[str]:
     marks = []
     for value in scale.ticks(4):
         y = scale.at(value)
-        marks.append(element("line", x1=x, x2=right, y1=y, y2=y, class_="grid"))
-        marks.append(text(short(value), x - 6.0, y + 4.0, class_="tick", text_anchor="end"))
-    middle = 0.5 * (scale.first + scale.last)
-    if beside:
-        marks.append(
-            text(title, 0.0, 0.0, class_="name", text_anchor="middle",
-                 transform=f"translate(12 {middle:.0f}) rotate(-90)")
-        )  # fmt: skip
-    else:
-        marks.append(text(title, 2.0, 12.0, class_="name"))
-    return "".join(marks)
-
-
-def _arrow(x: float, y: float, right: bool) -> str:
-    way = 7 if right else -7
-    return f"M{x - way / 2:.1f} {y - 5:.1f}l{way} 5l{-way} 5z"
+        marks.append(element("line", x1=left, x2=right, y1=y, y2=y, class_="grid"))
+        marks.append(text(short(value), left - 6.0, y + 4.0, class_="tick", text_anchor="end"))
+    return marks

@@ -1,4 +1,4 @@
-"""A page: what a template says with which values, and the charts on it."""
+"""A page: a template, its values, and the charts on it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from dashboards.web.charts import Chart
 
 if TYPE_CHECKING:
-    from dashboards.web.query import Asked
-    from dashboards.web.site import Site
+    from dashboards.web.data_reader import DataReader
+    from dashboards.web.parameters import Parameters
 
 
 @dataclass(frozen=True)
 class Page:
-    """What answers an address."""
+    """What answers a request."""
 
     template: str
     title: str
@@ -25,4 +25,15 @@ class Page:
     charts: Sequence[Chart] = ()
 
 
-PageOf = Callable[["Site", "Asked"], Page]
+PageOf = Callable[["DataReader", "Parameters"], Page]  # from the data and what the address asks for
+
+
+def menu(name: str, title: str, options: Mapping[str, str] | Sequence[str], value: str) -> dict[str, Any]:
+    """A menu of a form, for the template's macro of that name.
+
+    ``name``: of the parameter. ``title``: of the menu. ``options``: values, with their titles if these
+    differ.
+    ``value``: the one that is chosen.
+    """
+    titles = options if isinstance(options, Mapping) else {option: option for option in options}
+    return {"name": name, "title": title, "options": list(titles.items()), "value": value}

@@ -1,4 +1,4 @@
-"""An attempt made again: the same seed gives the same plan, and now it is at hand to be looked at."""
+"""An attempt made again, to be looked at: the same seed gives the same plan."""
 
 from __future__ import annotations
 
@@ -16,35 +16,43 @@ from planners.world.workspace import Workspace
 from storage.tables.configurations import Configuration
 
 
-class Again(NamedTuple):
+class Replay(NamedTuple):
     """An attempt, what it recalled, and what its search grew, in the canonical frame."""
 
     attempt: Attempt
     recalled: Sequence[tuple[Recollection, Plan]]  # best first, turned to the problem's start
-    tree: Trace | None  # None where nothing was searched
+    tree: Trace | None  # None if nothing was searched
     roadmap: Roads | None
 
 
-def again(
+def replay(
     problem: Problem,
     planner: str,
-    how: Configuration,
+    configuration: Configuration,
     memory: Memory | None,
     seed: int,
     vehicle: Vehicle,
     limits: Limits,
-) -> Again:
-    """Solve a canonical problem again; ValueError where memory and problem do not fit each other."""
-    known = None if how.assist in WITHOUT_MEMORY else memory
+) -> Replay:
+    """Solve a canonical ``problem`` again, with what a row says of the attempt.
+
+    ``memory``: ignored by a configuration that uses none. ``seed``, ``limits``: of the search.
+
+    Raises ValueError if memory and problem do not fit each other.
+    """
+    used = None if configuration.assist in WITHOUT_MEMORY else memory
+    assist, recall, top_k = configuration
     workspace = Workspace()
     attempt = solve(
-        *(problem, planner, how.assist, max(how.top_k, 1), known, seed, limits, vehicle),
-        strategy=how.recall or None,
-        workspace=workspace,
+        problem, planner, assist, max(top_k, 1), used, seed, limits, vehicle, recall or None, workspace
     )
     searched = attempt.source == "searched" or not attempt.solved
     tree = last_tree(workspace, limits, vehicle) if searched else None
-    roads = last_roadmap(workspace, planner) if searched and attempt.roadmap_seconds > 0.0 else None
-    looked_at = recollections(problem, attempt, known, vehicle, workspace) if known is not None else []
-    plans = [turned(known.plans[each.plan], problem.start[2]) for each in looked_at] if known else []
-    return Again(attempt, list(zip(looked_at, plans, strict=True)), tree, roads)
+    roadmap = last_roadmap(workspace, planner) if searched and attempt.roadmap_seconds > 0.0 else None
+    if used is None:
+        return Replay(attempt, [], tree, roadmap)
+    recalled = [
+        (recollection, turned(used.plans[recollection.plan], problem.start[2]))
+        for recollection in recollections(problem, attempt, used, vehicle, workspace)
+    ]
+    return Replay(attempt, recalled, tree, roadmap)

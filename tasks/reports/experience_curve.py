@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pandas as pd
 
-from dashboards.figures.experience_curve import experience_chart, experience_rows, experience_table
+from dashboards.figures.recall_curves import experience_chart
 from dashboards.figures.style import save
+from dashboards.report.tables import experience_table
+from dashboards.statistics.experience_recall import experience_rows
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.stage import run_folder
 from tasks.reports.report import console

@@ -11,10 +11,9 @@ import pandas as pd
 from rich.console import Console
 
 from dashboards.figures.bars import ablation, controls, planning_times, time_split
-from dashboards.figures.curves import continual_improvement, performance_profile, solved_against_time
+from dashboards.figures.planning_curves import continual_improvement, performance_profile, solved_against_time
+from dashboards.figures.recall_curves import retrieval_curves
 from dashboards.figures.style import save
-from dashboards.figures.training_figures import retrieval_curves
-from dashboards.report.sweep_table import sweep_table
 from dashboards.report.tables import (
     as_csv,
     claims_markdown,
@@ -23,6 +22,7 @@ from dashboards.report.tables import (
     stages_table,
     summary_markdown,
     summary_table,
+    sweep_table,
 )
 from dashboards.statistics.distributions import performance_profile as profile_curve
 from dashboards.statistics.distributions import solved_against_time as solved_curve

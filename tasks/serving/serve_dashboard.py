@@ -13,8 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dashboards.web.memory_versions import MemoryVersion, Versions
 from dashboards.web.notices import NoticeError
-from dashboards.web.retrained import Retrained, Retrainings
 from storage.places.data_folder import MARK, DataFolder, open_data_folder
 from tasks.registry.champion_registry import Registry, Version
 from tasks.servers.access import auth, hosts
@@ -63,9 +63,9 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     address = f"http://{LOOPBACK}:{listener.getsockname()[1]}/"
     for name, value in IMPATIENT.items():
         os.environ.setdefault(name, value)
-    retrainings = partial(_retrainings, Registry(folder))
-    threading.Thread(target=_read_ahead, args=(retrainings,), name="registry", daemon=True).start()
-    config = config_of(partial(guarded_dashboard, folder, retrainings))
+    versions = partial(_versions, Registry(folder))
+    threading.Thread(target=_read_ahead, args=(versions,), name="registry", daemon=True).start()
+    config = config_of(partial(guarded_dashboard, folder, versions))
     print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
     if open_browser and sys.stdout.isatty():
         import webbrowser
@@ -74,34 +74,34 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     uvicorn.Server(config).run(sockets=[listener])
 
 
-def guarded_dashboard(data: DataFolder, retrainings: Retrainings) -> Guard:
-    """The dashboard of a data folder behind the guard; ``retrainings`` reads the registry."""
+def guarded_dashboard(data: DataFolder, versions: Versions) -> Guard:
+    """The dashboard of a data folder behind the guard; ``versions`` reads the registry."""
     from dashboards.web.app import dashboard_app  # late, like Uvicorn
     from tasks.servers.guard import Guard
 
-    return Guard(dashboard_app(data, retrainings), auth(), hosts())
+    return Guard(dashboard_app(data, versions), auth(), hosts())
 
 
-def _retrainings(registry: Registry) -> Sequence[Retrained]:
+def _versions(registry: Registry) -> Sequence[MemoryVersion]:
     """Each version of each memory, oldest first. Raises NoticeError if the registry does not answer."""
     try:
         versions = []
         for name in registry.names():
             champion = registry.aliased(name)
-            versions += [_retrained(version, champion) for version in registry.versions(name)]
+            versions += [_memory_version(version, champion) for version in registry.versions(name)]
         return versions
     except RunError as error:
         raise NoticeError(str(error)) from None
 
 
-def _retrained(version: Version, champion: Version | None) -> Retrained:
+def _memory_version(version: Version, champion: Version | None) -> MemoryVersion:
     def figure(name: str) -> float:
         try:
             return float(version.tag(name))
         except ValueError:
             return math.nan
 
-    return Retrained(
+    return MemoryVersion(
         memory=version.name,
         number=version.number,
         retraining=version.retraining,
@@ -116,10 +116,10 @@ def _retrained(version: Version, champion: Version | None) -> Retrained:
     )
 
 
-def _read_ahead(retrainings: Retrainings) -> None:
+def _read_ahead(versions: Versions) -> None:
     """Import MLflow, which takes seconds, before a page needs it."""
     with suppress(NoticeError):
-        retrainings()
+        versions()
 
 
 def _existing_folder(data: Path) -> DataFolder:

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from dashboards.figures.embeddings import embedding_map
+from dashboards.figures.recall_curves import training_curves
 from dashboards.figures.style import save
-from dashboards.figures.training_figures import training_curves
 from planners.memory.build_memory import build_memory
 from planners.memory.recall import Memory
 from planners.world.geometry.occupancy import GRID

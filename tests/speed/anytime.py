@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from dashboards.figures.training_figures import anytime_curves
+from dashboards.figures.planning_curves import anytime_curves
 from planners.memory.recall import default_recall, recall
 from planners.search.anytime import Improved, improve
 from planners.search.registry import PLANNERS

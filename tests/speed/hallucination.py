@@ -25,7 +25,8 @@ from rich.console import Console
 from rich.table import Table
 
 from dashboards.figures.pictures import draw_plan, draw_problem
-from dashboards.figures.style import INK, PURPLE, new_figure
+from dashboards.figures.style import new_figure
+from dashboards.palette import INK, PURPLE
 from planners.memory.hallucination.mixture import METHODS, hallucinate, method_named
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.plans.experience import Experience

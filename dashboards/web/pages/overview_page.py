@@ -1,291 +1,243 @@
-"""Overview: how much faster, where; solved shares; where the time goes; what was run when and where."""
+"""Overview: how much faster, where; shares solved; where the time goes; what was run when and where."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from math import nan
 from typing import Any, Final
 
 import pandas as pd
 
-from dashboards.cells import decimals_of, percent, reduction, share
-from dashboards.figures.style import planner_title
-from dashboards.statistics.distributions import PARTS, REST, time_split
-from dashboards.statistics.panels import COMBINED, summarise
-from dashboards.web.charts import Chart, Interval, Panel, intervals, stacks
+from dashboards.cells import PLANNING_TIME, decimals_of, panel_title, percent, planner_title, with_interval
+from dashboards.palette import TIME_COLOURS, colour_of
+from dashboards.report.tables import reduction_cell
+from dashboards.statistics.distributions import TIME_PARTS, time_split
+from dashboards.statistics.panels import COMBINED
+from dashboards.web.charts import Chart, Dot, Drawing, dots, stacks
+from dashboards.web.data_reader import DataReader, stamp_of
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
-from dashboards.web.query import Asked, link
-from dashboards.web.site import Site, stamp_of
-from dashboards.web.svg import short
+from dashboards.web.parameters import Parameters, link
 from storage.places.data_folder import RunFolder
 from storage.tables.attempts import readable_attempts
-from storage.tables.configurations import BASELINE
+from storage.tables.configurations import BASELINE, Configuration, configurations_in
 
-PLANNING_TIME: Final = (
-    "Planning time is everything between receiving the obstacles and returning a plan: drawing the grid, "
-    "encoder, recall, checks, guide, repair, roadmap, search; failures count with the time they took."
-)
 VIEWS: Final = {"reduction": "How much faster", "solved": "Solved", "time": "Where the time goes"}
-COLOURS: Final = {"closed": "0", "open": "3", "repair": "2", "fresh": "6", "none": "6"}
-RESAMPLES: Final = 200  # where a run has no report of its own: the ends then stand on 5 resamples each
-_FURTHEST: Final = (-1.0, 1.0)  # of an axis of reductions
 _SPLIT: Final = (
     "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "memory", "planning_seconds",
-    *(column for part in PARTS for column in part.columns),
+    *(column for part in TIME_PARTS for column in part.columns),
 )  # fmt: skip
 
+Row = Mapping[Any, Any]  # of a summary
 
-def overview(site: Site, asked: Asked) -> Page:
+
+def overview(data: DataReader, params: Parameters) -> Page:
     """A run at a glance; without attempts, what there is of it."""
-    run = site.run(asked.run)
-    settings, name = site.settings(run), run.path.name
-    view = asked.one_of("view", tuple(VIEWS), "reduction")
+    run = data.run(params.run)
+    name = run.path.name
+    view = params.one_of("view", tuple(VIEWS), "reduction")
     values: dict[str, Any] = {
-        "settings": settings,
-        "stages": _stages(site.stages(run)),
-        "places": list(_places(site, run)),
-        "views": [(key, title, asked.also(view=key)) for key, title in VIEWS.items()],
+        "settings": data.settings(run),
+        "stages": _stages(data.stages(run)),
+        "places": list(_places(data, run)),
+        "views": [(key, title, params.also(view=key)) for key, title in VIEWS.items()],
         "view": view,
         "notice": "",
         "faults": (),
         "tables": [],
     }
+    charts = []
     try:
-        summary, told = summary_of(site, run)
+        summary, origin = data.summary(run)
     except NoticeError as error:
-        return Page("overview.html.jinja", name, "Overview", name, values | {"notice": str(error)})
-    if view == "time":
-        charts = [time_chart(site, run)]
-        values["faults"] = site.attempts(run).faults
+        values["notice"] = str(error)
     else:
-        charts = [
-            reduction_chart(summary, name, told) if view == "reduction" else solved_chart(summary, name)
-        ]
-    site.read_ahead(run)
-    values["tables"] = _tables(summary, name)
-    values["told"] = told
-    values["best"] = _best(summary)
+        match view:
+            case "time":
+                charts = [_time_chart(data, run)]
+                values["faults"] = data.attempts(run).faults
+            case "solved":
+                charts = [_solved_chart(summary, name)]
+            case _:
+                charts = [_reduction_chart(summary, name, origin)]
+        data.read_ahead(run)
+        values |= {"tables": _tables(summary, name), "origin": origin, "best": _best(summary)}
     return Page("overview.html.jinja", name, "Overview", name, values, charts)
 
 
-def summary_of(site: Site, run: RunFolder) -> tuple[pd.DataFrame, str]:
-    """The table of the run's report, or one made here with wider intervals; and where it is from."""
-    found = site.summary(run)
-    if found is not None:
-        return found, "Numbers of the run's report."
-    rows = site.attempts(run).rows
-    made = site.kept(
-        ("summarise", stamp_of(run.results)),
-        lambda: summarise(rows.astype({"recall": object, "assist": object}), resamples=RESAMPLES),
-    )
-    return made, f"The run has no report yet: made here from its rows, with {RESAMPLES} resamples only."
+def reduction_ends(lows: pd.Series[float]) -> tuple[float, float]:
+    """Ends of an axis in per cent for reductions whose intervals begin at ``lows``, which are fractions."""
+    lowest = 100.0 * float(lows.min())
+    return max(-100.0, min(-10.0, lowest if lowest == lowest else -10.0)), 100.0
 
 
-def panels_of(summary: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Panel, planner and rows, in reading order; planners after one another in each panel."""
+def reduction_of(row: Row) -> tuple[float, float, float]:
+    """The reduction in a ``row`` and the ends of its interval, per cent."""
+    return 100.0 * row["reduction"], 100.0 * row["reduction_low"], 100.0 * row["reduction_high"]
+
+
+def _problems_address(run: str, row: Row, **more: str) -> str:
+    """The attempts behind a row of a summary."""
+    filters = {"memory": COMBINED} if row["panel"] == COMBINED else {"class": row["panel"]}
+    filters |= {"planner": row["planner"], "configuration": row["configuration"], **more}
+    return link(f"/runs/{run}/problems", filters)
+
+
+def _dots(
+    summary: pd.DataFrame,
+    run: str,
+    estimate: Callable[[Row], tuple[float, float, float]],
+    words: Callable[[Row], str],
+    **more: str,
+) -> Iterator[tuple[str, list[Dot]]]:
+    """Of each panel and planner a title, and a dot for each row with its ``estimate`` and ``words`` on it."""
     for (panel, planner), rows in summary.groupby(["panel", "planner"], sort=False):
-        yield str(panel), str(planner), rows
-
-
-def problems_address(run: str, panel: str, planner: str, configuration: str, **more: str) -> str:
-    """The attempts behind a dot or a row."""
-    place = {"memory": COMBINED} if panel == COMBINED else {"class": panel}
-    return link(
-        f"/runs/{run}/problems", {**place, "planner": planner, "configuration": configuration, **more}
-    )
-
-
-def panel_title(panel: str, planner: str) -> str:
-    """Planner and class."""
-    return f"{planner_title(planner)}, {'combined memory' if panel == COMBINED else panel}"
-
-
-def reduction_chart(summary: pd.DataFrame, run: str, told: str) -> Chart:
-    """Less planning time with each configuration, a panel a planner and class."""
-    rows = summary[summary["configuration"] != BASELINE.label]
-    lowest = rows.get("reduction_low", rows["reduction"]).min()
-    ends = (max(_FURTHEST[0], min(-0.1, float(lowest) if lowest == lowest else -0.1)), _FURTHEST[1])
-    drawn: list[Panel] = []
-    for panel, planner, of_panel in panels_of(rows):
-        found = [
-            Interval(
-                row["configuration"],
-                row["reduction"],
-                row.get("reduction_low", float("nan")),
-                row.get("reduction_high", float("nan")),
-                COLOURS.get(row["assist"], "5"),
-                f"{panel_title(panel, planner)}, {row['configuration']}: {_reduction(row)} % less time, "
-                f"{row['mean_ms']:.3g} ms",
-                problems_address(run, panel, planner, row["configuration"]),
-            )
-            for row in of_panel.to_dict("records")
-        ]
-        axis = "less mean planning time, %"
-        drawn.append(intervals(panel_title(panel, planner), found, axis, ends, in_percent))
-    legend = [
-        (COLOURS.get(name, "5"), "random plans" if name.startswith("random") else name)
-        for name in dict.fromkeys(
-            "random" if str(each).startswith("random") else str(each) for each in rows["assist"]
+        title = panel_title(str(panel), str(planner))
+        yield (
+            title,
+            [
+                Dot(
+                    row["configuration"],
+                    estimate(row),
+                    colour_of(Configuration(row["assist"], row["recall"], row["top_k"])),
+                    f"{title}, {row['configuration']}: {words(row)}",
+                    _problems_address(run, row, **more),
+                )
+                for row in rows.to_dict("records")
+            ],
         )
-    ]
+
+
+def _reduction_chart(summary: pd.DataFrame, run: str, origin: str) -> Chart:
+    """Less planning time with each configuration, a drawing a planner and class."""
+    rows = summary[summary["configuration"] != BASELINE.label]
+    ends = reduction_ends(rows["reduction_low"])
+    panels = _dots(
+        rows, run, reduction_of, lambda row: f"{reduction_cell(row)} % less time, {row['mean_ms']:.3g} ms"
+    )
+    legend = {
+        colour_of(each): "random plans" if each.recall == "random" else f"{each.assist} {each.top_k or ''}"
+        for each in configurations_in(rows)
+    }
     return Chart(
         "reduction",
         "How much less time planning takes with memory",
         "Reduction of the mean planning time against the same planner without memory, paired by problem, "
-        "with "
-        f"bootstrap 95 % intervals; right of the line at 0 is faster. {PLANNING_TIME} {told}",
-        drawn,
+        f"with 95 % bootstrap intervals; right of the line at 0 is faster. {PLANNING_TIME} {origin}",
+        [dots(title, of_panel, "less mean planning time, %", ends) for title, of_panel in panels],
         rows,
-        legend,
+        list(legend.items()),
     )
 
 
-def solved_chart(summary: pd.DataFrame, run: str) -> Chart:
+def _solved_chart(summary: pd.DataFrame, run: str) -> Chart:
     """Share of problems solved."""
-    low = min(0.9, float(summary["solved"].min()) - 0.02)
-    drawn = []
-    for panel, planner, of_panel in panels_of(summary):
-        found = [
-            Interval(
-                row["configuration"],
-                row["solved"],
-                float("nan"),
-                float("nan"),
-                COLOURS.get(row["assist"], "5"),
-                f"{panel_title(panel, planner)}, {row['configuration']}: {percent(row['solved'])} % of "
-                f"{row['problems']} problems solved",
-                problems_address(run, panel, planner, row["configuration"], show="failed"),
-            )
-            for row in of_panel.to_dict("records")
-        ]
-        ends = (max(0.0, low), 1.0)
-        drawn.append(intervals(panel_title(panel, planner), found, "problems solved, %", ends, in_percent))
+    lowest = max(0.0, min(90.0, 100.0 * float(summary["solved"].min()) - 2.0))
+    panels = _dots(
+        summary, run, lambda row: (100.0 * row["solved"], nan, nan),
+        lambda row: f"{percent(row['solved'])} % of {row['problems']} problems solved", show="failed",
+    )  # fmt: skip
     return Chart(
         "solved",
         "Share of the problems that were solved",
-        "Attempts end without a plan when the planner's expansions are used up; such attempts count in "
+        "An attempt ends without a plan when the planner has used up its expansions. Such attempts count in "
         "every time.",
-        drawn,
+        [dots(title, of_panel, "problems solved, %", (lowest, 100.0)) for title, of_panel in panels],
         summary[["panel", "planner", "configuration", "problems", "solved"]],
     )
 
 
-def time_chart(site: Site, run: RunFolder) -> Chart:
+def _time_chart(data: DataReader, run: RunFolder) -> Chart:
     """Mean milliseconds of each part of planning time."""
 
     def made() -> pd.DataFrame:
         frame, _ = readable_attempts(run.results, _SPLIT)
         return time_split(frame.astype({"recall": object, "assist": object}))
 
-    split = site.kept(("time split", stamp_of(run.results)), made)
-    names = [*(part.name for part in PARTS), REST]
-    colours = dict(zip(names, ("7", "4", "0", "6", "2", "5", "3", "1", "8"), strict=True))
-    drawn = []
+    split = data.kept(("time split", stamp_of(run.results)), made)
+    drawings: list[Drawing] = []
     for (panel, planner), rows in split.groupby(["panel", "planner"], sort=False):
-        stacked = {
-            str(label): [(str(part), float(ms)) for part, ms in zip(each["part"], each["ms"], strict=True)]
-            for label, each in rows.groupby("configuration", sort=False)
+        parts = {
+            str(label): list(zip(of_label["part"], of_label["ms"].tolist(), strict=True))
+            for label, of_label in rows.groupby("configuration", sort=False)
         }
-        end = 1.05 * max((sum(ms for _, ms in parts) for parts in stacked.values()), default=1.0)
-        drawn.append(
-            stacks(
-                panel_title(str(panel), str(planner)), stacked, colours, "mean planning time, ms", end, "ms"
-            )
-        )
+        title = panel_title(str(panel), str(planner))
+        drawings.append(stacks(title, parts, TIME_COLOURS, "mean planning time, ms", "ms"))
     return Chart(
         "time",
         "Where planning time goes",
-        f"Mean milliseconds of each part over all problems. {PLANNING_TIME} Rest: between the parts.",
-        drawn,
+        f"Mean milliseconds of each part over all problems. {PLANNING_TIME} Rest: in none of the parts.",
+        drawings,
         split,
-        [(colours[name], name) for name in names],
+        [(colour, name) for name, colour in TIME_COLOURS.items()],
     )
 
 
-def in_percent(fraction: float) -> str:
-    """A tick of a fraction, in per cent."""
-    return short(round(100.0 * fraction, 6))
-
-
 def _tables(summary: pd.DataFrame, run: str) -> list[dict[str, Any]]:
-    """A table a panel: every figure of the summary that is read most."""
+    """The figures of a summary that are read most, a table a panel."""
     tables = []
     for panel, rows in summary.groupby("panel", sort=False):
-        decimals = decimals_of(rows[["mean_ms", "median_ms"]].to_numpy(float)) if "median_ms" in rows else 2
-        cells = []
-        for row in rows.to_dict("records"):
-            cells.append(
-                {
-                    "planner": planner_title(row["planner"]),
-                    "configuration": row["configuration"],
-                    "address": problems_address(run, str(panel), row["planner"], row["configuration"]),
-                    "numbers": [
-                        f"{row['mean_ms']:,.{decimals}f}",
-                        *[f"{row[name]:,.{decimals}f}" for name in ("median_ms", "p90_ms") if name in row],
-                        percent(row["solved"]),
-                        _reduction(row),
-                        share(row.get("slower", float("nan"))),
-                    ],
-                }
-            )
+        decimals = decimals_of(rows[["mean_ms", "median_ms"]].to_numpy(float))
+        cells = [
+            {
+                "planner": planner_title(row["planner"]),
+                "configuration": row["configuration"],
+                "address": _problems_address(run, row),
+                "numbers": [
+                    *[f"{row[name]:,.{decimals}f}" for name in ("mean_ms", "median_ms", "p90_ms")],
+                    percent(row["solved"]), reduction_cell(row), percent(row["slower"]),
+                ],
+            }
+            for row in rows.to_dict("records")
+        ]  # fmt: skip
         tables.append({"title": str(panel), "problems": int(rows["problems"].max()), "rows": cells})
     return tables
 
 
 def _best(summary: pd.DataFrame) -> list[dict[str, str]]:
-    """Of each panel, the configuration with the lowest mean time."""
+    """The configuration with the lowest mean time in each panel."""
     best = []
     for panel, rows in summary.groupby("panel", sort=False):
-        row = rows.iloc[int(rows["mean_ms"].argmin())]
-        ends = [100.0 * row.get(f"reduction_{end}", float("nan")) for end in ("low", "high")]
-        between = f" [{ends[0]:.0f}, {ends[1]:.0f}]" if ends[0] == ends[0] else ""
-        alone = row["configuration"] == BASELINE.label
-        said = "" if alone else f": {100.0 * row['reduction']:.0f} % less{between}"
+        row = min(rows.to_dict("records"), key=lambda row: row["mean_ms"])
+        less = with_interval(row["reduction"], row["reduction_low"], row["reduction_high"])
+        less = "" if row["configuration"] == BASELINE.label else f": {less} % less"
         best.append(
             {
                 "panel": "combined memory" if panel == COMBINED else str(panel),
                 "time": f"{row['mean_ms']:.3g} ms",
-                "how": f"{planner_title(row['planner'])}, {row['configuration']}{said}",
+                "how": f"{planner_title(row['planner'])}, {row['configuration']}{less}",
             }
         )
     return best
 
 
-def _reduction(row: dict[Any, Any]) -> str:
-    nothing = float("nan")
-    return reduction(row["reduction"], row.get("reduction_low", nothing), row.get("reduction_high", nothing))
-
-
 def _stages(records: list[dict[str, Any]]) -> list[dict[str, str]]:
     return [
         {
-            "stage": str(each.get("stage", "?")),
-            "began": str(each.get("began", "")).replace("T", " ").replace("+00:00", " UTC"),
-            "seconds": f"{float(each.get('seconds', 0.0)):,.1f}",
-            "host": str(each.get("host", "")),
-            "commit": str(each.get("commit", ""))[:10],
+            "stage": str(record.get("stage", "?")),
+            "began": str(record.get("began", "")).replace("T", " ").replace("+00:00", " UTC"),
+            "seconds": f"{float(record.get('seconds', 0.0)):,.1f}",
+            "host": str(record.get("host", "")),
+            "commit": str(record.get("commit", ""))[:10],
         }
-        for each in records
+        for record in records
     ]
 
 
-def _places(site: Site, run: RunFolder) -> Iterator[tuple[str, str, str]]:
-    """Where else to look: name, address if it is one, else the command that opens it."""
+def _places(data: DataReader, run: RunFolder) -> Iterator[tuple[str, str, str]]:
+    """Where else to look: name, and its address or else the command that opens it."""
     tracking = os.environ.get("MLFLOW_TRACKING_URI", "")
     if "@" in tracking:  # a password may be in it
         tracking = f"{tracking.partition('://')[0]}://{tracking.rpartition('@')[2]}"
     if tracking.startswith(("http://", "https://")):
         yield "MLflow", tracking, ""
     else:
-        yield (
-            "MLflow",
-            "",
-            f"mlflow ui --backend-store-uri {tracking or f'sqlite:///{site.data.mlflow_database}'}",
-        )
+        store = tracking or f"sqlite:///{data.folder.mlflow_database}"
+        yield "MLflow", "", f"mlflow ui --backend-store-uri {store}"
     server = os.environ.get("PREFECT_API_URL", "").removesuffix("/api")
     if server.startswith(("http://", "https://")):
         yield "Prefect", f"{server}/runs", ""
     else:
-        yield "Prefect", "", f"motion-memory servers --data {site.data.path}"
+        yield "Prefect", "", f"motion-memory servers --data {data.folder.path}"
     yield "Folder", "", str(run.path)

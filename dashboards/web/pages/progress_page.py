@@ -1,4 +1,4 @@
-"""Progress: more experience, more runs, retrainings: is planning getting faster, and does it stay so?"""
+"""Progress: with more experience, more runs, more retrainings: does planning become faster, and stay so?"""
 
 from __future__ import annotations
 
@@ -9,261 +9,254 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import pandas as pd
 
-from dashboards.figures.experience_curve import experience_rows
-from dashboards.figures.style import planner_title
+from dashboards.cells import PLANNING_TIME, panel_title, planner_title
+from dashboards.palette import BLUE, GREEN, SERIES
+from dashboards.statistics.experience_recall import experience_rows
 from dashboards.statistics.panels import COMBINED
-from dashboards.web.charts import Chart, Line, Panel, lines
+from dashboards.web.charts import Chart, Drawing, Line, lines
+from dashboards.web.data_reader import DataReader
 from dashboards.web.notices import NoticeError
-from dashboards.web.page import Page
-from dashboards.web.pages.overview_page import PLANNING_TIME, panel_title, summary_of
-from dashboards.web.pages.retrainings_page import (
-    retrained_charts,
-    retrained_rows,
+from dashboards.web.page import Page, menu
+from dashboards.web.pages.retraining_charts import (
+    retraining_charts,
+    retraining_rows,
     watched_charts,
     watched_rows,
 )
-from dashboards.web.query import Asked, link
-from dashboards.web.site import Site, stamp_of
+from dashboards.web.parameters import Parameters, link
 from storage.errors import StorageError
 from storage.places.data_folder import RunFolder
+from storage.tables.configurations import BASELINE
+from storage.tables.learned_experiences import learned_shards
 from storage.tables.recalls import read_recalls
 from storage.tables.watched import read_watched
 
 MOST_RUNS: Final = 30  # that are read for this page, the newest
-_MAY_DIFFER: Final = {
+_MAY_DIFFER: Final = {  # settings in which runs of growing experience may differ
     "preset", "classes", "worlds", "planners", "assists", "test_problems", "combined", "strict", "candidates",
     "continual", "experiences",
 }  # fmt: skip
-_COLOURS: Final = ("0", "1", "2", "3", "5", "4", "6", "7")
 
 
-class Made(NamedTuple):
-    """A run with its summary."""
+class MeasuredRun(NamedTuple):
+    """A run that has attempts."""
 
-    run: RunFolder
+    folder: RunFolder
     settings: dict[str, Any]
     summary: pd.DataFrame
     when: datetime
 
+    @property
+    def name(self) -> str:
+        """The name of the run."""
+        return self.folder.path.name
 
-def progress(site: Site, asked: Asked) -> Page:
-    """All runs that were measured, by time and by experience."""
-    configuration = asked.text("configuration")
-    known = [each.path.name for each in site.runs()]
-    run = asked.one_of("run", known, "")
-    found, left_out = _made(site)
-    retrained, unreached = site.retrained()
-    seen, damaged = read_watched(site.data.watched)
-    labels = list(
-        dict.fromkeys(label for each in found for label in each.summary["configuration"] if label != "none")
-    )
-    chosen = asked.one_of("configuration", labels, _default(labels)) if configuration else _default(labels)
-    charts = []
-    if found and chosen:
-        charts = [*_continual(found, chosen), *_recall(site, found), *_over_time(found, chosen)]
-    of_retrainings = list(retrained_charts(retrained, set(known)))
-    of_watching = list(watched_charts(seen))
+
+def progress(data: DataReader, params: Parameters) -> Page:
+    """All runs that were measured, by time and by experience, and what became of retrainings."""
+    names = [run.path.name for run in data.runs()]
+    run = params.one_of("run", names, "")
+    measured, left_out = _measured_runs(data)
+    versions, unreached = data.versions()
+    seen, damaged = read_watched(data.folder.watched)
+    labels = list(dict.fromkeys(label for each in measured for label in each.summary["configuration"]))
+    labels = [label for label in labels if label != BASELINE.label]
+    chosen = params.one_of("configuration", labels, _default(labels))
+    of_runs = []
+    if measured and chosen:
+        of_runs = [*_continual(measured, chosen), *_recall(measured), *_run_after_run(measured, chosen)]
+    of_retrainings, of_watching = list(retraining_charts(versions, set(names))), list(watched_charts(seen))
     values = {
-        "path": asked.path,
+        "path": params.path,
         "run": run,
         "left_out": [*left_out, *unreached, *damaged],
-        "count": len(found),
-        "learned": list(_learned(site)),
-        "menu": {
-            "name": "configuration",
-            "title": "Configuration",
-            "value": chosen,
-            "options": [(label, label) for label in labels],
-        },
-        "rows": [_row(each) for each in reversed(found)],
-        "continual": any(chart.name == "continual" for chart in charts),
-        "retrained": retrained_rows(retrained, set(known)),
+        "count": len(measured),
+        "learned": list(_learned(data)),
+        "menu": menu("configuration", "Configuration", labels, chosen),
+        "rows": [_row(each) for each in reversed(measured)],
+        "continual": any(chart.name == "continual" for chart in of_runs),
+        "retrained": retraining_rows(versions, set(names)),
         "watched": watched_rows(seen),
-        "of_runs": charts,
+        "of_runs": of_runs,
         "of_retrainings": of_retrainings,
         "of_watching": of_watching,
     }
-    shown = [*charts, *of_retrainings, *of_watching]
-    return Page("progress.html.jinja", "Progress", "Progress", run, values, shown)
+    charts = [*of_runs, *of_retrainings, *of_watching]
+    return Page("progress.html.jinja", "Progress", "Progress", run, values, charts)
 
 
 def _default(labels: list[str]) -> str:
-    """What a reader most wants to see: repair, by the best recall, else the first there is."""
-    wanted = [label for label in labels if label.startswith("repair") and "centroid" not in label]
-    return (wanted or labels or [""])[0]
+    """What a reader most wants to see: repair with the best recall, else the first there is."""
+    repairs = [label for label in labels if label.startswith("repair") and "centroid" not in label]
+    return (repairs or labels or [""])[0]
 
 
-def _made(site: Site) -> tuple[list[Made], list[str]]:
-    """The runs that have attempts, the oldest first, and those that cannot be read."""
-    found, left_out = [], []
-    for run in site.runs()[:MOST_RUNS]:
+def _measured_runs(data: DataReader) -> tuple[list[MeasuredRun], list[str]]:
+    """The runs that have attempts, the oldest first, and why others cannot be read."""
+    measured, left_out = [], []
+    for run in data.runs()[:MOST_RUNS]:
         try:
-            settings = site.settings(run)
-            summary, _ = summary_of(site, run)
+            settings, (summary, _) = data.settings(run), data.summary(run)
         except NoticeError:
             continue
         except StorageError as error:
             left_out.append(str(error))
             continue
-        began = [str(each.get("began", "")) for each in site.stages(run) if each.get("stage") == "benchmark"]
-        found.append(Made(run, settings, summary, _time(began[-1] if began else "", run)))
-    return sorted(found, key=lambda each: each.when), left_out
+        began = [stage.get("began") for stage in data.stages(run) if stage.get("stage") == "benchmark"]
+        measured.append(MeasuredRun(run, settings, summary, _time(str(began[-1]) if began else "", run)))
+    return sorted(measured, key=lambda each: each.when), left_out
 
 
-def _time(said: str, run: RunFolder) -> datetime:
+def _time(words: str, run: RunFolder) -> datetime:
     try:
-        found = datetime.fromisoformat(said)
+        time = datetime.fromisoformat(words)
     except ValueError:
         return datetime.fromtimestamp(run.settings.stat().st_mtime, UTC)
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
+    return time if time.tzinfo else time.replace(tzinfo=UTC)
 
 
-def _families(found: list[Made]) -> Iterator[list[Made]]:
-    """Runs that differ in how many experiences they have, and in what of it they measure."""
-    groups: dict[str, dict[int, Made]] = {}
-    for each in found:
+def _families(measured: list[MeasuredRun]) -> Iterator[tuple[str, list[MeasuredRun]]]:
+    """Runs that differ in how many experiences they have, and in what of it they measure.
+
+    Comes with the ending of their charts' names: nothing for the first family, then numbers.
+    """
+    groups: dict[str, dict[int, MeasuredRun]] = {}
+    for each in measured:
         alike = {name: value for name, value in each.settings.items() if name not in _MAY_DIFFER}
-        groups.setdefault(repr(sorted(alike.items())), {})[int(each.settings.get("experiences", 0))] = each
-    for group in groups.values():
-        if len(group) > 1:
-            yield [each for _, each in sorted(group.items())]
+        groups.setdefault(repr(sorted(alike.items())), {})[each.settings["experiences"]] = each
+    families = [group for group in groups.values() if len(group) > 1]
+    for number, group in enumerate(families):
+        yield f"-{number}" if number else "", [each for _, each in sorted(group.items())]
 
 
-def _continual(found: list[Made], configuration: str) -> Iterator[Chart]:
+def _of_configuration(tables: list[pd.DataFrame], configuration: str) -> pd.DataFrame:
+    rows = pd.concat(tables)
+    return rows[(rows["configuration"] == configuration) & (rows["panel"] != COMBINED)]
+
+
+def _continual(measured: list[MeasuredRun], configuration: str) -> Iterator[Chart]:
     """Mean time relative to the planner alone, by number of experiences."""
-    for number, family in enumerate(_families(found)):
-        rows = pd.concat([each.summary.assign(experiences=each.settings["experiences"]) for each in family])
-        rows = rows[(rows["configuration"] == configuration) & (rows["panel"] != COMBINED)]
-        panels = []
-        for (panel, planner), of_panel in rows.groupby(["panel", "planner"], sort=False):
-            if of_panel["experiences"].nunique() > 1:
-                panels.append(
-                    _by(of_panel, "experiences", panel_title(str(panel), str(planner)), "experiences a class")
-                )
-        if panels:
-            name = "continual" if number == 0 else f"continual-{number}"
+    for ending, family in _families(measured):
+        tables = [each.summary.assign(experiences=each.settings["experiences"]) for each in family]
+        rows = _of_configuration(tables, configuration)
+        drawings = [
+            _reductions(panel_title(str(panel), str(planner)), of_panel.sort_values("experiences"))
+            for (panel, planner), of_panel in rows.groupby(["panel", "planner"], sort=False)
+            if of_panel["experiences"].nunique() > 1
+        ]
+        if drawings:
             yield Chart(
-                name,
+                f"continual{ending}",
                 f"Continual improvement: {configuration} with more and more experience",
-                "Less mean planning time than the same planner without memory, paired by problem, with 95 % "
-                f"intervals; each point is a run of its own, from the first stage on. {PLANNING_TIME}",
-                panels,
+                "Reduction of the mean planning time against the same planner without memory, paired by "
+                "problem, with 95 % intervals; each point is a run of its own, from the first stage on. "
+                f"{PLANNING_TIME}",
+                drawings,
                 rows,
             )
 
 
-def _by(rows: pd.DataFrame, column: str, title: str, axis: str) -> Panel:
-    rows = rows.sort_values(column)
-    low, high = (
-        100.0 * rows.get(name, rows["reduction"]).to_numpy(float)
-        for name in ("reduction_low", "reduction_high")
-    )
-    line = Line(
-        title, rows[column].to_numpy(float), 100.0 * rows["reduction"].to_numpy(float), "0", low, high, True
-    )
+def _percents(rows: pd.DataFrame, *columns: str) -> list[Any]:
+    return [100.0 * rows[column].to_numpy(float) for column in columns]
+
+
+def _reductions(title: str, rows: pd.DataFrame) -> Drawing:
+    reduction, low, high = _percents(rows, "reduction", "reduction_low", "reduction_high")
+    line = Line(title, rows["experiences"].to_numpy(float), reduction, BLUE, low, high, dots=True)
     ends = (min(0.0, max(-100.0, float(np.nanmin(low)))), 100.0)
-    return lines(title, [line], axis, "less planning time, %", y_ends=ends)
+    return lines(title, [line], "experiences a class", "less planning time, %", y_ends=ends)
 
 
-def _recall(site: Site, found: list[Made]) -> Iterator[Chart]:
+def _recall(measured: list[MeasuredRun]) -> Iterator[Chart]:
     """Fresh hit@5 by number of experiences."""
-    for number, family in enumerate(_families(found)):
-        tables = []
-        for each in family:
-            shards = [
-                shard for name in each.settings["classes"] for shard in each.run.shards("recalls", str(name))
-            ]
-            if shards:
-                try:
-                    rows = read_recalls(shards)
-                except (StorageError, ValueError):
-                    continue
-                own = rows[rows["memory"] == rows["class"]]
-                tables.append(experience_rows(own))
-        tables = [table for table in tables if len(table)]
+    for ending, family in _families(measured):
+        tables = [table for each in family if len(table := _recall_rows(each))]
         if len(tables) < 2:
             continue
         rows = pd.concat(tables)
-        panels = []
+        drawings = []
         for panel, of_panel in rows.groupby("panel", sort=False):
             of_panel = of_panel.sort_values("plans")
             x = of_panel["plans"].to_numpy(float)
-            hit, low, high, oracle = (
-                100.0 * of_panel[name].to_numpy(float) for name in ("hit", "low", "high", "oracle")
-            )
-            drawn = [Line("hit@5", x, hit, "0", low, high, True), Line("oracle", x, oracle, "2", dots=True)]
-            panels.append(lines(str(panel), drawn, "plans in the memory", "problems, %", y_ends=(0.0, 100.0)))
+            hit, low, high, oracle = _percents(of_panel, "hit", "low", "high", "oracle")
+            drawn = [
+                Line("hit@5", x, hit, BLUE, low, high, dots=True),
+                Line("oracle", x, oracle, GREEN, dots=True),
+            ]
+            axes = ("plans in the memory", "problems, %")
+            drawings.append(lines(str(panel), drawn, *axes, y_ends=(0.0, 100.0)))
         yield Chart(
-            "recall" if number == 0 else f"recall-{number}",
+            f"recall{ending}",
             "What memories recall, with more and more experience",
             "Share of fresh problems with a free plan among the first five that the encoder ranks, with 95 % "
             "intervals, and with any free plan at all (oracle). No planning time is in this chart.",
-            panels, rows, [("0", "hit@5"), ("2", "oracle: any stored plan is free")],
-        )  # fmt: skip
-
-
-def _over_time(found: list[Made], configuration: str) -> Iterator[Chart]:
-    """Reduction run after run."""
-    tables = [
-        each.summary.assign(run=each.run.path.name, number=float(i + 1), when=f"{each.when:%Y-%m-%d %H:%M}")
-        for i, each in enumerate(found)
-    ]
-    rows = pd.concat(tables)
-    rows = rows[(rows["configuration"] == configuration) & (rows["panel"] != COMBINED)]
-    if len(found) < 2 or not len(rows):
-        return
-    panels = []
-    for panel, of_panel in rows.groupby("panel", sort=False):
-        drawn = []
-        for i, (planner, of_planner) in enumerate(of_panel.groupby("planner", sort=False)):
-            y = 100.0 * of_planner["reduction"].to_numpy(float)
-            drawn.append(
-                Line(
-                    planner_title(str(planner)),
-                    of_planner["number"].to_numpy(float),
-                    y,
-                    _COLOURS[i % 8],
-                    dots=True,
-                )
-            )
-        low = min(0.0, max(-100.0, 100.0 * float(of_panel["reduction"].min())))
-        numbers = np.arange(1, len(found) + 1, max(1, len(found) // 8), dtype=float).tolist()
-        panels.append(
-            lines(
-                str(panel),
-                drawn,
-                "run, the oldest first (table below)",
-                "less planning time, %",
-                y_ends=(low, 100.0),
-                x_ends=(0.8, len(found) + 0.2),
-                x_ticks=numbers,
-            )
+            drawings,
+            rows,
+            [(BLUE, "hit@5"), (GREEN, "oracle: any stored plan is free")],
         )
-    planners = [str(each) for each in rows["planner"].drop_duplicates()]
+
+
+def _recall_rows(run: MeasuredRun) -> pd.DataFrame:
+    """What the run's memories recalled for their own classes; empty if that was not measured."""
+    classes = [str(name) for name in run.settings["classes"]]
+    shards = [shard for name in classes for shard in run.folder.shards("recalls", name)]
+    try:
+        rows = read_recalls(shards)
+    except (StorageError, ValueError):
+        return pd.DataFrame()
+    return experience_rows(rows[rows["memory"] == rows["class"]])
+
+
+def _run_after_run(measured: list[MeasuredRun], configuration: str) -> Iterator[Chart]:
+    """The reduction in each run, one after another."""
+    tables = [
+        run.summary.assign(run=run.name, number=float(number), when=f"{run.when:%Y-%m-%d %H:%M}")
+        for number, run in enumerate(measured, start=1)
+    ]
+    rows = _of_configuration(tables, configuration)
+    if len(measured) < 2 or not len(rows):
+        return
+    planners = {str(name): SERIES[i % len(SERIES)] for i, name in enumerate(rows["planner"].unique())}
+    numbers = np.arange(1, len(measured) + 1, max(1, len(measured) // 8), dtype=float).tolist()
+    drawings = []
+    for panel, of_panel in rows.groupby("panel", sort=False):
+        drawn = [
+            Line(
+                planner_title(str(planner)), of_planner["number"].to_numpy(float),
+                _percents(of_planner, "reduction")[0], planners[str(planner)], dots=True,
+            )
+            for planner, of_planner in of_panel.groupby("planner", sort=False)
+        ]  # fmt: skip
+        low = min(0.0, max(-100.0, 100.0 * float(of_panel["reduction"].min())))
+        drawings.append(
+            lines(
+                str(panel), drawn, "run, the oldest first (table below)", "less planning time, %",
+                y_ends=(low, 100.0), x_ends=(0.8, len(measured) + 0.2), x_ticks=numbers,
+            )
+        )  # fmt: skip
     yield Chart(
         "runs",
         f"Run after run: {configuration}",
-        "Reduction of the mean planning time in each run of this folder. Runs may differ in their "
-        "settings and "
-        f"machines: Compare shows two of them paired. {PLANNING_TIME}",
-        panels, rows, [(_COLOURS[i % 8], planner_title(name)) for i, name in enumerate(planners)],
-    )  # fmt: skip
+        "Reduction of the mean planning time in each run of this folder. Runs may differ in their settings "
+        f"and machines: Compare shows two of them paired. {PLANNING_TIME}",
+        drawings,
+        rows,
+        [(colour, planner_title(planner)) for planner, colour in planners.items()],
+    )
 
 
-def _learned(site: Site) -> Iterator[dict[str, Any]]:
-    """What was learned on the job: files, newest change."""
-    for folder in sorted((site.data.path / "learned").glob("[!.]*/")):
-        stamps = stamp_of(folder)
-        shards = [each for each in stamps if each[0].endswith(".parquet") and "/snapshots/" not in each[0]]
-        if shards:
-            newest = datetime.fromtimestamp(max(each[1] for each in shards) / 1e9, UTC)
-            yield {"vehicle": folder.name, "files": len(shards), "newest": f"{newest:%Y-%m-%d %H:%M} UTC"}
+def _learned(data: DataReader) -> Iterator[dict[str, Any]]:
+    """What was learned from solving: files and the newest change, by vehicle."""
+    for folder in data.folder.learned_folders():
+        times = [shard.stat().st_mtime for shard in learned_shards(folder) if shard.is_file()]
+        if times:
+            newest = datetime.fromtimestamp(max(times), UTC)
+            yield {"vehicle": folder.name, "files": len(times), "newest": f"{newest:%Y-%m-%d %H:%M} UTC"}
 
 
-def _row(each: Made) -> dict[str, Any]:
-    name = each.run.path.name
+def _row(run: MeasuredRun) -> dict[str, Any]:
     return {
-        "name": name, "address": f"/runs/{name}", "when": f"{each.when:%Y-%m-%d %H:%M}",
-        "experiences": each.settings.get("experiences"), "objective": each.settings.get("objective", ""),
-        "compare": link("/compare", {"other": name}),
+        "name": run.name, "address": f"/runs/{run.name}", "when": f"{run.when:%Y-%m-%d %H:%M}",
+        "experiences": run.settings["experiences"], "objective": run.settings.get("objective", ""),
+        "compare": link("/compare", {"other": run.name}),
     }  # fmt: skip

@@ -1,39 +1,36 @@
-"""The runs of the data folder, the newest first; what an empty folder is told to do."""
+"""The runs of the data folder, the newest first; an empty folder says what to do."""
 
 from __future__ import annotations
 
 from datetime import UTC, datetime
 from typing import Any
 
+from dashboards.web.data_reader import DataReader
 from dashboards.web.page import Page
-from dashboards.web.query import Asked
-from dashboards.web.site import Site
+from dashboards.web.parameters import Parameters
 from storage.errors import StorageError
 from storage.places.data_folder import RunFolder
 
 
-def runs(site: Site, asked: Asked) -> Page:
-    """Every run with what it was asked for and how far it is; broken ones say why they cannot be read."""
-    rows = [_row(site, run) for run in site.runs()]
-    return Page("runs.html.jinja", "Runs", values={"rows": rows, "data": str(site.data.path)})
+def runs(data: DataReader, params: Parameters) -> Page:
+    """Every run with its settings and how far it is; one that cannot be read says why."""
+    rows = [_row(data, run) for run in data.runs()]
+    return Page("runs.html.jinja", "Runs", values={"rows": rows, "data": str(data.folder.path)})
 
 
-def _row(site: Site, run: RunFolder) -> dict[str, Any]:
+def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
     when = datetime.fromtimestamp(run.settings.stat().st_mtime, UTC)
     row: dict[str, Any] = {"name": run.path.name, "when": f"{when:%Y-%m-%d %H:%M} UTC", "fault": ""}
     try:
-        settings = site.settings(run)
-        stages = list(dict.fromkeys(str(each.get("stage")) for each in site.stages(run)))
+        settings = data.settings(run)
+        stages = list(dict.fromkeys(str(stage.get("stage")) for stage in data.stages(run)))
     except StorageError as error:
         return row | {"fault": str(error)}
-    classes = [
-        *settings["classes"],
-        *(str(world).rstrip("/").rpartition("/")[2] for world in settings["worlds"]),
-    ]
+    worlds = [str(world).rstrip("/").rpartition("/")[2] for world in settings["worlds"]]
     return row | {
-        "classes": ", ".join(classes),
-        "planners": ", ".join(settings.get("planners", [])),
-        "experiences": settings.get("experiences"),
+        "classes": ", ".join([*settings["classes"], *worlds]),
+        "planners": ", ".join(settings["planners"]),
+        "experiences": settings["experiences"],
         "problems": settings.get("test_problems"),
         "vehicle": settings.get("vehicle", "car"),
         "stages": ", ".join(stages) or "none yet",

@@ -1,10 +1,10 @@
 "use strict";
-// A world that can be edited; each change is planned for, with and without memory.
+// A world that can be edited. After each change it is planned in again, with and without memory.
 const SVG = "http://www.w3.org/2000/svg";
 const svg = document.getElementById("editor");
 const given = JSON.parse(document.getElementById("start-world").textContent);
 const choices = document.getElementById("choices");
-let world = given.world, outline = given.start, chosen = -1, answers = [], past = [], asked = 0, timer = null;
+let world = given.world, outline = given.start, chosen = -1, answers = [], past = [], requests = 0, timer = null;
 
 const make = (name, attributes, parent) => {
   const made = document.createElementNS(SVG, name);
@@ -12,7 +12,6 @@ const make = (name, attributes, parent) => {
   return parent ? parent.appendChild(made) : made;
 };
 const written = (points) => points.map(([x, y]) => `${x},${y}`).join(" ");
-const pairs = (flat) => flat.reduce((found, value, i) => (i % 2 ? [...found.slice(0, -1), [found.at(-1)[0], value]] : [...found, [value]]), []);
 
 // Polygons that were pieces of one obstacle stay together: groups of polygons, as the file says.
 let things = [];
@@ -60,12 +59,12 @@ const draw = (focus = false) => {
     const alone = answer.assist === "none";
     if (!alone) {
       const bodies = make("g", { class: "bodies" }, flipped);
-      for (const body of answer.bodies) make("polygon", { points: written(pairs(body)) }, bodies);
+      for (const body of answer.bodies) make("polygon", { points: written(body) }, bodies);
     }
-    make("polyline", { points: written(answer.way), class: alone ? "alone-plan" : "found-plan" }, flipped);
+    make("polyline", { points: written(answer.way), class: alone ? "alone-plan" : "with-plan" }, flipped);
   }
   const start = make("g", { class: "start" }, flipped);
-  for (const body of outline) make("polygon", { points: written(pairs(body)) }, start);
+  for (const body of outline) make("polygon", { points: written(body) }, start);
   const [x, y, heading] = world.start;
   make("line", { x1: x, y1: y, x2: x + 4.5 * Math.cos(heading), y2: y + 4.5 * Math.sin(heading), class: "heading" }, flipped);
   if (chosen >= 0) {
@@ -98,17 +97,17 @@ const tell = (where, answer) => {
 
 const post = async (where, content) => {
   const base = location.pathname.replace(/\/try$/, "");
-  const answer = await fetch(`${base}/${where}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content) });
-  const found = await answer.json();
-  if (!answer.ok) throw new Error(found.error ?? "This cannot be answered.");
-  return found;
+  const response = await fetch(`${base}/${where}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content) });
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.error ?? "This cannot be answered.");
+  return answer;
 };
 const plan = async () => {
-  const mine = ++asked, began = performance.now();
+  const mine = ++requests, began = performance.now();
   try {
-    const found = await post("plan", { world: fields(), planner: value("planner"), assist: value("assist"), memory: value("memory") });
-    if (mine !== asked) return;
-    answers = found.answers;
+    const planned = await post("plan", { world: fields(), planner: value("planner"), assist: value("assist"), memory: value("memory") });
+    if (mine !== requests) return;
+    answers = planned.answers;
     const [alone, withMemory] = answers;
     tell("alone", alone);
     tell("with", withMemory);
@@ -117,7 +116,7 @@ const plan = async () => {
       say(ratio >= 1 ? `With memory ${ratio.toFixed(1)} times as fast.` : `With memory ${(1 / ratio).toFixed(1)} times as long.`);
     } else say(withMemory?.solved ? "Only with memory is a plan found." : alone.solved ? "A plan is found without memory." : "No plan is found in time.");
   } catch (error) {
-    if (mine !== asked) return;
+    if (mine !== requests) return;
     answers = [];
     tell("alone");
     tell("with");
@@ -207,10 +206,10 @@ document.getElementById("file").addEventListener("change", async (event) => {
     if (file.size > 1 << 20) throw new Error("A world takes at most 1 MB; this file is larger.");
     let content;
     try { content = JSON.parse(await file.text()); } catch { throw new Error(`${file.name} is no JSON.`); }
-    const found = await post("check", content);
+    const checked = await post("check", content);
     remember();
-    outline = found.start;
-    take(found.world);
+    outline = checked.start;
+    take(checked.world);
     changed();
   } catch (error) { say(error.message); }
 });
@@ -241,9 +240,9 @@ const begin = async () => {
   if (kept) {
     try {
       const bytes = Uint8Array.from(atob(kept[1].replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
-      const found = await post("check", JSON.parse(new TextDecoder().decode(bytes)));
-      outline = found.start;
-      take(found.world);
+      const checked = await post("check", JSON.parse(new TextDecoder().decode(bytes)));
+      outline = checked.start;
+      take(checked.world);
     } catch (error) { say(`The world in this address cannot be read: ${error.message}`); draw(); return; }
   }
   draw();

@@ -5,7 +5,9 @@ import pandas as pd
 import pytest
 from rich.console import Console
 
-from dashboards.figures.experience_curve import experience_chart, experience_rows, experience_table
+from dashboards.figures.recall_curves import experience_chart
+from dashboards.report.tables import experience_table
+from dashboards.statistics.experience_recall import experience_rows
 from tests.dashboards.synthetic import recalls
 
 

@@ -12,15 +12,21 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from dashboards.cells import PLANNING_TIME
 from dashboards.figures.bars import ablation, controls, paper_configurations, planning_times, time_split
-from dashboards.figures.curves import continual_improvement, performance_profile, solved_against_time
+from dashboards.figures.planning_curves import (
+    anytime_curves,
+    continual_improvement,
+    performance_profile,
+    solved_against_time,
+)
+from dashboards.figures.recall_curves import retrieval_curves, training_curves
 from dashboards.figures.style import save
-from dashboards.figures.training_figures import anytime_curves, retrieval_curves, training_curves
 from dashboards.statistics import distributions
 from dashboards.statistics.panels import COMBINED, summarise, summarise_continual
 from dashboards.statistics.retrieval_rates import retrieval_curve
 from storage.tables.configurations import Configuration
-from tests.dashboards.synthetic import ABLATION, PARTS, STANDARD, attempts, recalls
+from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
 
 BARS = STANDARD[:5]
 
@@ -33,7 +39,7 @@ def texts(figure: Figure) -> list[str]:
 def test_four_memories_and_three_planners_are_twelve_panels_of_five_bars() -> None:
     rows = pd.concat([attempts(), attempts(configurations=STANDARD[1:], memory=COMBINED)])
     figure = planning_times(summarise(rows, resamples=10))
-    assert len(figure.axes) == 12
+    assert len(figure.axes) == 4 * 3
     assert all(len(axes.patches) == 5 for axes in figure.axes)
     titles = [axes.get_title().splitlines()[0] for axes in figure.axes[:4]]
     assert titles == ["curves", "random", "trap", COMBINED]
@@ -87,7 +93,6 @@ def test_a_split_is_as_long_as_the_planning_time(attempt_rows: pd.DataFrame) -> 
     longest = max(bar.get_x() + bar.get_width() for bar in panel.patches)
     means = mine.groupby(["assist", "top_k", "recall"], dropna=False)["planning_seconds"].mean()
     assert longest == pytest.approx(1e3 * means.max())
-    assert len(panel.patches) == len(STANDARD) * len(PARTS)  # guide and repair are one, rest is one more
 
 
 def test_growing_experience_has_a_curve_a_configuration() -> None:
@@ -106,14 +111,14 @@ def test_every_planner_and_class_has_a_panel_of_curves(name: str, attempt_rows: 
     chart = {"solved_against_time": solved_against_time, "performance_profile": performance_profile}[name]
     figure = chart(getattr(distributions, name)(attempt_rows))
     panels = [axes for axes in figure.axes if axes.lines]
-    assert len(panels) == 9
-    assert all(len(axes.lines) == 7 for axes in panels)
+    assert len(panels) == len(attempt_rows[["planner", "problem_class"]].drop_duplicates())
+    ways = {(each.assist, each.recall) for each in STANDARD}
+    assert all(len(axes.lines) == len(ways) for axes in panels)
 
 
 def test_the_figure_says_what_counts_as_planning_time(attempt_rows: pd.DataFrame) -> None:
     words = " ".join(texts(planning_times(summarise(attempt_rows, resamples=10)))).replace("\n", " ")
-    assert "from receiving the obstacles to returning a plan" in words
-    assert "Failures keep their time" in words
+    assert PLANNING_TIME in words
 
 
 def test_improving_has_a_panel_a_class_and_a_curve_a_planner() -> None:
@@ -134,8 +139,11 @@ def test_improving_has_a_panel_a_class_and_a_curve_a_planner() -> None:
     planning_times, controls, time_split, continual_improvement, solved_against_time, performance_profile,
     retrieval_curves, training_curves, anytime_curves,
 ])  # fmt: skip
-def test_without_rows_a_figure_says_what_to_do(chart: Callable[[pd.DataFrame], Figure]) -> None:
-    assert any("first." in text for text in texts(chart(pd.DataFrame())))
+def test_without_rows_a_figure_is_a_message(chart: Callable[[pd.DataFrame], Figure]) -> None:
+    figure = chart(pd.DataFrame())
+    (axes,) = figure.axes
+    assert not axes.axison
+    assert axes.texts[0].get_text()
 
 
 @pytest.mark.parametrize("plans", [1, 4, 30])

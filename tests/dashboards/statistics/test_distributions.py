@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scipy.stats import ecdf
 
 from dashboards.statistics.distributions import (
-    PARTS,
     REST,
+    TIME_PARTS,
     endings,
     performance_profile,
     solved_against_time,
@@ -71,7 +71,7 @@ def test_who_is_fastest_on_every_problem_starts_at_its_solved_share() -> None:
 
 def test_the_parts_of_planning_time_add_up_to_it(attempt_rows: pd.DataFrame) -> None:
     split = time_split(attempt_rows)
-    assert set(split["part"]) == {*(part.name for part in PARTS), REST}
+    assert set(split["part"]) == {*(part.name for part in TIME_PARTS), REST}
     whole = split.groupby(["panel", "planner", "configuration"])["ms"].sum()
     for panel, planner, name in whole.index:
         mine = attempt_rows[(attempt_rows["problem_class"] == panel) & (attempt_rows["planner"] == planner)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dashboards.statistics.panels import COMBINED
 from dashboards.verdicts.claim_rules import FAILS, HOLDS, OPEN, Claim
 from dashboards.verdicts.claims import claims
-from dashboards.verdicts.evidence import Evidence, Figure
+from dashboards.verdicts.evidence import Estimate, Evidence
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
 
@@ -124,7 +124,7 @@ def test_every_claim_says_its_rule_and_where_it_stands() -> None:
 
 @given(low=st.floats(-1, 1), width=st.floats(0, 1), line=st.floats(-1, 1))
 def test_a_figure_decides_only_with_its_whole_interval(low: float, width: float, line: float) -> None:
-    figure = Figure("", low + 0.5 * width, low, low + width)
+    figure = Estimate("", low + 0.5 * width, low, low + width)
     assert (figure.above(line) is None) == (figure.low <= line <= figure.high)
     assert figure.below(line) is (None if figure.above(line) is None else not figure.above(line))
     assert figure.reaches(line) == (figure.above(line) is not False)

@@ -9,15 +9,15 @@ from contextlib import contextmanager
 
 import uvicorn
 
-from dashboards.web.retrained import Retrainings
+from dashboards.web.memory_versions import Versions
 from storage.places.data_folder import DataFolder
 from tasks.serving.serve_dashboard import guarded_dashboard
 
 
 @contextmanager
-def served(data: DataFolder, retrainings: Retrainings = tuple) -> Iterator[str]:
+def served(data: DataFolder, versions: Versions = tuple) -> Iterator[str]:
     """The dashboard over a data folder on a free port; its address."""
-    server = uvicorn.Server(uvicorn.Config(guarded_dashboard(data, retrainings), port=0, log_level="warning"))
+    server = uvicorn.Server(uvicorn.Config(guarded_dashboard(data, versions), port=0, log_level="warning"))
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     while not server.started:

@@ -15,7 +15,7 @@ import pandas as pd
 from dashboards.report.tables import as_csv
 from dashboards.statistics.panels import summarise
 from dashboards.verdicts.drift import Usefulness, drifts
-from dashboards.web.retrained import Retrained
+from dashboards.web.memory_versions import MemoryVersion
 from planners.memory.plans.sweeps import Flags, free_plans
 from planners.memory.recall import Memory
 from planners.solve import solve
@@ -33,10 +33,10 @@ from tests.planners.memories import memory_of
 
 CLASS = "trap"
 PROBLEMS = 6
-RETRAINED = (
-    Retrained("motion-memory-trap", 1, 0, "first", "rolled back", "", nan, nan, nan, "", False),
-    Retrained("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "faster: 20 %", True),
-    Retrained("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not faster", False),
+VERSIONS = (
+    MemoryVersion("motion-memory-trap", 1, 0, "first", "rolled back", "", nan, nan, nan, "", False),
+    MemoryVersion("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "faster: 20 %", True),
+    MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not faster", False),
 )
 SEEN = Usefulness(problems=200, hits=160, mean_ms=1.5, median_ms=0.5)
 WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "centroid"))

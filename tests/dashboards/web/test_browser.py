@@ -12,19 +12,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webdriver import WebDriver
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
-from storage.places.data_folder import DataFolder
-from tests.dashboards.web.browser import (
-    CHROMIUM,
-    DESKTOP,
-    DRIVER,
-    PHONE,
-    browser,
-    complaints,
-    findings,
-    shown_at,
-)
-from tests.dashboards.web.server import served
-from tests.dashboards.web.small_data import RETRAINED
+from tests.dashboards.web.browser import CHROMIUM, DESKTOP, DRIVER, PHONE, complaints, findings, shown_at
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
 
@@ -36,26 +24,14 @@ PAGES = (
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def address(data: DataFolder) -> Iterator[str]:
-    with served(data, lambda: RETRAINED) as address:
-        yield address
-
-
-@pytest.fixture(scope="module")
-def driver() -> Iterator[WebDriver]:
-    with browser() as driver:
-        yield driver
-
-
 @pytest.fixture
-def opened(driver: WebDriver, address: str) -> Iterator[Callable[[str], WebDriver]]:
+def opened(driver: WebDriver, server: str) -> Iterator[Callable[[str], WebDriver]]:
     shown_at(driver, DESKTOP)
     driver.get_log("browser")
 
     def opened(place: str) -> WebDriver:
         driver.get("about:blank")
-        driver.get(address + place)
+        driver.get(server + place)
         return driver
 
     yield opened
@@ -66,16 +42,19 @@ def wait(driver: WebDriver, so: Callable[[WebDriver], object], seconds: float = 
     WebDriverWait(driver, seconds, poll_frequency=0.05).until(so)
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def planned(driver: WebDriver) -> int:
+    return int(driver.find_element(By.ID, "editor").get_attribute("data-planned") or 0)
+
+
 @pytest.mark.parametrize("place", PAGES)
 def test_a_page_has_no_serious_finding_and_fits_both_screens(
-    opened: Callable[[str], WebDriver], place: str, dark: bool
+    opened: Callable[[str], WebDriver], place: str
 ) -> None:
     driver = opened(place)
-    for size in (DESKTOP, PHONE):
+    if "/try" in place:
+        wait(driver, planned)
+    for size, dark in ((DESKTOP, False), (PHONE, True)):
         shown_at(driver, size, dark)
-        if "/try" in place:
-            wait(driver, lambda d: d.find_element(By.ID, "editor").get_attribute("data-planned"))
         assert findings(driver) == []
         assert driver.execute_script("return document.documentElement.scrollWidth") <= size[0]
 
@@ -130,10 +109,6 @@ def test_a_chart_is_saved_as_a_picture(opened: Callable[[str], WebDriver]) -> No
     wait(driver, lambda d: int(button.get_attribute("data-saved") or 0) > 5_000)
 
 
-def planned(driver: WebDriver) -> int:
-    return int(driver.find_element(By.ID, "editor").get_attribute("data-planned") or 0)
-
-
 def after(driver: WebDriver, act: Callable[[], object]) -> None:
     """Do something that changes the world, and wait for the plans that follow."""
     before = planned(driver)
@@ -141,63 +116,69 @@ def after(driver: WebDriver, act: Callable[[], object]) -> None:
     wait(driver, lambda d: planned(d) > before)
 
 
-def test_a_world_is_edited_with_the_mouse_and_planned_at_once(
-    opened: Callable[[str], WebDriver], tmp_path: Path
-) -> None:
+def obstacles(driver: WebDriver) -> list[str]:
+    """The corners of each obstacle in the editor."""
+    polygons = driver.find_elements(By.CSS_SELECTOR, ".obstacle polygon:first-child")
+    return [polygon.get_attribute("points") for polygon in polygons]
+
+
+@pytest.fixture
+def editor(opened: Callable[[str], WebDriver]) -> WebDriver:
     driver = opened("/runs/first/try?problem=trap-standard-3-0")
     wait(driver, planned)
-    count = len(driver.find_elements(By.CSS_SELECTOR, ".obstacle"))
-    after(driver, driver.find_element(By.CSS_SELECTOR, "[data-add='4']").click)
-    assert len(driver.find_elements(By.CSS_SELECTOR, ".obstacle")) == count + 1
-    thing = driver.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon")
-    before = thing.get_attribute("points")
-    after(driver, ActionChains(driver).drag_and_drop_by_offset(thing, 40, 30).perform)
-    moved = driver.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon").get_attribute("points")
-    assert moved != before
-    handle = driver.find_element(By.CSS_SELECTOR, ".handle")
-    after(driver, ActionChains(driver).drag_and_drop_by_offset(handle, 60, 40).perform)
-    assert driver.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon").get_attribute("points") != moved
-    kept = driver.current_url
-    assert "#w=" in kept
-    shape = (
-        driver.find_elements(By.CSS_SELECTOR, ".obstacle")[-1]
-        .find_element(By.TAG_NAME, "polygon")
-        .get_attribute("points")
-    )
-    opened(
-        kept.partition("127.0.0.1")[2].partition("/")[1] + kept.partition("127.0.0.1")[2].partition("/")[2]
-    )
-    wait(driver, planned)
-    again = (
-        driver.find_elements(By.CSS_SELECTOR, ".obstacle")[-1]
-        .find_element(By.TAG_NAME, "polygon")
-        .get_attribute("points")
-    )
-    assert [round(float(x), 2) for x in shape.replace(",", " ").split()] == pytest.approx(
-        [round(float(x), 2) for x in again.replace(",", " ").split()], abs=0.02
-    )
-    after(driver, driver.find_element(By.ID, "clear").click)
-    assert "ms" in driver.find_element(By.ID, "ms-alone").text
-    assert "ms" in driver.find_element(By.ID, "ms-with").text
+    return driver
+
+
+def test_a_world_is_edited_with_the_mouse_and_planned_at_once(editor: WebDriver) -> None:
+    before = obstacles(editor)
+    after(editor, editor.find_element(By.CSS_SELECTOR, "[data-add='4']").click)
+    *others, added = obstacles(editor)
+    assert others == before
+    thing = editor.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon")
+    after(editor, ActionChains(editor).drag_and_drop_by_offset(thing, 40, 30).perform)
+    *others, moved = obstacles(editor)
+    assert others == before
+    assert moved != added
+    handle = editor.find_element(By.CSS_SELECTOR, ".handle")
+    after(editor, ActionChains(editor).drag_and_drop_by_offset(handle, 60, 40).perform)
+    *others, turned = obstacles(editor)
+    assert others == before
+    assert turned != moved
+
+
+def test_the_address_of_an_edited_world_opens_it_again(editor: WebDriver) -> None:
+    after(editor, editor.find_element(By.CSS_SELECTOR, "[data-add='3']").click)
+    edited, address = obstacles(editor), editor.current_url
+    editor.get("about:blank")
+    editor.get(address)
+    wait(editor, planned)
+    corners = [
+        [float(x) for x in each.replace(",", " ").split()] for each in (edited[-1], obstacles(editor)[-1])
+    ]
+    assert corners[1] == pytest.approx(corners[0], abs=0.01)
+
+
+def test_an_empty_world_and_one_from_a_file_are_planned(editor: WebDriver, tmp_path: Path) -> None:
+    after(editor, editor.find_element(By.ID, "clear").click)
+    assert obstacles(editor) == []
     own = {"start": [0, 0, 0.7], "goal": [50, 50], "goal_radius": 2, "bounds": [-7, -7, 57, 57],
            "obstacles": [[[20, 20], [25, 20], [25, 25]]]}  # fmt: skip
     (tmp_path / "own.json").write_text(json.dumps(own), "utf-8")
-    after(driver, lambda: driver.find_element(By.ID, "file").send_keys(str(tmp_path / "own.json")))
-    assert len(driver.find_elements(By.CSS_SELECTOR, ".obstacle")) == 1
+    after(editor, lambda: editor.find_element(By.ID, "file").send_keys(str(tmp_path / "own.json")))
+    assert len(obstacles(editor)) == 1
+    assert editor.find_elements(By.CSS_SELECTOR, ".alone-plan")
+    assert editor.find_elements(By.CSS_SELECTOR, ".with-plan")
 
 
-def test_a_world_is_edited_with_keys_alone(opened: Callable[[str], WebDriver]) -> None:
-    driver = opened("/runs/first/try?problem=trap-standard-3-0")
-    wait(driver, planned)
-    count = len(driver.find_elements(By.CSS_SELECTOR, ".obstacle"))
-    editor = driver.find_element(By.ID, "editor")
-    driver.execute_script("arguments[0].focus()", editor)
-    keys = ActionChains(driver)
-    keys.send_keys(Keys.TAB).perform()
-    before = driver.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon").get_attribute("points")
-    after(driver, ActionChains(driver).send_keys(Keys.ARROW_RIGHT, "[").perform)
-    assert driver.find_element(By.CSS_SELECTOR, ".obstacle.chosen polygon").get_attribute("points") != before
-    after(driver, ActionChains(driver).send_keys(Keys.DELETE).perform)
-    assert len(driver.find_elements(By.CSS_SELECTOR, ".obstacle")) == count - 1
-    after(driver, ActionChains(driver).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform)
-    assert len(driver.find_elements(By.CSS_SELECTOR, ".obstacle")) == count
+def test_a_world_is_edited_with_keys_alone(editor: WebDriver) -> None:
+    before = obstacles(editor)
+    editor.execute_script("arguments[0].focus()", editor.find_element(By.ID, "editor"))
+    ActionChains(editor).send_keys(Keys.TAB).perform()
+    after(editor, ActionChains(editor).send_keys(Keys.ARROW_RIGHT, "[").perform)
+    moved, *others = obstacles(editor)
+    assert others == before[1:]
+    assert moved != before[0]
+    after(editor, ActionChains(editor).send_keys(Keys.DELETE).perform)
+    assert obstacles(editor) == before[1:]
+    after(editor, ActionChains(editor).key_down(Keys.CONTROL).send_keys("z").key_up(Keys.CONTROL).perform)
+    assert obstacles(editor) == [moved, *before[1:]]

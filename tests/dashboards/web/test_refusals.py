@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from storage.places.data_folder import DataFolder, open_data_folder
-from tests.dashboards.web.conftest import ClientOf
+from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.small_data import write_settings
 
 PATHS = (
@@ -190,15 +190,15 @@ def test_a_world_of_megabytes_is_refused(client: httpx.Client) -> None:
     assert nested.status_code == 400
 
 
-def test_an_empty_folder_says_what_to_do(client_of: ClientOf, tmp_path: Path) -> None:
-    text = client_of(open_data_folder(tmp_path / "data")).get("/").text
+def test_an_empty_folder_says_what_to_do(tmp_path: Path) -> None:
+    text = LocalClient(open_data_folder(tmp_path / "data")).get("/").text
     assert "motion-memory run" in text
 
 
-def test_a_run_without_rows_says_how_far_it_is(client_of: ClientOf, tmp_path: Path) -> None:
+def test_a_run_without_rows_says_how_far_it_is(tmp_path: Path) -> None:
     data = open_data_folder(tmp_path / "data")
     write_settings(data.run("begun"))
-    client = client_of(data)
+    client = LocalClient(data)
     assert "no attempts yet" in client.get("/runs/begun").text
     assert client.get("/runs/begun").status_code == 200
     assert client.get("/runs/begun/problems").status_code == 409
@@ -206,9 +206,7 @@ def test_a_run_without_rows_says_how_far_it_is(client_of: ClientOf, tmp_path: Pa
     assert client.get("/progress").status_code == 200
 
 
-def test_a_damaged_file_is_named_and_the_others_are_shown(
-    client_of: ClientOf, data: DataFolder, tmp_path: Path
-) -> None:
+def test_a_damaged_file_is_named_and_the_others_are_shown(data: DataFolder, tmp_path: Path) -> None:
     other = open_data_folder(tmp_path / "data")
     run = other.run("broken")
     write_settings(run)
@@ -216,11 +214,11 @@ def test_a_damaged_file_is_named_and_the_others_are_shown(
     run.shard("results", "trap", 0).parent.mkdir(parents=True)
     run.shard("results", "trap", 0).write_bytes(whole)
     run.shard("results", "trap", 1).write_bytes(whole[: len(whole) // 2])
-    text = client_of(other).get("/runs/broken/problems").text
+    text = LocalClient(other).get("/runs/broken/problems").text
     assert "0001.parquet is no whole Parquet file" in text
     assert "attempts" in text
     run.shard("results", "trap", 0).unlink()
-    answer = client_of(other).get("/runs/broken/problems")
+    answer = LocalClient(other).get("/runs/broken/problems")
     assert answer.status_code == 409
     assert "Traceback" not in answer.text
 
@@ -228,20 +226,20 @@ def test_a_damaged_file_is_named_and_the_others_are_shown(
 @pytest.mark.parametrize(
     "content", ["", "{", "[]", "null", '{"classes": 3}', "\x00", '{"classes": [], "worlds": 7}']
 )
-def test_settings_that_cannot_be_read_are_told(client_of: ClientOf, tmp_path: Path, content: str) -> None:
+def test_settings_that_cannot_be_read_are_told(tmp_path: Path, content: str) -> None:
     data = open_data_folder(tmp_path / "data")
     write_settings(data.run("odd"))
     data.run("odd").settings.write_text(content, "utf-8")
-    client = client_of(data)
+    client = LocalClient(data)
     for place in ("/", "/runs/odd", "/runs/odd/try", "/progress"):
         answer = client.get(place)
         assert answer.status_code in (200, 409), place
         assert "Traceback" not in answer.text
 
 
-def test_random_bytes_in_the_place_of_a_summary_are_told(client_of: ClientOf, tmp_path: Path) -> None:
+def test_random_bytes_in_the_place_of_a_summary_are_told(tmp_path: Path) -> None:
     data = open_data_folder(tmp_path / "data")
     write_settings(data.run("odd"))
     data.run("odd").summary("csv").write_bytes(np.random.default_rng(0).bytes(500))
-    answer = client_of(data).get("/runs/odd")
+    answer = LocalClient(data).get("/runs/odd")
     assert answer.status_code == 409

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dashboards.report.sweep_table import sweep_table
+from dashboards.report.tables import sweep_table
 from storage.tables.hallucinated import Labelled
 from tasks.fan_out.stage import Chunk
 from tasks.reports.experience_curve import runs_of_curve

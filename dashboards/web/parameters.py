@@ -7,45 +7,43 @@ from dataclasses import dataclass
 from typing import Final
 from urllib.parse import quote, urlencode
 
-from dashboards.web.notices import WrongQuestionError
+from dashboards.web.notices import BadRequestError
 
 LONGEST: Final = 200  # letters of a value
 
 
 @dataclass(frozen=True)
-class Asked:
+class Parameters:
     """The path and the parameters of an address."""
 
     path: str
     values: Mapping[str, str]
-    run: str = ""  # of the path, where it names one
+    run: str = ""  # that the path names, if it does
 
     def text(self, name: str, default: str = "") -> str:
-        """A short printable text."""
-        value = self.values.get(name, default)
+        """The parameter ``name``, a short printable text; ``default`` if it is missing or empty."""
+        value = self.values.get(name) or default
         if len(value) > LONGEST or not value.isprintable():
-            raise WrongQuestionError(f"{name} must be up to {LONGEST} printable letters, got {_told(value)}.")
+            raise BadRequestError(f"{name} must be up to {LONGEST} printable letters, got {_short(value)}.")
         return value
 
     def one_of(self, name: str, options: Sequence[str], default: str) -> str:
-        """One of some words."""
+        """The parameter ``name``, one of the ``options``; ``default`` if it is missing."""
         value = self.text(name, default)
         if value not in options and value != default:
-            raise WrongQuestionError(
-                f"{name} is {_told(value)}; choose one of {', '.join(options[:12])}"
-                f"{', …' if len(options) > 12 else ''}."
-            )
+            known = f"{', '.join(options[:12])}{', …' if len(options) > 12 else ''}"
+            raise BadRequestError(f"{name} is {_short(value)}; choose one of {known}.")
         return value
 
     def number(self, name: str, low: int, high: int, default: int) -> int:
-        """A whole number."""
+        """The parameter ``name``, a whole number from ``low`` to ``high``; ``default`` if it is missing."""
         value = self.text(name, str(default))
         if not (value.isascii() and value.removeprefix("-").isdigit() and low <= int(value) <= high):
-            raise WrongQuestionError(f"{name} is {_told(value)}; give a whole number from {low} to {high}.")
+            raise BadRequestError(f"{name} is {_short(value)}; give a whole number from {low} to {high}.")
         return int(value)
 
     def flag(self, name: str) -> bool:
-        """Whether something is wished, ``1`` or ``0``."""
+        """Whether the parameter ``name`` is 1 rather than 0 or missing."""
         return self.one_of(name, ("0", "1"), "0") == "1"
 
     def also(self, **changes: object) -> str:
@@ -54,10 +52,10 @@ class Asked:
 
 
 def link(path: str, values: Mapping[str, object] | None = None) -> str:
-    """An address with parameters; empty ones are left out."""
-    said = {name: str(value) for name, value in (values or {}).items() if value not in (None, "")}
-    return quote(path) + (f"?{urlencode(said)}" if said else "")
+    """The address of a ``path`` with the parameters ``values``, without those that are empty or None."""
+    texts = {name: str(value) for name, value in (values or {}).items() if value not in (None, "")}
+    return quote(path) + (f"?{urlencode(texts)}" if texts else "")
 
 
-def _told(value: str) -> str:
+def _short(value: str) -> str:
     return repr(value if len(value) <= 60 else f"{value[:57]}...")

@@ -1,0 +1,127 @@
+"""Retrainings, one after another: how challengers were judged, and how useful champions are at work."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from dashboards.cells import PLANNING_TIME
+from dashboards.palette import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
+from dashboards.web.charts import Chart, Dot, Drawing, Line, dots, lines
+from dashboards.web.memory_versions import MemoryVersion
+
+NEWEST: Final = 20  # rows of the table of what was seen at work
+_COLOURS: Final = {
+    "promoted": GREEN, "refused": VERMILLION, "awaiting approval": ORANGE, "rolled back": PURPLE,
+    "first champion": BLUE,
+}  # fmt: skip
+
+
+def retraining_charts(versions: Sequence[MemoryVersion], runs: set[str]) -> Iterator[Chart]:
+    """Every challenger in ``versions`` beside the champion of its time; ``runs``: names of those there."""
+    judged = [version for version in versions if np.isfinite(version.reduction)]
+    if not judged:
+        return
+    ends = [100.0 * end for version in judged for end in (version.low, version.high)]
+    across = (max(-100.0, min(0.0, *ends) - 2.0), min(100.0, max(0.0, *ends) + 2.0))
+    drawings = []
+    for memory in dict.fromkeys(version.memory for version in judged):
+        rows = [_dot(version, runs) for version in judged if version.memory == memory]
+        drawings.append(dots(memory, rows, "less planning time than the champion, %", across))
+    verdicts = dict.fromkeys(version.verdict for version in judged)
+    yield Chart(
+        "retrainings",
+        "Retrainings: each challenger beside the champion of its time",
+        "Reduction of the mean planning time on held-back problems that both attempted, averaged over "
+        f"planners and configurations, with the 95 % interval that decided. {PLANNING_TIME}",
+        drawings,
+        pd.DataFrame(versions),
+        [(_colour(verdict), verdict or "not judged yet") for verdict in verdicts],
+    )
+
+
+def retraining_rows(versions: Sequence[MemoryVersion], runs: set[str]) -> list[dict[str, Any]]:
+    """The ``versions`` for the page's table, the newest first; ``runs``: names of those that are there."""
+    newest_first = sorted(versions, key=lambda each: (-each.retraining, each.memory, -each.number))
+    return [
+        {
+            "memory": version.memory, "number": version.number, "champion": version.is_champion,
+            "verdict": version.verdict or "not judged yet", "colour": _colour(version.verdict),
+            "against": f"version {version.against}" if version.against else "",
+            "why": version.why, "run": version.run, "address": _address(version, runs),
+        }
+        for version in newest_first
+    ]  # fmt: skip
+
+
+def watched_charts(seen: pd.DataFrame) -> Iterator[Chart]:
+    """Hits at work beside the benchmark's, one file of problems after another.
+
+    ``seen``: rows of ``storage.tables.watched``.
+    """
+    if not len(seen):
+        return
+    drawings = [
+        _watched(f"{memory}: {configuration}", of_both)
+        for (memory, configuration), of_both in seen.groupby(["memory", "configuration"], sort=False)
+    ]
+    yield Chart(
+        "drift",
+        "Drift: do champions answer at work as in their benchmark?",
+        "A hit is a problem that a recalled plan answers as it is. Each dot is one file of problems that was "
+        "solved with the memory, vermilion if hits are significantly fewer than in its benchmark (Fisher's "
+        f"exact test, 0.1 %). Planning times are in the table. {PLANNING_TIME}",
+        drawings,
+        seen,
+        [(BLUE, "at work"), (VERMILLION, "fallen"), (GREEN, "in its benchmark")],
+    )
+
+
+def watched_rows(seen: pd.DataFrame) -> list[dict[str, Any]]:
+    """The newest of ``seen``, rows of ``storage.tables.watched``, for the page's table."""
+    return [
+        {
+            "when": f"{row['at']:%Y-%m-%d %H:%M} UTC", "memory": row["memory"],
+            "configuration": row["configuration"], "problems": f"{row['problems']:,}",
+            "hits": f"{100 * row['hits'] / row['problems']:.1f}",
+            "promised": f"{100 * row['benchmark_hits'] / row['benchmark_problems']:.1f}",
+            "mean_ms": f"{row['mean_ms']:.2f}", "promised_ms": f"{row['benchmark_mean_ms']:.2f}",
+            "fallen": row["has_fallen"],
+        }
+        for row in seen[::-1][:NEWEST].to_dict("records")
+    ]  # fmt: skip
+
+
+def _dot(version: MemoryVersion, runs: set[str]) -> Dot:
+    words = f"version {version.number} is {version.verdict}, against version {version.against}: {version.why}"
+    estimate = (100.0 * version.reduction, 100.0 * version.low, 100.0 * version.high)
+    label, colour = f"version {version.number}", _colour(version.verdict)
+    return Dot(label, estimate, colour, words, _address(version, runs) or None)
+
+
+def _address(version: MemoryVersion, runs: set[str]) -> str:
+    return f"/runs/{version.run}" if version.run in runs else ""
+
+
+def _colour(verdict: str) -> str:
+    return _COLOURS.get(verdict, GREY)
+
+
+def _watched(title: str, seen: pd.DataFrame) -> Drawing:
+    number = np.arange(1.0, len(seen) + 1.0)
+    hits, promised = (
+        100.0 * (seen[f"{of}hits"] / seen[f"{of}problems"]).to_numpy(float) for of in ("", "benchmark_")
+    )
+    drawn = [
+        Line("in its benchmark", number, promised, GREEN),
+        Line("at work", number, hits, BLUE, dots=True),
+    ]
+    for i in np.flatnonzero(seen["has_fallen"].to_numpy(bool)):
+        drawn.append(Line("fallen", number[i : i + 1], hits[i : i + 1], VERMILLION, dots=True))
+    return lines(
+        title, drawn, "file of problems, the oldest first", "hits, %", y_ends=(0.0, 100.0),
+        x_ends=(0.8, len(seen) + 0.2), x_ticks=number[:: max(1, len(number) // 8)].tolist(),
+    )  # fmt: skip

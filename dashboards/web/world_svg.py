@@ -1,0 +1,118 @@
+"""A world as SVG in metres: obstacles, the vehicle, plans with their collisions, what a search grew."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from dashboards.web.svg import element, points, tooltip
+from dashboards.world_outlines import CheckedPlan, heading_tip, outlines, shown_states
+from planners.search.traces import Roads, Trace
+from planners.world.arrays import Floats
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.vehicle import Vehicle
+
+_MARGIN_M: Final = 1.0
+_MOST_EDGES: Final = 20_000  # of a tree or a roadmap: more is a blot
+_MOST_NODES: Final = 3_000
+
+
+def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
+    """A ``problem`` with a ``vehicle`` at its start, and ``layers`` of markup over it; y points up."""
+    x_min, y_min, x_max, y_max = problem.bounds
+    place = {"x": x_min, "y": y_min, "width": x_max - x_min, "height": y_max - y_min}
+    inner = f"M{x_min:g} {y_min:g}H{x_max:g}V{y_max:g}H{x_min:g}Z"
+    beyond = f"M{x_min - 99:g} {y_min - 99:g}H{x_max + 99:g}V{y_max + 99:g}H{x_min - 99:g}Z{inner}"
+    (goal_x, goal_y), (x, y, _), (tip_x, tip_y) = problem.goal, problem.start, heading_tip(problem)
+    marks = [
+        element("rect", **place, class_="bounds"),
+        element("g", *_obstacles(problem), class_="obstacles"),
+        element("path", d=beyond, class_="beyond"),
+        element("rect", **place, class_="frame"),
+        element("circle", tooltip("goal"), cx=goal_x, cy=goal_y, r=problem.goal_radius, class_="goal"),
+        *layers,
+        _bodies(start_state(problem, vehicle)[np.newaxis], vehicle, "start"),
+        element("line", x1=x, y1=y, x2=tip_x, y2=tip_y, class_="heading"),
+        element("g", class_="moving"),
+    ]
+    width, height = (size + 2 * _MARGIN_M for size in (x_max - x_min, y_max - y_min))
+    return element(
+        "svg",
+        element("g", *marks, transform="scale(1 -1)"),
+        viewBox=f"{x_min - _MARGIN_M:g} {-y_max - _MARGIN_M:g} {width:g} {height:g}",
+        class_="world",
+        role="img",
+        aria_label=f"World of problem {problem.id}",
+    )
+
+
+def answer_layer(plan: Plan, vehicle: Vehicle) -> str:
+    """The ``plan`` found: the way of the reference point, and the ``vehicle`` every few metres."""
+    way = element("polyline", points=points(plan.states[:, :2]))
+    return element("g", _bodies(shown_states(plan, vehicle), vehicle, "bodies"), way, class_="found")
+
+
+def recalled_layer(recalled: CheckedPlan, number: int, order: int, is_answer: bool = False) -> str:
+    """A ``recalled`` plan: a wide pale line if it is free, else dashed, every state in collision marked.
+
+    ``number``: of the plan in its memory. ``order``: of recall, from 1. ``is_answer``: whether the plan was
+    driven as it is.
+    """
+    way, first = recalled.plan.states[:, :2], recalled.first_blocked
+    collisions = way[recalled.blocked].tolist()
+    marks = [element("polyline", points=points(way if first is None else way[: first + 1]))]
+    if first is not None:
+        x, y = way[first].tolist()
+        cross = f"M{x - 0.9:.1f} {y - 0.9:.1f}l1.8 1.8m0 -1.8l-1.8 1.8"
+        marks.append(element("polyline", points=points(way[first:]), class_="rest"))
+        marks += [element("circle", cx=x, cy=y, r=0.45) for x, y in collisions]
+        marks.append(element("path", d=cross))
+    fate = "free" if first is None else f"{len(collisions)} states in collision"
+    kind = "free" if first is None else "blocked"
+    return element(
+        "g", tooltip(f"recalled {order}: plan {number}, {fate}"), *marks,
+        class_=f"recalled {kind}{' answer' if is_answer else ''}", data_order=order,
+    )  # fmt: skip
+
+
+def tree_layer(trace: Trace) -> str:
+    """What a search drove through, as its ``trace`` says: a line from each state to the one before."""
+    children = np.arange(len(trace.parents))[trace.parents >= 0]
+    children = children[:: max(1, -(-len(children) // _MOST_EDGES))]
+    ends = np.stack([trace.places[trace.parents[children]], trace.places[children]], axis=1)
+    return element("path", d=_segments(ends), class_="tree")
+
+
+def roadmap_layer(roads: Roads) -> str:
+    """The strips of a roadmap that were found free, its nodes, and pale what was never looked at."""
+    strips = [
+        element("path", d=_segments(roads.nodes[edges][:_MOST_EDGES]), class_=f"road {kind}")
+        for kind, edges in (("unknown", roads.unknown), ("free", roads.free))
+        if len(edges)
+    ]
+    nodes = roads.nodes[:_MOST_NODES].tolist()
+    circles = [element("circle", cx=x, cy=y, r=0.3, class_="node") for x, y in nodes]
+    return element("g", *strips, *circles, class_="roadmap")
+
+
+def _obstacles(problem: Problem) -> list[str]:
+    """An element an obstacle, of its convex pieces."""
+    pieces = problem.obstacles.pieces()
+    return [
+        element("path", d=" ".join(f"M{points(piece).replace(' ', 'L')}Z" for piece in pieces[first:last]))
+        for first, last in pairwise(problem.obstacles.obstacle_starts.tolist())
+    ]
+
+
+def _bodies(states: Floats, vehicle: Vehicle, kind: str) -> str:
+    """The vehicle at each of ``states [T, S]``."""
+    bodies, bars = outlines(states, vehicle)
+    polygons = [element("polygon", points=points(corners)) for corners in bodies]
+    tow_bars = [element("path", d=_segments(bars), class_="bars")] if len(bars) else []
+    return element("g", *polygons, *tow_bars, class_=kind)
+
+
+def _segments(ends: Floats) -> str:
+    return "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for a, b, c, d in ends.reshape(-1, 4).tolist())
