@@ -1,21 +1,21 @@
-"""The one error of this package, and how its line ends."""
+"""The errors of this package, each with a message of one line."""
 
 from __future__ import annotations
 
 
 class StorageError(Exception):
-    """Something on disk is missing, damaged, foreign or cannot be written; the message is one line."""
+    """Something on disk is missing, damaged, foreign or cannot be written."""
 
 
 class UnreachableError(StorageError):
-    """Object storage does not answer, or answers with errors; it may, later."""
+    """Object storage does not answer now, or answers with errors that may pass."""
 
 
 class InUseError(StorageError):
-    """Another process holds it."""
+    """Another process holds what is wanted."""
 
 
-def sentence(subject: object, told: object) -> str:
-    """One line of what is wrong with something, ended as a sentence where it does not end as a question."""
-    text = f"{subject} {told}"
+def sentence(subject: object, fault: object) -> str:
+    """One line of what is wrong with a ``subject``, with a full stop unless it ends in a question."""
+    text = f"{subject} {fault}"
     return text if text.endswith(("?", ".")) else f"{text}."

@@ -1,4 +1,4 @@
-"""The one door for JSON and for fields that are handed in: no field is unknown, and none is there twice."""
+"""How JSON and fields that users hand in are read: no field may be unknown, and none may occur twice."""
 
 from __future__ import annotations
 
@@ -17,18 +17,10 @@ LONGEST: Final = 60  # characters of a value that a message quotes
 
 
 def parse_json(text: str | bytes, where: str) -> Any:
-    """Parse a JSON text.
+    """The value that a JSON ``text`` holds, which may be given as its bytes in UTF-8.
 
-    Args:
-        text: the text, or its bytes in UTF-8.
-        where: what the message calls it.
-
-    Returns:
-        The value that the text holds.
-
-    Raises:
-        StorageError: the text is not JSON in UTF-8, or an object in it has a field twice.
-
+    ``where``: it stands, for messages. Raises StorageError if it is not JSON in UTF-8, or if an object in it
+    has a field twice.
     """
 
     def unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -49,15 +41,9 @@ def parse_json(text: str | bytes, where: str) -> Any:
 
 
 def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
-    """Refuse what nobody would understand.
+    """Raise ValueError if one of ``fields`` is not among the supported ``names``, or occurs twice.
 
-    Args:
-        fields: the names of an object's fields, or of a table's columns.
-        names: those that are supported.
-
-    Raises:
-        ValueError: one is not supported, or is there twice; the message says which, and what is supported.
-
+    ``fields``: of an object, or the columns of a table. The message says which one, and what is supported.
     """
     for field in fields:
         if field not in names:
@@ -69,17 +55,17 @@ def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
 
 
 def number_of(value: object, name: str) -> float:
-    """The number that a field holds, infinite if it is too large; ValueError for anything else."""
+    """The number that the field ``name`` holds, infinite if too large. Raises ValueError if it holds none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"{name} must hold numbers, got {short(value)}")
     try:
         return float(value)
     except OverflowError:
-        return math.inf  # which the checks refuse
+        return math.inf  # which checks refuse
 
 
 def scale_of(value: object) -> float:
-    """Metres of the world outside in a canonical metre, 1 for None; ValueError where no robot is so large."""
+    """Metres of the world outside in a canonical metre, 1 for None. Raises ValueError beyond the limits."""
     scale = 1.0 if value is None else number_of(value, "scale")
     if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
         raise ValueError(
@@ -90,14 +76,14 @@ def scale_of(value: object) -> float:
 
 
 def text_of(value: object, name: str) -> str:
-    """The printable text that a field holds; ValueError for anything else."""
+    """The printable text that the field ``name`` holds. Raises ValueError if it holds none."""
     if not isinstance(value, str) or not value.isprintable():
         raise ValueError(f"{name} must be a printable text, got {short(value)}")
     return value
 
 
 def short(value: object) -> str:
-    """A value as a message quotes it, in one line."""
+    """A ``value`` as a message quotes it, in one line."""
     text = repr(value)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 

@@ -1,4 +1,4 @@
-"""How files record the vehicle they were made for, and refuse to be used for another."""
+"""The vehicle that a file was made for: how it is recorded, and how another vehicle is refused."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from storage.errors import StorageError
 
 
 def fields_of(vehicle: Vehicle) -> dict[str, Any]:
-    """The vehicle's settings as JSON values."""
+    """The settings of a ``vehicle`` as JSON values."""
     fields: dict[str, Any] = json.loads(json.dumps(vehicle._asdict()))
     return fields
 
 
 def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
-    """A StorageError that names both vehicles unless ``made_for``, as recorded, is the one wanted."""
+    """Raise StorageError unless ``made_for``, as ``where`` records it, is the vehicle ``wanted``."""
     if made_for == fields_of(wanted):
         return
     names = {json.dumps(fields_of(vehicle)): name for name, vehicle in VEHICLES.items()}
@@ -25,7 +25,7 @@ def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
 
 
 def other_vehicle(where: object, made_for: str, wanted: Vehicle) -> StorageError:
-    """The error of something made for the vehicle of that name, wanted for another."""
+    """The error that ``where`` was ``made_for`` the vehicle of that name, but ``wanted`` for another."""
     advice = f"ask for --vehicle {made_for}" if made_for in VEHICLES else "this program knows no such vehicle"
     return StorageError(
         f"{where} was made for vehicle {made_for}, wanted was {name_of(wanted)}; {advice}, or make one for "

@@ -1,7 +1,7 @@
-"""Archives: a folder of named files with a header, checksums of all of it, and nothing half written.
+"""Archives: folders of named files with a header and checksums, written whole or not at all.
 
 Reading one runs nothing, imports nothing and unpickles nothing: files are mapped, measured and hashed before
-anybody looks at their contents.
+their contents are used.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ VERSION: Final = 2  # one more whenever an older program could no longer read an
 LARGEST_HEADER_BYTES: Final = 1 << 24
 _NAME: Final = re.compile(r"[a-z0-9_]{1,40}\.[a-z]{1,20}")
 
-Contents = mmap.mmap  # a whole file; kernels would be compiled anew for arrays that cannot be written to
+Contents = mmap.mmap  # a whole file, writable: kernels would be compiled anew for read-only arrays
 Files = Mapping[str, bytes | Array]
 
 
 def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str, Any], files: Files) -> None:
-    """Write ``<kind>.json`` and the files as one folder, in the place of what was there.
+    """Write an archive as one ``folder``, in place of what was there; the same content gives the same bytes.
 
-    Arrays are written as ``storage.archives.arrays`` does. The same content gives the same bytes.
+    ``kind``: of archive, which names its header ``<kind>.json``. ``vehicle``: that it is made for.
+    ``header``: more JSON values for the header. ``files``: contents by name; arrays are written as ``.npy``.
 
-    StorageError: it could not be written; the folder is as it was.
+    Raises StorageError if it cannot be written; the folder is then as it was.
     """
     with whole_folder(folder) as temporary:
         for name, data in files.items():
@@ -62,9 +63,12 @@ def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str
 
 
 def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, Any], dict[str, Contents]]:
-    """Header and files of an archive, after every byte was compared with what was written.
+    """The header of an archive, and its files by name, after every byte was compared with what was written.
 
-    StorageError: missing, damaged, with more or fewer files, of another version, for another vehicle or grid.
+    ``folder``: of the archive. ``kind``, ``vehicle``: that it has to be of.
+
+    Raises StorageError if it is missing or damaged, has more or fewer files, or is of another version, for
+    another vehicle or grid.
     """
     header = _header(folder, kind)
     refuse_another(folder, header.get("vehicle"), vehicle)
@@ -84,7 +88,8 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
     extra = sorted({file.name for file in folder.iterdir()} - {f"{kind}.json", *listed})
     if extra:
         raise StorageError(
-            f"{folder / extra[0]} is no part of the {kind}; move it elsewhere, or build the {kind} again."
+            f"{folder / extra[0]} does not belong to the {kind}; move it elsewhere, or build the {kind} "
+            "again."
         )
     files = _hashed([folder / name for name in listed])
     for name, (_, digest) in files.items():
@@ -94,7 +99,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
 
 
 def _header(folder: Path, kind: str) -> dict[str, Any]:
-    """The header of an archive of this version, as it was written to the last byte."""
+    """The header of an archive of this version, the same to the last byte as it was written."""
     path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
         raise StorageError(f"{folder} holds no {kind} (no {kind}.json in it); check the path or build one.")
@@ -114,7 +119,7 @@ def _header(folder: Path, kind: str) -> dict[str, Any]:
     header.pop("sha256", None)
     try:
         as_written = text == _signed(header)
-    except (ValueError, RecursionError):  # a number that JSON does not have, nesting without end
+    except (ValueError, RecursionError):  # a number that JSON does not have, or endless nesting
         as_written = False
     if not as_written or not _lists_files(header.get("files")):
         raise _damaged(path, kind)
@@ -122,13 +127,13 @@ def _header(folder: Path, kind: str) -> dict[str, Any]:
 
 
 def _signed(content: Mapping[str, Any]) -> str:
-    """The text of a header, with a checksum of all else in it."""
+    """The text of a header, with a checksum of everything else in it."""
     digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     return json.dumps({**content, "sha256": digest}, indent=2, allow_nan=False) + "\n"
 
 
 def _lists_files(listed: object) -> bool:
-    """Whether names, sizes and checksums are such; no name may reach out of the folder."""
+    """Whether a header lists names, sizes and checksums; no name may lead out of the folder."""
     return isinstance(listed, dict) and all(
         _NAME.fullmatch(name)
         and isinstance(entry, dict)
@@ -141,25 +146,25 @@ def _lists_files(listed: object) -> bool:
 
 def _size_of_plain_file(path: Path) -> int:
     try:
-        found = path.lstat()
+        about = path.lstat()
     except OSError as error:
         raise StorageError(f"{path} cannot be read: {error.strerror}; copy or build it again.") from None
-    if not stat.S_ISREG(found.st_mode):
-        raise StorageError(f"{path} is no plain file; copy or build it again.")
-    return found.st_size
+    if not stat.S_ISREG(about.st_mode):
+        raise StorageError(f"{path} is not a plain file; copy or build it again.")
+    return about.st_size
 
 
 def _hashed(paths: list[Path]) -> dict[str, tuple[Contents, str]]:
     """Contents and checksum of files, by name."""
-    found = {}
+    by_name = {}
     for path in paths:  # threads gain nothing: one file, the states, is most of an archive
         try:
             with path.open("rb") as file:
                 contents = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)
         except OSError as error:
             raise StorageError(f"{path} cannot be read: {error.strerror}; copy or build it again.") from None
-        found[path.name] = contents, hashlib.sha256(contents).hexdigest()
-    return found
+        by_name[path.name] = contents, hashlib.sha256(contents).hexdigest()
+    return by_name
 
 
 def _damaged(path: Path, kind: str) -> StorageError:

@@ -1,7 +1,7 @@
-"""Arrays as ``.npy`` files whose headers are known beforehand: none is parsed, so none can lie.
+"""Arrays as ``.npy`` files, which NumPy reads too; their headers are compared and never parsed.
 
-NumPy reads them too. The header of an array follows from its type, its columns and the size of its file; it
-is compared, never evaluated, and the numbers are used where the file is mapped, without a copy.
+The header of an array follows from its type, its columns and the size of its file. The numbers are used where
+the file is mapped, without a copy.
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ import numpy as np
 
 from storage.tables.columns import Array
 
-HEADER_BYTES: Final = 128  # of which the first ten say: NumPy, version 1.0, so many bytes of text follow
+HEADER_BYTES: Final = 128  # the first ten: NumPy, version 1.0, the number of bytes of text that follow
 _BEGINNING: Final = b"\x93NUMPY\x01\x00" + (HEADER_BYTES - 10).to_bytes(2, "little")
 
 
 def write_array(file: BinaryIO, array: Array) -> None:
-    """Write an array, little-endian, row by row; the same array gives the same bytes."""
+    """Write an ``array`` to an open ``file``, little-endian, row by row; always the same bytes."""
     plain = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     file.write(_header(plain.dtype, plain.shape))
     file.write(plain.reshape(-1).view(np.uint8).data)
 
 
 def array_of(contents: mmap | bytes, dtype: str, columns: tuple[int, ...] = ()) -> Array:
-    """The array ``[n, *columns]`` of a type like ``"<f8"`` in a file's contents, not copied.
+    """The array ``[n, *columns]`` of a ``dtype`` like ``"<f8"`` in a file's ``contents``, not copied.
 
-    ValueError: the contents are anything else.
+    Raises ValueError if the contents are anything else.
     """
     kind = np.dtype(dtype)
     rows, rest = divmod(len(contents) - HEADER_BYTES, kind.itemsize * math.prod(columns))
     if rows < 0 or rest or contents[:HEADER_BYTES] != _header(kind, (rows, *columns)):
         wanted = ", ".join(["n", *map(str, columns)])
-        raise ValueError(f"it is no {kind.name} array [{wanted}] in NumPy's format 1.0")
+        raise ValueError(f"it is not a {kind.name} array [{wanted}] in NumPy's format 1.0")
     return np.frombuffer(contents, kind, offset=HEADER_BYTES).reshape(rows, *columns)
 
 

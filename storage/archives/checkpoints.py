@@ -1,4 +1,4 @@
-"""Where a training stands, on disk after each epoch: a killed one goes on from there."""
+"""Checkpoints: a training after its last finished epoch, from which a killed one goes on."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
-from planners.memory.encoder.training import Checkpoint, Epoch
-from storage.archives.tensors import check_floats
+from planners.memory.encoder.training import Checkpoint
+from storage.archives.tensors import check_floats, packed_epochs, unpacked_epochs
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
 from storage.tables.columns import Array
@@ -20,32 +19,27 @@ _KEY: Final = "key"
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint, key: str) -> None:
-    """Write a checkpoint, whole or not at all; ``key`` says which training it belongs to."""
-    history = np.array(checkpoint.history, np.float64).reshape(-1, len(Epoch._fields))
-    tensors = {**checkpoint._asdict(), "history": history}
+    """Write a ``checkpoint`` to ``path``, whole or not at all; ``key`` says which training it belongs to."""
+    tensors = {**checkpoint._asdict(), "history": packed_epochs(checkpoint.history)}
     with whole_file(path, f"{len(checkpoint.history)} {key}") as temporary:
         save_file(tensors, temporary, {_KEY: key})
 
 
 def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
-    """The checkpoint of the training that ``key`` names; None where there is none: training begins anew."""
+    """The checkpoint at ``path`` of the training ``key``; None if there is none to go on from."""
     tensors = _tensors(path, key, Checkpoint._fields)
     if tensors is None:
         return None
-    history = tensors.pop("history")
     try:
+        history = unpacked_epochs(tensors.pop("history"))
         check_floats(tensors, dict.fromkeys(tensors, (len(tensors["values"]),)))
     except (TypeError, ValueError):
         return None
-    shape = (max(1, len(history)), len(Epoch._fields))
-    if history.shape != shape or not np.isfinite(history[:, 2:]).all():
-        return None
-    rows = history.tolist()
-    return Checkpoint(**tensors, history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in rows))
+    return Checkpoint(**tensors, history=history)
 
 
 def epochs_kept(path: Path, key: str) -> int:
-    """How many epochs of the training that ``key`` names are over; cheap enough to be asked all the time."""
+    """How many epochs of the training ``key`` the checkpoint at ``path`` holds; cheap enough to ask often."""
     note = note_of(path)
     if note is not None:
         epochs, _, noted = note.partition(" ")

@@ -1,4 +1,4 @@
-"""Trained encoders on disk: all that training leaves, for building a memory later or comparing trainings."""
+"""Trained encoders on disk: all that training leaves, to build a memory or to compare trainings."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 
 from planners.memory.encoder.encoder import Architecture, weight_shapes
-from planners.memory.encoder.training import Epoch, TrainedEncoder, TrainingSettings
+from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import read_archive, write_archive
-from storage.archives.tensors import check_floats, packed, unpacked
+from storage.archives.tensors import check_floats, packed, packed_epochs, unpacked, unpacked_epochs
 from storage.errors import StorageError
 from storage.fields import short
 
@@ -23,34 +23,26 @@ _FLOATS: Final = ("centroids", "vectors", "biases", "popularity")
 
 
 def save_encoder(folder: Path, trained: TrainedEncoder, vehicle: Vehicle = CAR) -> None:
-    """Write a trained encoder as a folder, whole or not at all; the same one gives the same bytes."""
+    """Write a ``trained`` encoder as a ``folder``, whole or not at all; the same one gives the same bytes."""
     tensors = {_WEIGHT + name: tensor for name, tensor in trained.weights.items()}
     tensors |= {name: getattr(trained, name) for name in (*_FLOATS, "held_out")}
-    history = np.array(trained.history, np.float64).reshape(-1, len(Epoch._fields))
-    data = packed({**tensors, "history": history})
+    data = packed({**tensors, "history": packed_epochs(trained.history)})
     write_archive(folder, _KIND, vehicle, {"settings": asdict(trained.settings)}, {_TENSORS: data})
 
 
 def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
-    """The trained encoder in a folder.
+    """The encoder in a ``folder``, trained for a ``vehicle``.
 
-    Raises:
-        StorageError: it is missing, damaged, does not hold what it says, or is of another version, for
-            another vehicle or grid.
-
+    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version, for
+    another vehicle or grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
         tensors = unpacked(files[_TENSORS])
         settings = _settings(header["settings"])
-        history, held_out = tensors.pop("history"), tensors.pop("held_out")
+        history, held_out = unpacked_epochs(tensors.pop("history")), tensors.pop("held_out")
         if held_out.dtype != np.int32 or held_out.ndim != 1 or (held_out < 0).any():
-            raise ValueError("held_out are no numbers of problems")
-        if (
-            history.shape != (max(1, len(history)), len(Epoch._fields))
-            or not np.isfinite(history[:, 2:]).all()
-        ):
-            raise ValueError("history is none of epochs")
+            raise ValueError("held_out does not consist of numbers of problems")
         shapes = {_WEIGHT + name: shape for name, shape in weight_shapes(settings.architecture).items()}
         rows = (len(tensors["biases"]), settings.architecture.dimensions)
         readout = {"centroids": rows, "vectors": rows, "biases": rows[:1], "popularity": (rows[0] - 1,)}
@@ -59,7 +51,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
             settings=settings,
             weights={name.removeprefix(_WEIGHT): tensors[name] for name in shapes},
             **{name: tensors[name] for name in _FLOATS},
-            history=tuple(Epoch(int(epoch), *metrics) for epoch, *metrics in history.tolist()),
+            history=history,
             held_out=held_out,
         )
     except (KeyError, TypeError, ValueError) as error:
@@ -67,13 +59,11 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
 
 
 def _settings(described: object) -> TrainingSettings:
-    """The settings that a header describes; ValueError or TypeError where no training had them."""
+    """The settings that a header describes. Raises ValueError or TypeError if no training had such."""
     if not isinstance(described, dict):
         raise ValueError(f"its settings are {short(described)}, wanted was an object")
-    sizes, others = (
-        described["architecture"],
-        {name: described[name] for name in described.keys() - {"architecture"}},
-    )
+    sizes = described["architecture"]
+    others = {name: value for name, value in described.items() if name != "architecture"}
     for name, usual in asdict(TrainingSettings()).items():
         value = others.get(name, usual)
         if not (type(value) is type(usual) or (type(value) is int and type(usual) is float)):

@@ -1,4 +1,4 @@
-"""The networks of learned hallucination on disk: with them the same problems can be made again."""
+"""Networks of learned hallucination on disk, with which the same problems can be made again."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ _WEIGHTS: Final = "weights.safetensors"
 
 
 def save_hallucinator(folder: Path, weights: Weights, vehicle: Vehicle = CAR) -> None:
-    """Write the weights as a folder, whole or not at all; the same ones give the same bytes."""
+    """Write ``weights`` as a ``folder``, whole or not at all; the same ones give the same bytes."""
     write_archive(folder, _KIND, vehicle, {}, {_WEIGHTS: packed(weights)})
 
 
 def load_hallucinator(folder: Path, vehicle: Vehicle = CAR) -> Weights:
-    """The weights in a folder.
+    """The weights in a ``folder``, made for a ``vehicle``.
 
-    StorageError: missing, damaged, of a newer version, for another vehicle, or of another network.
+    Raises StorageError if they are missing, damaged, of another version, vehicle or network.
     """
     _, files = read_archive(folder, _KIND, vehicle)
     try:
         weights = unpacked(files[_WEIGHTS])
         check_floats(weights, weight_shapes())
     except (KeyError, ValueError) as error:
-        raise StorageError(f"{folder} is no whole hallucinator ({error}); run hallucinate again.") from None
+        raise StorageError(
+            f"{folder} is not a whole hallucinator ({error}); run hallucinate again."
+        ) from None
     return weights

@@ -1,7 +1,8 @@
-"""Memories on disk: an archive of the encoder, of what reads it out, and of the plans as plain arrays.
+"""Memories on disk: archives of the encoder, its readout, and the plans as plain arrays.
 
-Small things are safetensors; what grows with the plans lies in ``.npy`` files that stay on the disk until
-they are used. ``encoder.onnx`` is the same network for other programs; recall makes its own from the weights.
+Small arrays are safetensors. Those that grow with the plans lie in ``.npy`` files, which stay on the disk
+until they are used. ``encoder.onnx`` is the same network for other programs; recall makes its own from the
+weights.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ _FILES: Final = {
     _WEIGHTS, _ONNX, _READOUT,
     "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy", "boxes.npy",
 }  # fmt: skip
-SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes are 10 MB
-_LISTS: Final = "lists.safetensors"  # of very many plans only
+SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes take 10 MB
+_LISTS: Final = "lists.safetensors"  # only in a memory of very many plans
 
 
 def save_memory(folder: Path, memory: Memory) -> None:
-    """Write a memory as a folder, whole or not at all; the same memory gives the same bytes."""
+    """Write a ``memory`` as a ``folder``, whole or not at all; the same memory gives the same bytes."""
     plans = store_plans(memory.plans, state_size(memory.vehicle))
     header = {
         "class": memory.class_name,
@@ -64,37 +65,28 @@ def save_memory(folder: Path, memory: Memory) -> None:
         "boxes.npy": memory.sweeps.boxes,
     }
     if memory.lists is not None:
-        kept = {name: getattr(memory.lists, name) for name in ("centres", "starts", "plans")}
-        files = {**files, _LISTS: packed(kept)}
+        lists = {name: getattr(memory.lists, name) for name in ("centres", "starts", "plans")}
+        files = {**files, _LISTS: packed(lists)}
     write_archive(folder, _KIND, memory.vehicle, header, files)
 
 
 def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
-    """The memory in a folder; its plans and boxes are read from the disk as they are used.
+    """The memory of a ``vehicle`` in a ``folder``; its plans and boxes are read from the disk when used.
 
     Checksums say that files are as they were written, not that they are true. So every plan is swept again,
-    and boxes and masks must be the plan's to the last bit (kernels give the same bits everywhere): no plan
-    is called free for boxes that are not its own, also where an older program left smaller ones. All plans,
-    not a sample: of 100 that takes 4 ms, of 10,000 a quarter of a second (hashing the files: a sixth). They
-    are compared and not replaced, so that processes go on sharing the files' memory.
+    and its boxes and masks must be the same to the last bit (kernels give the same bits everywhere): no plan
+    may count as free because of boxes that are not its own, or that an older program made smaller. For 100
+    plans that takes 4 ms, for 10,000 a quarter of a second (hashing the files: a sixth). Boxes are compared
+    and not replaced, so that processes go on sharing the files' memory.
 
-    Args:
-        folder: where it lies.
-        vehicle: the vehicle that it must be of.
-
-    Returns:
-        The memory.
-
-    Raises:
-        StorageError: it is missing, damaged, does not hold what it says, or is of another version, for
-            another vehicle or grid.
-
+    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version, for
+    another vehicle or grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
         if files.keys() - {_LISTS} != _FILES:
-            odd = ", ".join(sorted((files.keys() - {_LISTS}) ^ _FILES))
-            raise ValueError(f"it lacks or has too much of: {odd}")
+            different = ", ".join(sorted((files.keys() - {_LISTS}) ^ _FILES))
+            raise ValueError(f"missing or too many: {different}")
         weights, readout = unpacked(files[_WEIGHTS]), unpacked(files[_READOUT])
         architecture = architecture_of(weights)
         if header["architecture"] != _sizes(architecture):
@@ -104,6 +96,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         check_floats(weights, weight_shapes(architecture))
         check_floats(readout, {"centroids": rows, "vectors": rows, "biases": rows[:1]})
         masks = array_of(files["masks.npy"], "<u8", (GRID,))
+        rows_of_lists = {"vectors": readout["vectors"], "biases": readout["biases"]}
         return Memory(
             class_name=checked_name(text_of(header["class"], "class")),
             vehicle=vehicle,
@@ -116,16 +109,11 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
             objective=_objective(header["objective"]),
             weights=weights,
             metadata=_metadata(header["metadata"]),
-            lists=(
-                lists_with(**unpacked(files[_LISTS]), vectors=readout["vectors"], biases=readout["biases"])
-                if _LISTS in files
-                else None
-            ),
+            lists=lists_with(**unpacked(files[_LISTS]), **rows_of_lists) if _LISTS in files else None,
         )
     except (KeyError, TypeError, ValueError, StorageError) as error:
-        raise StorageError(
-            f"{folder} is no whole memory ({str(error).rstrip('.')}); build it again."
-        ) from None
+        reason = str(error).rstrip(".")
+        raise StorageError(f"{folder} is no whole memory ({reason}); build it again.") from None
 
 
 def _plans(files: Mapping[str, Contents], vehicle: Vehicle) -> StoredPlans:
@@ -135,23 +123,17 @@ def _plans(files: Mapping[str, Contents], vehicle: Vehicle) -> StoredPlans:
         array_of(files["plan_starts.npy"], "<i8"),
         array_of(files["dt.npy"], "<f8"),
     )
+    most = LARGEST_COORDINATE_M
     for numbers in (plans.states, plans.controls):
-        if (
-            not -LARGEST_COORDINATE_M
-            <= numbers.min(initial=0.0)
-            <= numbers.max(initial=0.0)
-            <= LARGEST_COORDINATE_M
-        ):
-            raise ValueError(
-                f"its plans have numbers that are not finite or beyond {LARGEST_COORDINATE_M:.0f}"
-            )
+        if not -most <= numbers.min(initial=0.0) <= numbers.max(initial=0.0) <= most:
+            raise ValueError(f"its plans have numbers that are not finite or beyond {most:.0f}")
     if (plans.dt != vehicle.dt).any():
         raise ValueError(f"its plans have other steps than the vehicle's, {vehicle.dt} s")
     return plans
 
 
 def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
-    """The sweeps whose boxes were stored; ValueError unless these and the masks are those of the plans."""
+    """The sweeps with the stored boxes. Raises ValueError if boxes or masks are not those of the plans."""
     sweeps = sweeps_with(boxes, plans)
     for first in range(0, len(plans), SWEPT_AT_ONCE):
         some = slice(first, first + SWEPT_AT_ONCE)
@@ -174,7 +156,7 @@ def _metadata(value: object) -> dict[str, Any]:
         raise ValueError(f"its metadata are {short(value)}, wanted was an object")
     scales = value.get("scales", [1.0])
     if not isinstance(scales, list) or not scales or len({scale_of(scale) for scale in scales}) < len(scales):
-        raise ValueError(f"its scales are {short(scales)}, wanted were some different numbers")
+        raise ValueError(f"its scales are {short(scales)}, wanted were distinct numbers")
     return value
 
 

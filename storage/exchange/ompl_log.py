@@ -1,4 +1,4 @@
-"""Attempts as OMPL benchmark logs, one a problem class, as ``ompl_benchmark_statistics`` reads them."""
+"""Attempts as OMPL benchmark logs, one a problem class, which ``ompl_benchmark_statistics`` reads."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from storage.places.files import whole_folder
 
 
 def write_ompl_logs(folder: Path, classes: dict[str, Path], origin: Origin) -> None:
-    """Make a folder of logs ``<class>.log``, whole or not at all, of the attempts below each class's folder.
+    """Make a ``folder`` of logs ``<class>.log``, whole or not at all.
 
-    The rows go through a database for Planner Arena, which sorts them by planner on the disk.
+    The rows go through a database for Planner Arena, which sorts them by planner on the disk. ``classes``:
+    folders of attempts by class. ``origin``: of the run.
     """
     with whole_folder(folder) as temporary:
         sorted_rows = temporary / "attempts.db"
@@ -27,7 +28,7 @@ def write_ompl_logs(folder: Path, classes: dict[str, Path], origin: Origin) -> N
 
 
 def _write_log(log: TextIO, database: sqlite3.Connection, experiment: tuple[object, ...]) -> None:
-    """One experiment, in the words that the reader looks for."""
+    """Write one experiment in the words that the reader looks for."""
     number, name, total, seconds, megabytes, count, version, host, processor, date, seed, setup = experiment
     library, _, release = str(version).partition(" ")
     log.write(f"{library} version {release}\nExperiment {name}\nRunning on {host}\nStarting at {date}\n")
@@ -52,9 +53,8 @@ def _write_log(log: TextIO, database: sqlite3.Connection, experiment: tuple[obje
         log.write(f"{len(PROPERTIES)} properties for each run\n")
         log.writelines(f"{kind} {affinity}\n" for kind, affinity in PROPERTIES.items())
         log.write(f"{runs} runs\n")
-        asked = (
-            f"SELECT {', '.join(PROPERTIES)} FROM runs WHERE experimentid = ? AND plannerid = ? ORDER BY id"
-        )
-        for row in database.execute(asked, (number, planner)):
+        columns = ", ".join(PROPERTIES)
+        query = f"SELECT {columns} FROM runs WHERE experimentid = ? AND plannerid = ? ORDER BY id"
+        for row in database.execute(query, (number, planner)):
             log.write("".join("; " if value is None else f"{value}; " for value in row) + "\n")
         log.write(".\n")

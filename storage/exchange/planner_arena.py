@@ -1,7 +1,8 @@
-"""Attempts as the SQLite database that Planner Arena reads, as OMPL's own benchmark statistics would make it.
+"""Attempts as the SQLite database that Planner Arena reads, like that of OMPL's own benchmark statistics.
 
-Tables and first columns are read by position, so they stand in OMPL's order; attempts stream through, a shard
-at a time. An experiment is a problem class of the run, a run of a planner is one problem of it.
+Planner Arena reads tables and the first columns by position, so they stand in OMPL's order. Attempts stream
+through, one shard at a time. An experiment is a problem class of the run; a run of a planner is one problem
+of it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _SECONDS: Final = (
     "occupancy_seconds", "encode_seconds", "recall_seconds", "scene_seconds", "check_seconds",
     "guide_seconds", "repair_seconds", "roadmap_seconds", "search_seconds",
 )  # fmt: skip
-PROPERTIES: Final = {  # of each attempt, the first four where readers expect them
+PROPERTIES: Final = {  # of each attempt; readers expect the first four in these columns
     "time": "REAL",  # s
     "memory": "REAL",  # MB, not measured
     "solved": "BOOLEAN",
@@ -73,25 +74,28 @@ class Origin(NamedTuple):
 
     run_name: str
     version: str
-    setup: str  # settings of the run, a text of any lines
+    setup: str  # settings of the run, as text
     processor: str | None
     date: datetime
 
 
 def enums() -> dict[str, list[str]]:
-    """The texts behind the numbers of each ENUM."""
+    """The texts that the numbers of each ENUM stand for."""
     return {"status": [str(each) for each in Status], "source": list(SOURCES)}
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """A database that is committed at the end and closed in any case."""
+    """The database at ``path``, committed at the end unless something is raised, and always closed."""
     with closing(sqlite3.connect(path)) as database, database:
         yield database
 
 
 def write_planner_arena(path: Path, classes: dict[str, Path], origin: Origin) -> None:
-    """Make the database of the attempts below the folder of each class; StorageError where one has none."""
+    """Make a database at ``path`` of the attempts below the folder of each class.
+
+    ``classes``: folders by class. ``origin``: of the run. Raises StorageError if a folder has no attempts.
+    """
     with opened(path) as database:
         database.executescript(_SCHEMA)
         database.executemany(
@@ -99,30 +103,30 @@ def write_planner_arena(path: Path, classes: dict[str, Path], origin: Origin) ->
             [(name, i, text) for name, texts in enums().items() for i, text in enumerate(texts)],
         )
         planners: dict[tuple[str, str], int] = {}
-        for name, place in classes.items():
-            _add_experiment(database, f"{origin.run_name}/{name}", place, origin, planners)
+        for name, folder in classes.items():
+            _add_experiment(database, f"{origin.run_name}/{name}", folder, origin, planners)
 
 
 def _add_experiment(
     database: sqlite3.Connection,
     name: str,
-    place: Path,
+    folder: Path,
     origin: Origin,
     planners: dict[tuple[str, str], int],
 ) -> None:
-    """One class: its rows go through a temporary table, which brings those of a planner together."""
+    """Add one class. Its rows go through a temporary table, which brings those of a planner together."""
     columns = ", ".join(PROPERTIES)
     database.execute(f"CREATE TEMP TABLE staged (name, settings, {columns})")
     marks = ", ".join("?" * (2 + len(PROPERTIES)))
     hosts: set[str] = set()
     seeds: set[str] = set()
-    for attempts in attempt_frames(place, without=("recalled",)):
+    for attempts in attempt_frames(folder, without=("recalled",)):
         hosts |= set(attempts["host"].dropna())
         seeds |= {str(seed) for seed in attempts["seed"].unique()}
         database.executemany(f"INSERT INTO staged VALUES ({marks})", _rows(attempts))
     (total,) = database.execute("SELECT sum(time) FROM staged").fetchone()
-    asked = database.execute("SELECT name, settings, count(*) FROM staged GROUP BY 1, 2 ORDER BY min(rowid)")
-    counts = {(planner, settings): count for planner, settings, count in asked}
+    groups = database.execute("SELECT name, settings, count(*) FROM staged GROUP BY 1, 2 ORDER BY min(rowid)")
+    counts = {(planner, settings): count for planner, settings, count in groups}
     limits = Limits()
     cursor = database.execute(
         "INSERT INTO experiments VALUES (NULL, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -134,8 +138,8 @@ def _add_experiment(
     )  # fmt: skip
     for key in counts:
         if key not in planners:
-            found = database.execute("INSERT INTO plannerConfigs VALUES (NULL, ?, ?)", key)
-            planners[key] = int(found.lastrowid or 0)
+            inserted = database.execute("INSERT INTO plannerConfigs VALUES (NULL, ?, ?)", key)
+            planners[key] = int(inserted.lastrowid or 0)
         database.execute(
             f"INSERT INTO runs (experimentid, plannerid, {columns}) "
             f"SELECT ?, ?, {columns} FROM staged WHERE name = ? AND settings = ? ORDER BY rowid",
@@ -145,25 +149,25 @@ def _add_experiment(
 
 
 def _rows(attempts: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
-    """Planner name, planner settings and ``PROPERTIES`` of each attempt; what is not known is None."""
-    rows, known = configured(attempts)
+    """Planner name, planner settings and ``PROPERTIES`` of each attempt; unknown values are None."""
+    rows, configurations = configured(attempts)
     keys = pd.DataFrame({name: rows.get(name) for name in ("planner", "configuration", "memory", "vehicle")})
-    group, asked = pd.factorize(pd.MultiIndex.from_frame(keys))
-    names = [_name_and_settings(known, *each) for each in asked]
+    group, distinct = pd.factorize(pd.MultiIndex.from_frame(keys))
+    names = [_name_and_settings(configurations, *key) for key in distinct]
     table = rows.assign(solved=rows["solved"].astype(int), memory=None)
-    table["problem_id"] = [" ".join(each.split()).replace("; ", ";") for each in rows["problem_id"]]
+    table["problem_id"] = [" ".join(id_.split()).replace("; ", ";") for id_ in rows["problem_id"]]
     for name, texts in enums().items():
         table[name] = table[name].map({text: i for i, text in enumerate(texts)})
     table = pd.DataFrame({name: table.get(_MEANT.get(name, name)) for name in PROPERTIES}, rows.index)
     values = table.astype(object).where(table.notna(), None).itertuples(index=False, name=None)
-    return ((*names[i], *each) for i, each in zip(group, values, strict=True))
+    return ((*names[i], *row) for i, row in zip(group, values, strict=True))
 
 
 def _name_and_settings(
-    known: dict[str, Configuration], planner: str, label: str, memory: object, vehicle: object
+    configurations: dict[str, Configuration], planner: str, label: str, memory: object, vehicle: object
 ) -> tuple[str, str]:
-    """Like ``gust closed 5, memory trap``, and its settings as OMPL's reader joins their lines."""
+    """A name like ``gust closed 5, memory trap``, and settings as OMPL's reader joins their lines."""
     of = f", memory {memory}" if isinstance(memory, str) else ""
-    settings = {"planner": planner, **known[label]._asdict(), "memory": memory, "vehicle": vehicle}
-    said = [f"{name} = {value}" for name, value in settings.items() if value == value and value is not None]
-    return f"{planner} {label}{of}", "".join(f"{line}\n;" for line in said)
+    settings = {"planner": planner, **configurations[label]._asdict(), "memory": memory, "vehicle": vehicle}
+    lines = [f"{name} = {value}" for name, value in settings.items() if value == value and value is not None]
+    return f"{planner} {label}{of}", "".join(f"{line}\n;" for line in lines)

@@ -1,4 +1,4 @@
-"""Plans as files: what anyone needs to re-simulate and judge one."""
+"""Plans in files: all that is needed to simulate a plan again and judge it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FIELDS: Final = (
 
 @dataclass(frozen=True, eq=False)
 class PlanRecord:
-    """A plan and where it came from; without a plan, how the attempt failed."""
+    """A plan and where it came from, or how the attempt failed."""
 
     problem_id: str
     status: str
@@ -34,15 +34,16 @@ class PlanRecord:
     planner: str
     assist: str
     planning_seconds: float
-    plan: Plan | None  # in the lengths of its problem; files hold those of the world outside
+    plan: Plan | None  # in the lengths of its problem, whereas files hold those of the world outside
     vehicle: Vehicle = CAR
     scale: float = 1.0  # metres of the world outside in one of the plan's
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
-    """Write the plan contract's JSON; without a plan, states and controls are empty, lengths null.
+    """Write a ``record`` to ``path`` as the plan contract's JSON.
 
-    At another scale than 1 positions, speeds and accelerations are those of the vehicle made as much larger.
+    Without a plan, states and controls are empty and lengths null. If the scale is not 1, positions, speeds
+    and accelerations are those of a vehicle that is so much larger.
     """
     plan = record.plan and scaled(record.plan, record.scale)
     scale = {} if record.scale == 1.0 else {"scale": record.scale}
@@ -68,19 +69,10 @@ def write_plan(path: Path, record: PlanRecord) -> None:
 
 
 def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
-    """Read the plan contract's JSON.
+    """The plan of a ``vehicle`` in the file at ``path``, in its problem's lengths, and where it came from.
 
-    Args:
-        path: the file.
-        vehicle: the vehicle that the plan must be for.
-
-    Returns:
-        The plan in the lengths of its problem, and where it came from.
-
-    Raises:
-        StorageError: the file is missing or no JSON, has an unknown field or lacks one, was made for another
-            vehicle, or holds what no vehicle could have driven.
-
+    Raises StorageError if the file is missing or is not JSON, has an unknown field or lacks one, was made for
+    another vehicle, or holds what no vehicle could have driven.
     """
     fields = read_json(path)
     try:
@@ -132,7 +124,7 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
 
 
 def _rows(rows: object, name: str) -> Floats:
-    """Numbers ``[T, n]``; no control is ``[0, 2]``."""
+    """Numbers ``[T, n]``; an empty list is ``[0, 2]``."""
     try:
         array = np.array(rows)
     except ValueError:  # rows of different lengths, or lists without end
@@ -140,5 +132,5 @@ def _rows(rows: object, name: str) -> Floats:
     if array.shape == (0,):
         return np.empty((0, 2))
     if array.dtype.kind not in "if" or array.ndim != 2:
-        raise ValueError(f"has {name} that are no rows of numbers; write the plan again")
+        raise ValueError(f"has {name} that are not rows of numbers; write the plan again")
     return array.astype(float)

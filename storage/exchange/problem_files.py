@@ -1,4 +1,4 @@
-"""Files of problems as their objects, whole or a slice: nothing is held in memory but what is read now."""
+"""Files of problems, read object by object, whole or in slices, with only the current ones in memory."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,50 +20,48 @@ from storage.places.files import read_text
 FORMATS: Final = (".json", ".jsonl", ".parquet")
 FIELDS: Final = ("id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale")
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
-SLICES_A_GROUP: Final = 16  # who wants the last rows of a row group has to decode those before
+SLICES_A_GROUP: Final = 16  # to read the last rows of a row group, those before are decoded too
 BUFFER_BYTES: Final = 1 << 20
 
 
 @dataclass(frozen=True)
 class ProblemSlice:
-    """Some consecutive problems of a file, and where to find them without reading what is before."""
+    """Some consecutive problems of a file, and where they begin, so that nothing before need be read."""
 
     path: Path
-    first: int  # number of its first line or problem, counted from 1
+    first: int  # number of the first line or problem, counted from 1
     count: int  # problems
-    place: int  # of a text the byte that it begins with; of a Parquet file the row in its group
+    offset: int  # in a text the first byte; in a Parquet file the first row in the row group
     group: int  # row group; 0 in a text
-    digest: str  # of what it is read from
+    digest: str  # of the content that it is read from
 
 
 def format_of(path: Path) -> str:
-    """The ending of a file of problems; a StorageError for another ending."""
+    """The ending of ``path``, which says its format. Raises StorageError if problems have no such files."""
     if path.suffix not in FORMATS:
         raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
     return path.suffix
 
 
 def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
-    """Objects and their numbers: of the line, or counted from 1.
+    """The objects in the file at ``path`` and their numbers, of the line or counted from 1.
 
-    StorageError: the file is missing, or no whole file of its format; the message names the line.
+    Raises StorageError if the file is missing or damaged; its message names the line.
     """
     match format_of(path):
         case ".json":
             yield 1, parse_json(read_text(path), str(path))
         case ".jsonl":
-            for number, line in enumerate(_lines(path), start=1):
-                if line.strip():
-                    yield number, parse_json(line, f"{path} line {number}")
+            yield from _objects(path)
         case _:
             yield from enumerate(_rows(path), start=1)
 
 
 def slices_of(path: Path, size: int) -> list[ProblemSlice]:
-    """The file cut into slices of ``size`` problems, those of a long row group longer; a text is read once.
+    """The file at ``path`` in slices of ``size`` problems, or more in a long row group; a text is read once.
 
-    The cut and its digests depend on the file's content alone, so that a corrected line leaves the slices
-    before as they are. StorageError: the file is missing, or no whole file of its format.
+    Slices and digests depend on the file's content alone, so a corrected line leaves the slices before it as
+    they are. Raises StorageError if the file is missing or damaged.
     """
     match format_of(path):
         case ".json":
@@ -75,27 +74,28 @@ def slices_of(path: Path, size: int) -> list[ProblemSlice]:
 
 
 def raw_slice(piece: ProblemSlice) -> Iterator[tuple[int, Any]]:
-    """The objects of a slice and their numbers, as ``raw_problems`` gives them."""
+    """The objects of the slice ``piece`` and their numbers, as ``raw_problems`` gives them."""
     match format_of(piece.path):
         case ".json":
             yield from raw_problems(piece.path)
         case ".jsonl":
-            found = 0
-            for number, line in enumerate(_lines(piece.path, piece.place), start=piece.first):
-                if line.strip():
-                    yield number, parse_json(line, f"{piece.path} line {number}")
-                    found += 1
-                if found == piece.count:
-                    break
+            yield from islice(_objects(piece.path, piece.offset, piece.first), piece.count)
         case _:
-            rows = _rows(piece.path, [piece.group], piece.place, piece.count)
+            rows = _rows(piece.path, [piece.group], piece.offset, piece.count)
             yield from enumerate(rows, start=piece.first)
 
 
-def _lines(path: Path, place: int = 0) -> Iterator[bytes]:
+def _objects(path: Path, offset: int = 0, first: int = 1) -> Iterator[tuple[int, Any]]:
+    """The objects in the lines of a text from a byte on, where line ``first`` begins."""
+    for number, line in enumerate(_lines(path, offset), start=first):
+        if line.strip():
+            yield number, parse_json(line, f"{path} line {number}")
+
+
+def _lines(path: Path, offset: int = 0) -> Iterator[bytes]:
     try:
         with path.open("rb") as file:
-            file.seek(place)
+            file.seek(offset)
             yield from file
     except FileNotFoundError:
         raise StorageError(f"{path} does not exist; check the name.") from None
@@ -105,15 +105,15 @@ def _lines(path: Path, place: int = 0) -> Iterator[bytes]:
 
 def _slices_of_lines(path: Path, size: int) -> list[ProblemSlice]:
     slices: list[ProblemSlice] = []
-    first, place, count, at, digest = 1, 0, 0, 0, hashlib.sha256()
+    first, offset, count, end, digest = 1, 0, 0, 0, hashlib.sha256()
     for number, line in enumerate(_lines(path), start=1):
         digest.update(line)
-        at += len(line)
+        end += len(line)
         count += bool(line.strip())
         if count == size:
-            slices.append(ProblemSlice(path, first, count, place, 0, digest.hexdigest()))
-            first, place, count, digest = number + 1, at, 0, hashlib.sha256()
-    return slices + ([ProblemSlice(path, first, count, place, 0, digest.hexdigest())] if count else [])
+            slices.append(ProblemSlice(path, first, count, offset, 0, digest.hexdigest()))
+            first, offset, count, digest = number + 1, end, 0, hashlib.sha256()
+    return slices + ([ProblemSlice(path, first, count, offset, 0, digest.hexdigest())] if count else [])
 
 
 def _slices_of_groups(path: Path, size: int) -> list[ProblemSlice]:
@@ -123,8 +123,10 @@ def _slices_of_groups(path: Path, size: int) -> list[ProblemSlice]:
         for group in range(file.metadata.num_row_groups):
             described = file.metadata.row_group(group)
             columns = [described.column(i) for i in range(described.num_columns)]
-            begin = min((each.dictionary_page_offset or each.data_page_offset for each in columns), default=0)
-            digest = _digest(content, begin, sum(each.total_compressed_size for each in columns))
+            begin = min(
+                (column.dictionary_page_offset or column.data_page_offset for column in columns), default=0
+            )
+            digest = _digest(content, begin, sum(column.total_compressed_size for column in columns))
             rows = described.num_rows
             step = max(size, -(-rows // SLICES_A_GROUP))
             slices += [
@@ -147,7 +149,7 @@ def _digest(content: Any, begin: int, size: int) -> str:
 def _rows(
     path: Path, groups: list[int] | None = None, first: int = 0, count: int | None = None
 ) -> Iterator[Any]:
-    """Rows of all row groups, or ``count`` from row ``first`` of some."""
+    """The rows of all row groups, or ``count`` rows from row ``first`` of some."""
     last = None if count is None else first + count
     with _opened(path) as file:
         at = 0

@@ -1,4 +1,4 @@
-"""Problems as files that people hand in and get: ``.json`` (one), ``.jsonl`` (one a line), ``.parquet``."""
+"""Problems in the files of users: ``.json`` (one), ``.jsonl`` (one a line), ``.parquet``."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ _REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
 
 
 def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
-    """All problems of a file, checked (``iterate_problems``)."""
+    """All problems in the file at ``path``, checked for a ``vehicle`` as by ``iterate_problems``."""
     return list(iterate_problems(path, vehicle))
 
 
 def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
-    """The problems of a file one by one, each checked for a vehicle when its turn comes.
+    """The problems in the file at ``path`` one by one, each checked for a ``vehicle`` when it is read.
 
-    StorageError: a problem is malformed, impossible or has another's id; the message names file, line, id
-    and what to do.
+    Raises StorageError if a problem is malformed, impossible or has the id of another; the message names
+    file, line and id, and what to do.
     """
-    for place, problem in problems_or_faults(path, vehicle):
+    for where, problem in problems_or_faults(path, vehicle):
         if isinstance(problem, str):
-            raise StorageError(f"{place}: {problem}.")
+            raise StorageError(f"{where}: {problem}.")
         yield problem
 
 
 def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
-    """Each problem of a file, or what is wrong with it, and where it stands.
+    """Where each problem in the file at ``path`` stands, and the problem or what is wrong with it.
 
-    StorageError: the file itself is missing, unreadable or of no known format.
+    ``vehicle``: that has to have room at the start. Raises StorageError if the file itself is missing,
+    unreadable or of an unknown format.
     """
     return _checked(path, raw_problems(path), vehicle)
 
 
 def problems_or_faults_of(piece: ProblemSlice, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
-    """The same for a slice of a file; an id may still occur in another slice."""
+    """Like ``problems_or_faults``, for the slice ``piece``; an id may occur in another slice, too."""
     return _checked(piece.path, raw_slice(piece), vehicle)
 
 
@@ -60,28 +61,28 @@ def _checked(
 ) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
     for number, fields in raw:
-        place = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
+        where = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
         identity = fields.get("id") if isinstance(fields, Mapping) else None
-        named = f"{place} (id {short(identity)})" if isinstance(identity, str) and identity else place
+        with_id = f"{where} (id {short(identity)})" if isinstance(identity, str) and identity else where
         try:
             name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
             problem = problem_of(fields, name, vehicle)
         except ValueError as error:
-            yield named, str(error)
+            yield with_id, str(error)
             continue
         if problem.id in seen:
-            yield place, f'id "{problem.id}" occurs twice; give every problem its own'
+            yield where, f'id "{problem.id}" occurs twice; give every problem its own'
             continue
         seen.add(problem.id)
-        yield place, problem
+        yield where, problem
 
 
 def write_problems(path: Path, problems: Sequence[Problem]) -> None:
-    """Write problems, whole or not at all, in the format that the file's ending says.
+    """Write ``problems`` to ``path``, whole or not at all, in the format of its ending.
 
-    Each convex piece becomes a polygon; ``groups`` keeps together those of one obstacle. Files hold the
-    lengths of the world outside: a problem's own times its scale. Reading gives the same problems back,
-    exactly, or to a last digit where the scale is not 1.
+    Each convex piece becomes a polygon; ``groups`` says which belong to one obstacle. Files hold the lengths
+    of the world outside, a problem's own times its scale. Reading gives the same problems back, exactly, or
+    to the last digit if the scale is not 1.
     """
     rows = [fields_of(problem) for problem in problems]
     match format_of(path):
@@ -97,7 +98,10 @@ def write_problems(path: Path, problems: Sequence[Problem]) -> None:
 
 
 def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
-    """The problem that a contract's object describes, checked; ValueError says what is wrong with it."""
+    """The problem that the contract's object ``fields`` describes, checked for a ``vehicle``.
+
+    ``default_id``: its id if it has none. Raises ValueError, which says what is wrong with it.
+    """
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
     check_fields(list(fields), FIELDS)
@@ -170,7 +174,7 @@ def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
 
 
 def fields_of(problem: Problem) -> dict[str, Any]:
-    """The contract's object that describes a problem (``problem_of``)."""
+    """The contract's object that describes a ``problem``, as ``problem_of`` takes it."""
     obstacles, scale = problem.obstacles, problem.scale
     x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()

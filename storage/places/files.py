@@ -1,4 +1,4 @@
-"""Whole files and whole folders: what is there under its name is complete, whatever was killed when."""
+"""Whole files and whole folders: whatever has its name is complete, whichever process was killed."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ REMOVAL_SECONDS: Final = 0.2
 
 @contextmanager
 def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
-    """Yield a temporary name beside ``path``; put it in the place of ``path`` once it is on the disk.
+    """Yield a temporary name beside ``path``, and rename the file to ``path`` once it is on the disk.
 
-    Where ``path`` stands for an object (``mirror.py``), it is put into storage first, with the ``note``.
-    Its permissions are those of ``mode`` that the umask leaves.
+    ``note``: what it was made from; if ``path`` stands for an object (``mirror.py``), it is put into storage
+    first, with the note. ``mode``: permissions, from which the umask is taken.
 
-    StorageError: it could not be written (disk full, no permission); ``path`` is as it was.
+    Raises StorageError if it cannot be written (disk full, no permission); ``path`` is then as it was.
     """
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -48,9 +48,9 @@ def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
 
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
-    """Yield an empty temporary folder beside ``path``; put it in the place of ``path`` once it is full.
+    """Yield an empty temporary folder beside ``path``, and rename it to ``path`` once it is on the disk.
 
-    StorageError: it could not be written; ``path`` is as it was.
+    Raises StorageError if it cannot be written; ``path`` is then as it was.
     """
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -76,10 +76,11 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def locked(path: Path, what: str) -> Iterator[None]:
-    """Hold the lock file ``path`` for this process; a killed one loses it.
+    """Hold the lock file ``path`` for this process; a killed process loses it.
 
-    InUseError: another process holds it; the message begins with ``what`` is in use, and says who it is.
-    OSError: it cannot be opened.
+    ``what``: is in use while another process holds it, for the message.
+
+    Raises InUseError if another process holds it, and says which; OSError if it cannot be opened.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -99,7 +100,7 @@ def locked(path: Path, what: str) -> Iterator[None]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Delete what killed writers left below ``folder``; only while nobody else writes there."""
+    """Delete what killed writers left below ``folder``; only while no other process writes there."""
     for leftover in [*folder.rglob(f".*{PARTIAL}")]:
         if leftover.is_dir():
             shutil.rmtree(leftover, ignore_errors=True)
@@ -108,7 +109,7 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def remove_folder(folder: Path) -> None:
-    """Delete a folder with all that is in it, also where somebody who is about to end still writes to it."""
+    """Delete a ``folder`` and its contents, even if a process that is about to end still writes there."""
     for _ in range(REMOVALS):
         shutil.rmtree(folder, ignore_errors=True)
         if not folder.exists():
@@ -117,9 +118,9 @@ def remove_folder(folder: Path) -> None:
 
 
 def write_json(path: Path, value: object, indent: int | None = 2) -> None:
-    """Write a value as JSON, whole or not at all; the same value gives the same bytes.
+    """Write a ``value`` as JSON to ``path``, whole or not at all; the same value gives the same bytes.
 
-    Without ``indent`` it is on one line, ten times as fast.
+    ``indent``: spaces a level; None writes one line, ten times as fast.
     """
     text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
     with whole_file(path) as temporary:
@@ -127,17 +128,17 @@ def write_json(path: Path, value: object, indent: int | None = 2) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """The value in a JSON file; a StorageError where it is missing or no JSON."""
+    """The value in the JSON file at ``path``. Raises StorageError if it is missing or is not JSON."""
     return parse_json(read_text(path), str(path))
 
 
 def read_text(path: Path) -> str:
-    """The text of a file; a StorageError where it is missing, unreadable or not UTF-8."""
+    """The text of the file at ``path``. Raises StorageError if it is missing, unreadable or not UTF-8."""
     return local_text(fetch(path))
 
 
 def local_text(path: Path) -> str:
-    """Like ``read_text``, of a file that is here, such as one of a folder that was fetched."""
+    """Like ``read_text``, for a file that need not be fetched, such as one in a folder that was fetched."""
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

@@ -1,9 +1,9 @@
-"""A local copy of what lies in object storage: put there whole when written, fetched when read.
+"""A local copy of object storage: files are put there whole when written, and fetched when read.
 
 A path below the cache folder stands for the object of the same name:
 ``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. So any process of any machine knows from a
-path alone which object it is; to paths elsewhere nothing here applies. The object is the truth, the file its
-copy, marked by its time as the copy of that very content. A folder that must appear at once is one object: a
+path alone which object it is; nothing here applies to other paths. The object counts, the file is its copy,
+and the file's time marks which content it is a copy of. A folder that must appear at once is one object, a
 tar.
 """
 
@@ -27,7 +27,7 @@ from urllib.parse import urlsplit
 
 from storage.errors import StorageError
 from storage.places import objects
-from storage.places.objects import Place
+from storage.places.objects import Address
 
 SCHEME: Final = re.compile(r"s3:/{1,2}(?P<bucket>[^/]+)/?(?P<key>.*)")  # pathlib makes one slash of two
 FOLDER: Final = ".tar"
@@ -39,52 +39,52 @@ _seen: ContextVar[set[Path] | None] = ContextVar("seen", default=None)
 
 
 def is_remote(place: Path | str) -> bool:
-    """Whether a place is in object storage rather than a folder."""
+    """Whether a ``place`` is in object storage, like ``s3://bucket/key``, rather than a path."""
     return SCHEME.fullmatch(str(place)) is not None
 
 
 def local_place(place: Path | str) -> Path:
-    """The path that stands for ``s3://bucket/key``; any other place is its own."""
+    """The path that stands for a ``place`` like ``s3://bucket/key``; a path stands for itself."""
     remote = SCHEME.fullmatch(str(place))
     if remote is None:
         return Path(place)
     parts = [part for part in remote["key"].split("/") if part]
     if {".", ".."} & {remote["bucket"], *parts}:
-        raise StorageError(f"{place} names no place in object storage; give s3://bucket/folder.")
+        raise StorageError(f"{place} is not a name in object storage; give s3://bucket/folder.")
     server = urlsplit(objects.endpoint()).netloc.rpartition("@")[2] or "s3.amazonaws.com"
     return cache_folder() / re.sub(r"[^A-Za-z0-9.-]", "-", server) / remote["bucket"] / Path(*parts)
 
 
 def shown(path: Path) -> str:
-    """How people and other programs call a place: ``s3://bucket/key`` or the path."""
-    place = object_of(path)
-    return str(path) if place is None else str(place).rstrip("/")
+    """The name of a ``path`` for people and other programs: ``s3://bucket/key``, or the path itself."""
+    address = object_of(path)
+    return str(path) if address is None else str(address).rstrip("/")
 
 
 def uri_of(path: Path) -> str:
-    """The same as an address: ``s3://…`` or ``file://…``."""
+    """The URI of a ``path``: ``s3://…`` or ``file://…``."""
     return path.absolute().as_uri() if object_of(path) is None else shown(path)
 
 
 def cache_folder() -> Path:
-    """Where copies lie: $MOTION_MEMORY_CACHE, or a folder in the user's own cache."""
+    """The folder of the copies: $MOTION_MEMORY_CACHE, or a folder in the user's own cache."""
     own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "motion-memory" / "s3"
     return Path(os.environ.get("MOTION_MEMORY_CACHE") or own).absolute()
 
 
-def object_of(path: Path) -> Place | None:
-    """The object that a path stands for; None where it is a path like any other."""
+def object_of(path: Path) -> Address | None:
+    """The object that a ``path`` stands for; None if it is a path like any other."""
     cache = cache_folder()
     if not path.is_relative_to(cache):
         return None
     _, bucket, *parts = (*path.relative_to(cache).parts, "", "")
     key = "/".join(part for part in parts if part)
-    return Place(bucket, key) if bucket else None
+    return Address(bucket, key) if bucket else None
 
 
 @contextmanager
 def looking_once() -> Iterator[None]:
-    """Inside, what was looked up once is not asked for again: for a chunk, whose inputs are finished."""
+    """Inside, storage is asked only once for each object: for a chunk, whose inputs are finished."""
     token = _seen.set(set())
     try:
         yield
@@ -93,64 +93,67 @@ def looking_once() -> Iterator[None]:
 
 
 def publish(written: Path, path: Path, note: str = "") -> None:
-    """Put what was written, for ``path``, into object storage if ``path`` stands for an object."""
-    place = object_of(path)
-    if place is not None:
-        _mark(written, objects.upload(written, place, note))
+    """Put the file ``written`` for ``path`` into object storage, if ``path`` stands for an object.
+
+    ``note``: what it was made from.
+    """
+    address = object_of(path)
+    if address is not None:
+        _mark(written, objects.upload(written, address, note))
         _see(path)
 
 
 def publish_folder(written: Path, path: Path) -> None:
-    """The same for a folder of files, as one object."""
-    place = object_of(path)
-    if place is None:
+    """Like ``publish``, for a folder of files, which becomes one object."""
+    address = object_of(path)
+    if address is None:
         return
     with _scratch(path) as scratch:
         packed = scratch / "whole.tar"
         with tarfile.open(packed, "w") as tar:
             for file in sorted(written.iterdir()):
                 tar.add(file, file.name)
-        etag = objects.upload(packed, _as_folder(place))
+        etag = objects.upload(packed, _as_folder(address))
     _mark(written, etag)
     _see(path)
 
 
 def fetch(path: Path) -> Path:
-    """The path, where now lies what the object holds: nothing if there is none."""
-    place = object_of(path)
-    if place is None or not _unseen(path):
+    """Fetch the object that ``path`` stands for; without an object, there is no file at the path either."""
+    address = object_of(path)
+    if address is None or not _unseen(path):
         return path
-    found = objects.look(place)
-    if found is not None and not _is_copy(path, found.etag):
+    head = objects.head(address)
+    if head is not None and not _is_copy(path, head.etag):
         with _scratch(path) as scratch:
-            if objects.download(place, scratch / path.name):
-                _mark(scratch / path.name, found.etag)
+            if objects.download(address, scratch / path.name):
+                _mark(scratch / path.name, head.etag)
                 (scratch / path.name).replace(path)
-            else:  # it went in between
-                found = None
-    if found is None:
+            else:  # it was deleted meanwhile
+                head = None
+    if head is None:
         path.unlink(missing_ok=True)
     _see(path)
     return path
 
 
 def fetch_folder(path: Path) -> Path:
-    """The same for a folder that was published as one."""
-    place = object_of(path)
-    if place is None or not _unseen(path):
+    """Like ``fetch``, for a folder that was published as one."""
+    address = object_of(path)
+    if address is None or not _unseen(path):
         return path
-    found = objects.look(_as_folder(place))
-    if found is not None and not _is_copy(path, found.etag):
+    head = objects.head(_as_folder(address))
+    if head is not None and not _is_copy(path, head.etag):
         with _scratch(path) as scratch, _alone(path):  # a full folder cannot be renamed over
-            if not _is_copy(path, found.etag):
-                objects.download(_as_folder(place), scratch / "whole.tar")
+            if not _is_copy(path, head.etag):
+                objects.download(_as_folder(address), scratch / "whole.tar")
                 with tarfile.open(scratch / "whole.tar") as tar:
                     tar.extractall(scratch / path.name, filter="data")
-                _mark(scratch / path.name, found.etag)
+                _mark(scratch / path.name, head.etag)
                 if path.exists():
                     path.replace(scratch / "old")
                 (scratch / path.name).replace(path)
-    elif found is None and path.exists():
+    elif head is None and path.exists():
         with _scratch(path) as scratch:
             path.replace(scratch / "old")
     _see(path)
@@ -158,9 +161,10 @@ def fetch_folder(path: Path) -> Path:
 
 
 def folders_here(place: str, name: str) -> Path:
-    """The path of a place after fetching, where it is in object storage, what was published as folders there.
+    """The path of a ``place``, after fetching what was published there as folders.
 
-    That is all in its folder ``name``, or else the place itself. StorageError: there is neither.
+    In object storage, that is all in its folder ``name``, or else the place itself. Raises StorageError if
+    there is neither.
     """
     if not is_remote(place):
         return Path(place)
@@ -174,20 +178,20 @@ def folders_here(place: str, name: str) -> Path:
 
 
 def note_of(path: Path) -> str | None:
-    """What the content of an object was made from, as its writer noted; None where a path stands for none."""
-    place = object_of(path)
-    if place is None:
+    """What the object of a ``path`` was made from, as its writer noted; None if the path stands for none."""
+    address = object_of(path)
+    if address is None:
         return None
-    found = objects.look(place)
-    return "" if found is None else found.note
+    head = objects.head(address)
+    return "" if head is None else head.note
 
 
 def files_in(folder: Path, pattern: str, below: bool = False) -> list[Path]:
-    """Paths of files in a folder, or anywhere below it, whose names match; in storage, none is fetched."""
-    place = object_of(folder)
-    if place is None:
+    """The files in a ``folder``, or anywhere ``below`` it, that match a ``pattern``; none is fetched."""
+    address = object_of(folder)
+    if address is None:
         return sorted(folder.rglob(pattern) if below else folder.glob(pattern))
-    root = _inside(place)
+    root = _inside(address)
     names = (key.removeprefix(root.key) for key in objects.keys(root))
     return sorted(
         folder / name
@@ -197,41 +201,41 @@ def files_in(folder: Path, pattern: str, below: bool = False) -> list[Path]:
 
 
 def folders_in(folder: Path) -> list[Path]:
-    """The folders in a folder, by name."""
-    place = object_of(folder)
-    if place is None:
+    """The folders in a ``folder``, by name."""
+    address = object_of(folder)
+    if address is None:
         return sorted(path for path in folder.glob("*") if path.is_dir())
-    return sorted(folder / name for name in objects.prefixes(_inside(place)))
+    return sorted(folder / name for name in objects.prefixes(_inside(address)))
 
 
 def is_there(path: Path) -> bool:
-    """Whether there is a file or folder, which is not fetched to find out."""
-    place = object_of(path)
-    if place is None:
+    """Whether there is a file or folder at a ``path``, without fetching it."""
+    address = object_of(path)
+    if address is None:
         return path.exists()
-    return any(objects.look(each) for each in (place, _as_folder(place))) or not is_empty(path)
+    return any(objects.head(each) for each in (address, _as_folder(address))) or not is_empty(path)
 
 
 def is_empty(folder: Path) -> bool:
-    """Whether there is no object below the place of a folder."""
-    place = object_of(folder)
-    return place is None or next(objects.keys(_inside(place)), None) is None
+    """Whether there is no object in a ``folder``; true for one that is not in object storage."""
+    address = object_of(folder)
+    return address is None or next(objects.keys(_inside(address)), None) is None
 
 
 def remove(path: Path) -> None:
-    """Delete a file, and the object that it stands for."""
-    place = object_of(path)
-    if place is not None:
-        objects.delete(place)
+    """Delete the file at a ``path``, and the object that it stands for."""
+    address = object_of(path)
+    if address is not None:
+        objects.delete(address)
     path.unlink(missing_ok=True)
 
 
-def _inside(place: Place) -> Place:
-    return Place(place.bucket, f"{place.key}/" if place.key else "")
+def _inside(address: Address) -> Address:
+    return Address(address.bucket, f"{address.key}/" if address.key else "")
 
 
-def _as_folder(place: Place) -> Place:
-    return Place(place.bucket, place.key + FOLDER)
+def _as_folder(address: Address) -> Address:
+    return Address(address.bucket, address.key + FOLDER)
 
 
 def _unseen(path: Path) -> bool:
@@ -247,7 +251,7 @@ def _see(path: Path) -> None:
 
 @contextmanager
 def _scratch(path: Path) -> Iterator[Path]:
-    """A folder beside ``path`` that goes afterwards."""
+    """A folder beside ``path`` that is removed afterwards."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent) as name:
         yield Path(name)
@@ -255,7 +259,7 @@ def _scratch(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
-    """Nobody else on this machine fetches the same folder."""
+    """Inside, no other process of this machine fetches the same folder."""
     with path.with_name(f".{path.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
@@ -268,7 +272,7 @@ def _fraction(etag: str) -> int:
 
 
 def _mark(path: Path, etag: str) -> None:
-    """Mark a file or folder as the copy of the content with this tag; a renaming keeps the mark."""
+    """Mark a file or folder as the copy of the content with this tag; renaming keeps the mark."""
     when = int(time.time()) * _SECOND + _fraction(etag)
     os.utime(path, ns=(when, when))
 

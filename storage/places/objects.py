@@ -1,8 +1,11 @@
-"""Objects: the one place that speaks to S3-compatible storage.
+"""Objects: the one module that speaks to S3-compatible storage.
 
-Server, region and credentials are what the usual AWS variables say (AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID,
-AWS_SECRET_ACCESS_KEY, AWS_REGION, a profile, an instance's role). A request that finds no answer, or one
-from 500 up, is made again with growing waits before anybody hears of it.
+The usual AWS variables say which server, region and credentials to use (AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID,
+AWS_SECRET_ACCESS_KEY, AWS_REGION, a profile, an instance's role). A request that gets no answer, or an error
+from 500 up, is repeated with growing waits before it fails.
+
+All functions raise StorageError for a request that is refused, and UnreachableError for one that may succeed
+later.
 """
 
 from __future__ import annotations
@@ -27,49 +30,46 @@ _MISSING: Final = {"404", "NoSuchKey", "NotFound"}
 _REFUSED: Final = {"412", "PreconditionFailed", "409", "ConditionalRequestConflict"}
 
 
-class Place(NamedTuple):
+class Address(NamedTuple):
     """Where an object lies."""
 
     bucket: str
     key: str
 
     def __str__(self) -> str:
-        """Its address."""
+        """The address as a URI."""
         return f"s3://{self.bucket}/{self.key}"
 
 
-class Found(NamedTuple):
+class Head(NamedTuple):
     """What is known of an object without its content."""
 
-    etag: str  # another content, another tag
-    note: str  # what it was made from, as its writer said
+    etag: str  # changes with the content
+    note: str  # what it was made from, as its writer noted
     age_seconds: float  # by the server's clock
 
 
 def endpoint() -> str:
-    """Address of the S3-compatible server; empty for Amazon's own."""
+    """The URL of the S3-compatible server; empty for Amazon's own."""
     return os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL") or ""
 
 
-def look(place: Place) -> Found | None:
-    """What is known of an object; None where there is none."""
-    with _one_line("read", place):
-        try:
-            answer = _client().head_object(Bucket=place.bucket, Key=place.key)
-        except _errors().ClientError as error:
-            if _code(error) in _MISSING:
-                return None
-            raise
+def head(address: Address) -> Head | None:
+    """What is known of the object at an ``address``; None if there is none."""
+    with _one_line("read", address):
+        answer = _unless(_MISSING, _client().head_object, Bucket=address.bucket, Key=address.key)
+    if answer is None:
+        return None
     now = answer["ResponseMetadata"]["HTTPHeaders"].get("date")
     age = (parsedate_to_datetime(now) if now else datetime.now(UTC)) - answer["LastModified"]
-    return Found(answer["ETag"], answer["Metadata"].get(NOTE, ""), age.total_seconds())
+    return Head(answer["ETag"], answer["Metadata"].get(NOTE, ""), age.total_seconds())
 
 
-def download(place: Place, path: Path) -> bool:
-    """Write an object's content to ``path``; False where there is none (any more)."""
-    with _one_line("read", place):
+def download(address: Address, path: Path) -> bool:
+    """Write the content of the object at an ``address`` to ``path``; False if there is no such object."""
+    with _one_line("read", address):
         try:
-            _client().download_file(place.bucket, place.key, str(path))
+            _client().download_file(address.bucket, address.key, str(path))
         except _errors().ClientError as error:
             if _code(error) in _MISSING:
                 return False
@@ -77,60 +77,63 @@ def download(place: Place, path: Path) -> bool:
     return True
 
 
-def upload(path: Path, place: Place, note: str = "") -> str:
-    """Put a file as an object, which appears whole or not at all; its tag."""
-    with _one_line("written", place):
-        _client().upload_file(str(path), place.bucket, place.key, ExtraArgs={"Metadata": {NOTE: note}})
-        etag: str = _client().head_object(Bucket=place.bucket, Key=place.key)["ETag"]
+def upload(path: Path, address: Address, note: str = "") -> str:
+    """Put the file at ``path`` at an ``address``, where it appears whole or not at all, and return its tag.
+
+    ``note``: what it was made from.
+    """
+    with _one_line("written", address):
+        extra = {"Metadata": {NOTE: note}}
+        _client().upload_file(str(path), address.bucket, address.key, ExtraArgs=extra)
+        etag: str = _client().head_object(Bucket=address.bucket, Key=address.key)["ETag"]
         return etag
 
 
-def put_if(place: Place, body: bytes, etag: str | None) -> str | None:
-    """Put an object if there is none (``etag`` None) or it is still the one of that tag; else None."""
+def put_if(address: Address, body: bytes, etag: str | None) -> str | None:
+    """Put an object at an ``address`` on a condition.
+
+    ``body``: its content. ``etag``: the tag of the object that it may replace; None if there must be none.
+
+    Returns its tag; None if the condition does not hold.
+    """
     condition = {"IfNoneMatch": "*"} if etag is None else {"IfMatch": etag}
-    with _one_line("written", place):
-        try:
-            answer = _client().put_object(Bucket=place.bucket, Key=place.key, Body=body, **condition)
-        except _errors().ClientError as error:
-            if _code(error) in _REFUSED | _MISSING:
-                return None
-            raise
-    tag: str = answer["ETag"]
+    with _one_line("written", address):
+        names = {"Bucket": address.bucket, "Key": address.key, "Body": body}
+        answer = _unless(_REFUSED | _MISSING, _client().put_object, **names, **condition)
+    tag: str | None = answer and answer["ETag"]
     return tag
 
 
-def content(place: Place) -> bytes:
-    """The content of a small object."""
-    with _one_line("read", place):
-        body: bytes = _client().get_object(Bucket=place.bucket, Key=place.key)["Body"].read()
+def content(address: Address) -> bytes:
+    """The content of the small object at an ``address``."""
+    with _one_line("read", address):
+        body: bytes = _client().get_object(Bucket=address.bucket, Key=address.key)["Body"].read()
         return body
 
 
-def keys(place: Place) -> Iterator[str]:
-    """The keys of all objects whose keys begin with that of ``place``, in order."""
-    with _one_line("listed", place):
-        for page in (
-            _client().get_paginator("list_objects_v2").paginate(Bucket=place.bucket, Prefix=place.key)
-        ):
-            yield from (each["Key"] for each in page.get("Contents", ()))
-
-
-def prefixes(place: Place) -> list[str]:
-    """What comes next, up to a slash, in keys that begin with that of ``place``: its folders."""
-    with _one_line("listed", place):
+def keys(address: Address) -> Iterator[str]:
+    """The keys of all objects whose keys begin with that of ``address``, in order."""
+    with _one_line("listed", address):
         pages = _client().get_paginator("list_objects_v2")
-        asked = pages.paginate(Bucket=place.bucket, Prefix=place.key, Delimiter="/")
+        for page in pages.paginate(Bucket=address.bucket, Prefix=address.key):
+            yield from (entry["Key"] for entry in page.get("Contents", ()))
+
+
+def prefixes(address: Address) -> list[str]:
+    """The folders at an ``address``: what comes next, up to a slash, in keys that begin with its key."""
+    with _one_line("listed", address):
+        pages = _client().get_paginator("list_objects_v2")
         return [
-            each["Prefix"].removeprefix(place.key).rstrip("/")
-            for page in asked
-            for each in page.get("CommonPrefixes", ())
+            entry["Prefix"].removeprefix(address.key).rstrip("/")
+            for page in pages.paginate(Bucket=address.bucket, Prefix=address.key, Delimiter="/")
+            for entry in page.get("CommonPrefixes", ())
         ]
 
 
-def delete(place: Place) -> None:
-    """Delete an object, if there is one."""
-    with _one_line("deleted", place):
-        _client().delete_object(Bucket=place.bucket, Key=place.key)
+def delete(address: Address) -> None:
+    """Delete the object at an ``address``, if there is one."""
+    with _one_line("deleted", address):
+        _client().delete_object(Bucket=address.bucket, Key=address.key)
 
 
 @functools.cache
@@ -147,12 +150,22 @@ def _client() -> Any:
         retries={"mode": "legacy", "total_max_attempts": ATTEMPTS},
         connect_timeout=CONNECT_SECONDS,
         read_timeout=READ_SECONDS,
-        # what is newer than S3's first checksums is not understood by all servers; content has our own
+        # not all servers understand newer checksums than S3's first; the content has its own
         request_checksum_calculation="when_required",
         response_checksum_validation="when_required",
         s3={"addressing_style": "path"} if endpoint() else None,
     )
     return Session().client("s3", config=settings)
+
+
+def _unless(codes: set[str], request: Any, **names: Any) -> Any:
+    """What a request answers; None if it fails with one of some codes."""
+    try:
+        return request(**names)
+    except _errors().ClientError as error:
+        if _code(error) in codes:
+            return None
+        raise
 
 
 def _errors() -> Any:
@@ -162,35 +175,34 @@ def _errors() -> Any:
 
 
 @contextmanager
-def _one_line(verb: str, place: Place) -> Iterator[None]:
-    """Errors as StorageError; those that may pass, when all attempts have failed, as UnreachableError."""
-    client_errors = _known_errors()
+def _one_line(verb: str, address: Address) -> Iterator[None]:
+    """Raise errors as StorageError, or as UnreachableError those that may pass."""
+    client_errors = _client_errors()
     try:
         yield
     except client_errors as error:
-        told = error.__context__ if isinstance(error.__context__, client_errors) else error
-        code = _code(told)
-        text = " ".join(str(told).split()).rstrip(".")
-        if _may_pass(told):
+        cause = error.__context__ if isinstance(error.__context__, client_errors) else error
+        text = " ".join(str(cause).split()).rstrip(".")
+        if _may_pass(cause):
             raise UnreachableError(
-                f"{place} cannot be {verb} now: {text}. When the storage is back, the same command goes on."
+                f"{address} cannot be {verb} now: {text}. When storage is back, run the same command again."
             ) from error
+        question = " (is the bucket there?)" if _code(cause) == "NoSuchBucket" else ""
         raise StorageError(
-            f"{place} cannot be {verb}: {text}. Check bucket, credentials and AWS_ENDPOINT_URL"
-            f"{' (is the bucket there?)' if code == 'NoSuchBucket' else ''}."
+            f"{address} cannot be {verb}: {text}. Check bucket, credentials and AWS_ENDPOINT_URL{question}."
         ) from error
 
 
 @functools.cache
-def _known_errors() -> tuple[type[Exception], ...]:
-    _client()  # says in one line where boto3 is not installed
+def _client_errors() -> tuple[type[Exception], ...]:
+    _client()  # raises StorageError if boto3 is not installed
     from boto3.exceptions import Boto3Error
 
     return (_errors().BotoCoreError, _errors().ClientError, Boto3Error)
 
 
 def _code(error: Any) -> str:
-    """S3's code of an error; empty where the server said nothing."""
+    """S3's code of an error; empty if the server said nothing."""
     response = getattr(error, "response", None) or {}
     return str(response.get("Error", {}).get("Code", ""))
 

@@ -1,6 +1,7 @@
-"""Folders in the machine's temporary directory that last as long as one need, or as their process.
+"""Folders in the machine's temporary directory that last as long as their use, or as their process.
 
-Each is locked by its process, and the kernel takes locks from dead ones: so it shows which were left behind.
+A process locks its folder, and the kernel releases the locks of dead processes, which shows what was left
+behind.
 """
 
 from __future__ import annotations
@@ -20,9 +21,9 @@ PREFIX: Final = "motion-memory-scratch-"
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Yield an empty folder that only this user can read; remove it afterwards.
+    """Yield an empty folder that only this user can read, and remove it afterwards.
 
-    What this user's killed processes left behind is removed, too.
+    Folders that killed processes of this user left behind are removed, too.
     """
     _remove_left_behind()
     folder, lock = _make()
@@ -38,7 +39,7 @@ def _make() -> tuple[Path, int]:
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX))
         lock = _lock(folder)
-        if lock is not None and folder.exists():  # else another process took it for one left behind
+        if lock is not None and folder.exists():  # else another process removed it as left behind
             return folder, lock
 
 

@@ -1,4 +1,4 @@
-"""Lists of numbers and bits as columns, and back, without a Python object a number."""
+"""Lists of numbers and bits as columns and back, without a Python object for each number."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
-    """Problems as the columns that every table with whole problems begins with."""
+    """``problems`` as the columns with which every table of whole problems begins."""
     return {
         "id": [problem.id for problem in problems],
         "class": [problem.class_name for problem in problems],
@@ -34,9 +34,9 @@ def problem_columns(problems: Sequence[Problem]) -> dict[str, Any]:
 
 
 def problems_of(table: pa.Table) -> list[Problem]:
-    """The problems of a table that has the columns of ``problem_columns``.
+    """The problems of a ``table`` that has the columns of ``problem_columns``.
 
-    Raises KeyError where a column is missing, TypeError or ValueError where a row is no problem: kernels
+    Raises KeyError if a column is missing, TypeError or ValueError if a row is not a problem, because kernels
     would follow starts that point elsewhere.
     """
     rows = zip(
@@ -52,21 +52,11 @@ def problems_of(table: pa.Table) -> list[Problem]:
         table["scale"].to_pylist() if "scale" in table.column_names else [1.0] * len(table),
         strict=True,
     )
-    return [_problem(*row) for row in rows]
+    return [_problem(row) for row in rows]
 
 
-def _problem(
-    identity: str,
-    class_name: str,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    radius: float,
-    bounds: tuple[float, float, float, float],
-    vertices: Array,
-    pieces: Array,
-    obstacles: Array,
-    scale: float | None,
-) -> Problem:
+def _problem(row: tuple[Any, ...]) -> Problem:
+    identity, class_name, start, goal, radius, bounds, vertices, pieces, obstacles, scale = row
     whole = (
         (len(start), len(goal), len(bounds), len(vertices) % 2) == (3, 2, 4, 0)
         and all(map(math.isfinite, (*start, *goal, radius, *bounds)))
@@ -75,7 +65,7 @@ def _problem(
         and _are_starts(obstacles, len(pieces) - 1)
     )
     if not whole:
-        raise ValueError(f"the row of problem {short(identity)} is none")
+        raise ValueError(f"the row of problem {short(identity)} is not a problem")
     corners = vertices.astype(np.float64).reshape(-1, 2)
     return Problem(
         text_of(identity, "id"),
@@ -90,12 +80,12 @@ def _problem(
 
 
 def _are_starts(starts: Array, count: int) -> bool:
-    """Whether ``starts [n + 1]`` divide ``count`` things among n, each of which has some."""
+    """Whether ``starts [n + 1]`` divide ``count`` things into n parts, none of them empty."""
     return len(starts) > 0 and starts[0] == 0 and starts[-1] == count and bool((np.diff(starts) > 0).all())
 
 
 def list_column(lists: Iterable[Any], dtype: type[np.generic]) -> pa.Array:
-    """One list a row, from arrays of any shape, flattened."""
+    """A column with one list a row, from ``lists`` of any shape, flattened, of numbers of a ``dtype``."""
     arrays = [np.asarray(values, dtype=dtype).reshape(-1) for values in lists]
     starts = np.cumsum([0] + [len(array) for array in arrays], dtype=np.int32)
     values = np.concatenate(arrays) if arrays else np.empty(0, dtype)
@@ -103,7 +93,7 @@ def list_column(lists: Iterable[Any], dtype: type[np.generic]) -> pa.Array:
 
 
 def lists_of(column: pa.ChunkedArray) -> list[Array]:
-    """The lists of a column, each a read-only array that shares the column's memory."""
+    """The lists of a ``column``, each a read-only array that shares the column's memory."""
     return [
         values[first:last]
         for chunk in column.chunks
@@ -113,14 +103,14 @@ def lists_of(column: pa.ChunkedArray) -> list[Array]:
 
 
 def bits_column(packed: Bits) -> pa.Array:
-    """Packed bits ``uint8 [n, b]`` as one value of ``b`` bytes a row."""
+    """A column with one value of b bytes a row, from ``packed`` bits ``uint8 [n, b]``."""
     rows, width = packed.shape
     data = pa.py_buffer(np.ascontiguousarray(packed, dtype=np.uint8))
     return pa.Array.from_buffers(pa.binary(width), rows, [None, data])
 
 
 def bits_of(column: pa.ChunkedArray) -> Bits:
-    """The packed bits ``uint8 [n, b]`` of a column, in one copy."""
+    """The packed bits ``uint8 [n, b]`` of a ``column``, in one copy."""
     width = column.type.byte_width
     parts = [
         np.frombuffer(chunk.buffers()[1], np.uint8, len(chunk) * width, chunk.offset * width)

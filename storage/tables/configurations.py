@@ -1,4 +1,4 @@
-"""Configurations: how an attempt may use a memory, how that is called, and in which order it is read."""
+"""Configurations: how an attempt uses a memory, how that is called, and in which order it is read."""
 
 from __future__ import annotations
 
@@ -10,45 +10,47 @@ ASSISTS: Final = (
     "none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair",
 )  # fmt: skip
 RECALLS: Final = ("exhaustive", "hybrid", "mask", "centroid", "random")
-_UNSAID: Final = ("", "random")  # the assist says that it is random
+_UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
 _WITHOUT_MEMORY: Final = ("none", "fresh")
 
 
 class Configuration(NamedTuple):
-    """Everything but planner and memory that tells two attempts at a problem apart."""
+    """How an attempt uses a memory: what tells two attempts of a planner and memory at a problem apart."""
 
     assist: str  # one of ASSISTS
-    recall: str  # one of RECALLS; empty where nothing is recalled
-    top_k: int  # 0 where nothing is recalled by rank
+    recall: str  # one of RECALLS; empty if nothing is recalled
+    top_k: int  # how many plans are recalled; 0 if they are not ranked
 
     @property
     def label(self) -> str:
-        """Its name in tables, figures and exports: ``none``, ``closed 5 centroid``, ``random-open 1``."""
+        """The name in tables, figures and exports: ``none``, ``closed 5 centroid``, ``random-open 1``."""
         count = [str(self.top_k)] if self.top_k else []
-        return " ".join([self.assist, *count, *([] if self.recall in _UNSAID else [self.recall])])
+        return " ".join([self.assist, *count, *([] if self.recall in _UNNAMED else [self.recall])])
 
     @property
     def rank(self) -> tuple[int, str, int, str, int]:
-        """Sorts configurations as they are read: known names in their order, then the others."""
-        return (*_place(self.assist, ASSISTS), *_place(self.recall, RECALLS), self.top_k)
+        """The key that sorts configurations as they are read: known names in their order, then others."""
+        return (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS), self.top_k)
 
 
 BASELINE: Final = Configuration("none", "", 0)
 
 
 def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configuration]]:
-    """Attempt rows with a categorical column ``configuration`` of labels, and the labels' meanings in order.
+    """``attempts`` with a categorical column ``configuration`` of labels.
 
-    Rows of before there was a field ``recall`` are understood: their memories ranked by centroid.
+    Rows that were written before there was a field ``recall`` count as ranked by centroid.
+
+    Returns the rows, and the configurations by label, in reading order.
     """
     keys = pd.DataFrame({name: attempts.get(name) for name in ("assist", "top_k", "recall")}, attempts.index)
-    asked = keys.drop_duplicates()
-    meant = [_understood(*row) for row in asked.itertuples(index=False, name=None)]
-    known = {each.label: each for each in sorted(set(meant), key=lambda each: each.rank)}
-    labels = pd.Categorical([each.label for each in meant], categories=list(known))
-    place = pd.MultiIndex.from_frame(asked).get_indexer(pd.MultiIndex.from_frame(keys))
-    return attempts.assign(configuration=labels.take(place)), known
+    distinct = keys.drop_duplicates()
+    configurations = [_understood(*row) for row in distinct.itertuples(index=False, name=None)]
+    by_label = {each.label: each for each in sorted(set(configurations), key=lambda each: each.rank)}
+    labels = pd.Categorical([each.label for each in configurations], categories=list(by_label))
+    rows = pd.MultiIndex.from_frame(distinct).get_indexer(pd.MultiIndex.from_frame(keys))
+    return attempts.assign(configuration=labels.take(rows)), by_label
 
 
 def configurations_in(table: pd.DataFrame) -> list[Configuration]:
@@ -71,5 +73,5 @@ def _understood(assist: str, top_k: float, recall: object) -> Configuration:
     return Configuration(assist, recall if isinstance(recall, str) else "centroid", int(top_k))
 
 
-def _place(name: str, known: tuple[str, ...]) -> tuple[int, str]:
-    return (known.index(name), "") if name in known else (len(known), name)
+def _position(name: str, order: tuple[str, ...]) -> tuple[int, str]:
+    return (order.index(name), "") if name in order else (len(order), name)

@@ -1,4 +1,4 @@
-"""Solved problems with their plans."""
+"""Experiences: solved problems with their plans."""
 
 from __future__ import annotations
 
@@ -34,7 +34,11 @@ def write_experiences(
     key: str = "",
     vehicle: Vehicle = CAR,
 ) -> None:
-    """Write experiences with the planner that found them, its seeds and its times, one of each a row."""
+    """Write ``experiences`` of a ``vehicle``, one a row.
+
+    ``planner``: that found them. ``seeds``, ``planning_seconds``: of its searches, one a row. ``key``: what
+    they were made from.
+    """
     plans = [experience.plan for experience in experiences]
     columns = {
         **problem_columns([experience.problem for experience in experiences]),
@@ -48,9 +52,9 @@ def write_experiences(
 
 
 def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = None) -> list[Experience]:
-    """The experiences of a file, in order; the first ``count`` if given.
+    """The experiences of a ``vehicle`` in the file at ``path``, in order; only the first ``count``, if given.
 
-    StorageError: the file is missing, damaged, of another kind, or recorded for another vehicle.
+    Raises StorageError if the file is missing, damaged, of another kind, or of another vehicle.
     """
     table = read_experience_table(path, vehicle)
     with sound(path):
@@ -58,7 +62,10 @@ def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = Non
 
 
 def experiences_of(table: pa.Table, vehicle: Vehicle) -> list[Experience]:
-    """The experiences in a table of a vehicle; KeyError, TypeError or ValueError where a row is none."""
+    """The experiences of a ``vehicle`` in a ``table``.
+
+    Raises KeyError, TypeError or ValueError if a row is not one.
+    """
     return [
         Experience(problem, _plan(problem, states, controls, dt, vehicle), vehicle)
         for problem, states, controls, dt in zip(
@@ -75,21 +82,22 @@ def _plan(problem: Problem, states: Array, controls: Array, dt: float, vehicle: 
     plan = Plan(states.reshape(-1, state_size(vehicle)).copy(), controls.reshape(-1, _CONTROL).copy(), dt)
     finite = np.isfinite(states).all() and np.isfinite(controls).all()
     if len(plan.states) != len(plan.controls) + 1 or not finite or dt != vehicle.dt:
-        raise ValueError(f"the plan of problem {short(problem.id)} is none of the vehicle's")
+        raise ValueError(f"the plan of problem {short(problem.id)} is not one of the vehicle's")
     return plan
 
 
 def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
-    """Like ``read_experiences``, as a table whose rows are not looked at."""
+    """Like ``read_experiences``, as a table whose rows are not checked."""
     table = read_table(path, EXPERIENCES)
     refuse_another(path, _recorded(path), vehicle)
     return table
 
 
 def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:
-    """Write rows of the shards, numbered in the order of the shards, as one file.
+    """Write some ``rows`` of the ``shards``, numbered through all of them, as one file at ``path``.
 
-    StorageError: there are no shards, fewer rows in them, or plans of several vehicles.
+    ``key``: what they were made from. Raises StorageError if there are no shards, fewer rows in them, or
+    plans of several vehicles.
     """
     tables = [read_table(shard, EXPERIENCES) for shard in shards]
     if not tables:
@@ -105,14 +113,17 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
 
 
 def copy_experiences(source: Path, path: Path, key: str) -> int:
-    """Write the experiences of a file as another; how many they are."""
+    """Write the experiences in the file ``source`` to ``path`` under another ``key``, and return how many."""
     table = read_table(source, EXPERIENCES)
     write_table(path, table, key)
     return int(table.num_rows)
 
 
 def replace_plans(source: Path, path: Path, first: int, plans: Sequence[Plan], key: str = "") -> None:
-    """Write rows ``first`` to before ``first + len(plans)`` of a file with other plans for their problems."""
+    """Write rows of the file ``source`` to ``path`` with other ``plans`` for their problems.
+
+    ``first``: number of the first row. ``key``: what they were made from.
+    """
     table = read_table(source, EXPERIENCES).slice(first, len(plans))
     columns = {name: table[name] for name in table.schema.names} | _plan_columns(plans)
     write_table(path, pa.table(columns, schema=table.schema), key)

@@ -1,4 +1,4 @@
-"""Hallucinated problems: what the encoder learns from, with the exact label of every stored plan."""
+"""Hallucinated problems, from which the encoder learns, with the exact label of every stored plan."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ MOST_DIGITS: Final = 8  # of a number of plans
 
 
 class Labelled(NamedTuple):
-    """What training needs of n problems; bits are packed most significant first, as ``np.packbits`` does."""
+    """What training needs of n problems; bits are packed most significant first, as by ``np.packbits``."""
 
     grids: Bits  # uint8 [n, 512] occupancy 64 x 64, row by row
-    plan_index: Integers  # int32 [n] the plan a problem was made for; -1: for none
+    plan_index: Integers  # int32 [n] the plan that a problem was made for; -1: for none
     labels: Bits  # uint8 [n, ceil(N / 8)] which plans are free
     plans: int  # N
 
@@ -46,7 +46,12 @@ def write_hallucinated(
     plans: int,
     key: str = "",
 ) -> None:
-    """Write n problems with ``grids [n, 512]`` and ``labels [n, ceil(plans / 8)]``, both packed bits."""
+    """Write n ``problems`` that were made around ``plans`` stored plans.
+
+    ``plan_index [n]``: the plan that a problem was made for; -1: for none. ``methods``: how each was made.
+    ``grids [n, 512]``, ``labels [n, ceil(plans / 8)]``: packed bits, as in ``Labelled``. ``key``: what they
+    were made from.
+    """
     schema = hallucinated(plans)
     widths = (schema.field("grid").type.byte_width, schema.field("labels").type.byte_width)
     if (grids.shape, labels.shape) != ((len(problems), widths[0]), (len(problems), widths[1])):
@@ -65,7 +70,7 @@ def write_hallucinated(
 
 
 def read_labelled(paths: Sequence[Path]) -> Labelled:
-    """Grids, labels and plan numbers of some shards, one after another; geometry is not read."""
+    """What training needs of the problems in some shards at ``paths``; geometry is not read."""
     if not paths:
         raise StorageError("There are no hallucinated problems; run hallucinate.")
     plans = plans_of(paths[0])
@@ -79,11 +84,8 @@ def read_labelled(paths: Sequence[Path]) -> Labelled:
         table = read_table(path, hallucinated(plans), ["grid", "plan_index", "labels"])
         with sound(path):
             made_for = table["plan_index"].to_numpy()
-            if (
-                made_for.dtype != np.int32
-                or made_for.min(initial=-1) < -1
-                or made_for.max(initial=-1) >= plans
-            ):
+            ends = made_for.min(initial=-1), made_for.max(initial=-1)
+            if made_for.dtype != np.int32 or ends[0] < -1 or ends[1] >= plans:
                 raise ValueError(f"plan_index has other values than -1 to {plans - 1}")
             parts.append((bits_of(table["grid"]), made_for, bits_of(table["labels"])))
     grids, indices, labels = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -91,20 +93,20 @@ def read_labelled(paths: Sequence[Path]) -> Labelled:
 
 
 def read_hallucinated_problems(path: Path) -> list[Problem]:
-    """The problems of one shard, without their labels."""
+    """The problems of the shard at ``path``, without their labels."""
     table = read_table(path, hallucinated(plans_of(path)))
     with sound(path):
         return problems_of(table)
 
 
 def read_methods(path: Path) -> list[str]:
-    """By which method each problem of a shard was made."""
+    """The method by which each problem of the shard at ``path`` was made."""
     table = read_table(path, hallucinated(plans_of(path)), ["method"])
     return [str(method) for method in table["method"].to_pylist()]
 
 
 def plans_of(path: Path) -> int:
-    """For how many stored plans a shard is labelled."""
+    """For how many stored plans the shard at ``path`` is labelled."""
     plans = metadata_of(path).get(b"plans", b"0")
     if not plans.isdigit() or len(plans) > MOST_DIGITS:
         raise StorageError(f"{path} is labelled for {short(plans)} plans; delete it and run its stage again.")

@@ -1,4 +1,4 @@
-"""Problems that were read and checked once and are read often, such as those of a folder of worlds."""
+"""Problems that are checked once and read often, such as those of a folder of worlds."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from storage.tables.shards import read_table, sound, write_table
 
 
 def write_imported(path: Path, problems: Sequence[Problem], key: str = "") -> None:
-    """Write checked problems, obstacles and their pieces as they are."""
+    """Write checked ``problems``, with the pieces of their obstacles, made from what ``key`` says."""
     write_table(path, pa.table(problem_columns(problems), schema=IMPORTED), key)
 
 
 def read_imported(path: Path) -> list[Problem]:
-    """The problems of ``write_imported``, exactly, without asking again whether they can be planned for."""
+    """The problems that ``write_imported`` wrote to ``path``, exactly, without checking them again."""
     table = read_table(path, IMPORTED)
     with sound(path):
         return problems_of(table)

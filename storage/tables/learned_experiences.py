@@ -1,11 +1,11 @@
-"""What was learned on the job: newly solved problems of any number of processes, without repeats, bounded.
+"""What was learned on the job: problems that any number of processes solved, without repeats, up to a limit.
 
-A folder of shards whose names follow from what is in them, each put in its place at once: writers never meet.
-Who makes one too many merges them all, while nobody else reads them.
+A folder holds shards whose names follow from their contents, so writers never meet. The process that writes
+one too many merges them all, under a lock.
 
-The rule: of all that was ever learned for a vehicle, taken in the order of a digest of problem and plan, the
-first with each problem id and the first with each plan are kept, up to ``MOST`` a class: a fair sample of the
-work, whoever found it when.
+The rule: all experiences of a vehicle are put in the order of a digest of problem and plan. The first with
+each problem id and the first with each plan are kept, up to ``MOST`` a class. That is a fair sample of the
+work, whichever process solved it when.
 """
 
 from __future__ import annotations
@@ -45,7 +45,10 @@ def add_learned(
     planning_seconds: Sequence[float],
     vehicle: Vehicle,
 ) -> None:
-    """Add experiences of one vehicle, all or none; the same ones again change nothing."""
+    """Add ``experiences`` of one ``vehicle`` to a ``folder``, all or none; adding them again changes nothing.
+
+    ``planner``: that found them. ``seeds``, ``planning_seconds``: of its searches, one an experience.
+    """
     marks = [
         _mark(each.problem.id, each.plan.states.tobytes() + each.plan.controls.tobytes())
         for each in experiences
@@ -63,14 +66,15 @@ def add_learned(
 
 
 def learned_shards(folder: Path) -> list[Path]:
-    """The shards that are there, in no telling order."""
+    """The shards in a ``folder``; their order says nothing."""
     return files_in(folder, "[!.]*.parquet")
 
 
 def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
-    """Keep what is learned by now under a name, unless there is something of that name; how it is called.
+    """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
 
-    That is the name and a digest of the content. StorageError: nothing is learned yet.
+    Returns what the snapshot is called: the name and a digest of the content. Raises StorageError if nothing
+    is learned yet.
     """
     if not learned_shards(folder):
         raise StorageError(f"{folder} holds nothing that was learned; solve problems with --learn first.")
@@ -79,28 +83,28 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
         if taken:
             return taken[0].stem
         _, table, digest = _kept(folder, vehicle)
-        called = f"{name}-{digest[:DIGITS]}"
-        write_table(snapshot_path(folder, called), table)
-        return called
+        snapshot = f"{name}-{digest[:DIGITS]}"
+        write_table(snapshot_path(folder, snapshot), table)
+        return snapshot
 
 
-def snapshot_path(folder: Path, called: str) -> Path:
-    """The file of a snapshot, which ``read_experiences`` reads."""
-    return folder / SNAPSHOTS / f"{called}.parquet"
+def snapshot_path(folder: Path, snapshot: str) -> Path:
+    """The file of the ``snapshot`` of a ``folder`` that is called so, which ``read_experiences`` reads."""
+    return folder / SNAPSHOTS / f"{snapshot}.parquet"
 
 
-def snapshot_ids(folder: Path, called: str) -> set[str]:
-    """The problems of a snapshot's experiences; none where it is not there any more."""
+def snapshot_ids(folder: Path, snapshot: str) -> set[str]:
+    """The ids of the problems in a ``snapshot`` of a ``folder``; none if it is not there any more."""
     try:
-        return set(read_table(snapshot_path(folder, called), EXPERIENCES, ["id"])["id"].to_pylist())
+        return set(read_table(snapshot_path(folder, snapshot), EXPERIENCES, ["id"])["id"].to_pylist())
     except StorageError:
         return set()
 
 
 def read_learned(folder: Path, vehicle: Vehicle) -> list[Experience]:
-    """What is learned by now, as a snapshot taken now would hold it; nothing is written."""
+    """What a ``folder`` holds of a ``vehicle`` now, as a snapshot would keep it; nothing is written."""
     for _ in range(READINGS):
-        with suppress(StorageError):  # somebody merged the shards meanwhile
+        with suppress(StorageError):  # another process merged the shards meanwhile
             return _experiences(folder, vehicle)
     return _experiences(folder, vehicle)
 
@@ -111,19 +115,20 @@ def _experiences(folder: Path, vehicle: Vehicle) -> list[Experience]:
 
 
 def extract_class(snapshot: Path, class_name: str, without: Set[str], path: Path, key: str) -> int:
-    """Write those experiences of a snapshot that are of a class and not ``without``; how many they are.
+    """Write the experiences of a class in the file ``snapshot`` to ``path``, and return how many there are.
 
-    StorageError: there is no such snapshot.
+    ``without``: ids of problems to leave out. ``key``: what they were made from. Raises StorageError if there
+    is no such file.
     """
     table = read_table(snapshot, EXPERIENCES)
-    named = zip(table["class"].to_pylist(), table["id"].to_pylist(), strict=True)
-    rows = [row for row, (name, each) in enumerate(named) if name == class_name and each not in without]
+    pairs = zip(table["class"].to_pylist(), table["id"].to_pylist(), strict=True)
+    rows = [row for row, (name, id_) in enumerate(pairs) if name == class_name and id_ not in without]
     write_table(path, table.take(pa.array(rows, pa.int64())), key)
     return len(rows)
 
 
 def _merge(folder: Path, vehicle: Vehicle) -> None:
-    """Make one shard of all, unless somebody else is at it."""
+    """Make one shard of all, unless another process does it."""
     with suppress(InUseError), locked(folder / ".lock", str(folder)):
         shards, table, digest = _kept(folder, vehicle)
         merged = folder / f"{digest}.parquet"
@@ -134,7 +139,7 @@ def _merge(folder: Path, vehicle: Vehicle) -> None:
 
 
 def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
-    """All shards, what the rule keeps of them, in its order, and a digest of that; nobody may merge them."""
+    """All shards, what the rule keeps of them in its order, and a digest of that; call it with the lock."""
     shards = learned_shards(folder)
     if not shards:
         return [], EXPERIENCES.empty_table(), ""
@@ -158,7 +163,7 @@ def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
 
 
 def _mark(identity: str, plan: bytes) -> bytes:
-    """What the order of the rule follows from."""
+    """The digest of problem and plan that the rule sorts by."""
     return hashlib.sha256(identity.encode() + b"\0" + plan).digest()
 
 

@@ -1,4 +1,4 @@
-"""Recalls: what a memory says to a problem, beside which plans are really free."""
+"""Recalls: which plans a memory ranks first for a problem, and which are really free."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from storage.tables.shards import read_table, sound, write_table
 
 
 def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key: str = "") -> None:
-    """Write recall rows with the fields of ``storage.tables.schemas.recalls``.
+    """Write ``rows`` of ``schemas.recalls`` of a memory of so many ``plans``.
 
-    ``order``: the numbers of the first plans, best first, all of them or not. ``free``: one truth value a
-    plan. KeyError where a row lacks a field.
+    In a row, ``order`` holds the numbers of the first plans, best first, and ``free`` one truth value a plan.
+    ``key``: what they were made from. Raises KeyError if a row lacks a field.
     """
     schema = recalls(plans)
     columns = {name: [row[name] for row in rows] for name in schema.names}
@@ -33,7 +33,7 @@ def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key
 
 
 def read_recalls(paths: Sequence[Path]) -> pd.DataFrame:
-    """The recall rows of some shards; ``order`` holds int32 arrays, ``free`` bool arrays."""
+    """The rows of the shards at ``paths``; ``order`` holds int32 arrays, ``free`` bool arrays."""
     return pd.concat([_read(path) for path in paths], ignore_index=True)
 
 

@@ -1,4 +1,4 @@
-"""The tables: their columns, types and versions. A new field raises no version, a changed one does."""
+"""The tables: their columns, types and versions. A changed field raises the version, a new one does not."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def _schema(
 
 IMPORTED: Final = _schema("imported/1", [*_PROBLEM, *_GEOMETRY])
 
-# The contract's table of problems: what users hand in and get, nested as in JSON.
+# The contract's table of problems: what users hand in and receive, nested as in JSON.
 PROBLEMS: Final = _schema(
     "problems/1",
     [
@@ -46,7 +46,7 @@ PROBLEMS: Final = _schema(
         ("obstacles", pa.list_(pa.list_(pa.list_(pa.float64())))),  # polygons of [x, y], m
         ("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
     ],
-    optional=("groups", "scale"),  # in this table the lengths are those of the world outside
+    optional=("groups", "scale"),  # lengths are those of the world outside here
 )
 
 EXPERIENCES: Final = _schema(
@@ -65,13 +65,13 @@ EXPERIENCES: Final = _schema(
 
 
 def hallucinated(plans: int) -> pa.Schema:
-    """Labelled problems; bit j of ``labels`` says whether plan j of ``plans`` is free."""
+    """The table of labelled problems; bit j of ``labels`` says whether plan j of ``plans`` is free."""
     return _schema(
         "hallucinated/1",
         [
             *_PROBLEM,
             *_GEOMETRY,
-            ("plan_index", pa.int32()),  # the plan it was made for; -1: for none
+            ("plan_index", pa.int32()),  # the plan that it was made for; -1: for none
             ("method", pa.string()),  # rearrange, maximal, minimal, learned, origin, no-plan, drawn
             ("grid", pa.binary(GRID_BYTES)),  # occupancy, row by row, most significant bit first
             ("labels", pa.binary((plans + 7) // 8)),  # most significant bit first
@@ -91,8 +91,8 @@ ATTEMPTS: Final = _schema(
         ("memory", pa.string()),
         ("status", pa.string()),
         ("solved", pa.bool_()),
-        ("source", pa.string()),  # recalled, repaired, searched; null where nothing was found
-        ("planning_seconds", pa.float64()),  # the whole, measured once around everything
+        ("source", pa.string()),  # recalled, repaired, searched; null if there is no plan
+        ("planning_seconds", pa.float64()),  # in all, measured once around everything
         ("occupancy_seconds", pa.float64()),
         ("encode_seconds", pa.float64()),
         ("recall_seconds", pa.float64()),
@@ -103,16 +103,16 @@ ATTEMPTS: Final = _schema(
         ("collision_checks", pa.int64()),
         ("expansions", pa.int64()),
         ("nodes", pa.int64()),
-        ("length_m", pa.float64()),  # null where nothing was found
-        ("duration_s", pa.float64()),  # null where nothing was found
+        ("length_m", pa.float64()),  # null if there is no plan
+        ("duration_s", pa.float64()),  # null if there is no plan
         ("seed", pa.int64()),
         ("run_id", pa.string()),
         ("commit", pa.string()),
         ("host", pa.string()),
         ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
-        ("guide_seconds", pa.float64()),  # a way over the grid, a recalled plan as a guide
-        ("repair_seconds", pa.float64()),  # repairing a recalled plan, in vain or not
-        ("verified", pa.bool_()),  # an independent check agreed; null where none was made
+        ("guide_seconds", pa.float64()),  # finding a way over the grid, or along a recalled plan
+        ("repair_seconds", pa.float64()),  # repairing a recalled plan, successful or not
+        ("verified", pa.bool_()),  # an independent check agreed; null if there was none
         ("vehicle", pa.string()),  # its name
         ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
     ],
@@ -126,20 +126,20 @@ WATCHED: Final = _schema(
         ("at", pa.timestamp("ms", tz="UTC")),
         ("memory", pa.string()),  # a registered version, or a run's
         ("configuration", pa.string()),  # planner and configuration
-        ("problems", pa.int64()),  # that were asked
+        ("problems", pa.int64()),
         ("hits", pa.int64()),  # answered by a recalled plan
         ("mean_ms", pa.float64()),  # planning time
-        ("benchmark_problems", pa.int64()),  # the same of the benchmark that the memory was judged by
+        ("benchmark_problems", pa.int64()),  # of the benchmark by which the memory was judged
         ("benchmark_hits", pa.int64()),
         ("benchmark_mean_ms", pa.float64()),
-        ("p_value", pa.float64()),  # that hits are so few by chance
+        ("p_value", pa.float64()),  # of so few hits by chance
         ("has_fallen", pa.bool_()),
     ],
 )
 
 
 def recalls(plans: int) -> pa.Schema:
-    """What a memory of ``plans`` plans says to a problem, beside the truth."""
+    """The table of what a memory of ``plans`` plans recalls, beside the truth."""
     return _schema(
         "recalls/1",
         [

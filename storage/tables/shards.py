@@ -1,4 +1,4 @@
-"""The one way to write and read a Parquet file: whole, compressed, stamped, the same bytes every time."""
+"""How every Parquet file is written and read: whole, compressed, stamped, the same bytes every time."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ SHARD_KEY: Final = b"key"
 
 
 def write_table(path: Path, table: pa.Table, key: str = "") -> None:
-    """Write a table, whole or not at all; the same table and key give the same bytes.
+    """Write a ``table`` to ``path``, whole or not at all; the same table and key give the same bytes.
 
-    ``key`` says what the rows were made from, so that a finished shard need not be made again.
+    ``key``: says what the rows were made from, so that a finished shard need not be made again.
 
-    StorageError: it could not be written; what was at ``path`` before is still there.
+    Raises StorageError if it cannot be written; what was at ``path`` is then still there.
     """
     write_tables(path, [table], table.schema, key)
 
 
 def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key: str = "") -> None:
-    """Write tables of one schema after one another into one file, of which no more than one is in memory.
+    """Write ``tables`` of one ``schema`` into one file, with one of them in memory at a time.
 
-    StorageError as for ``write_table``.
+    ``path``, ``key``: as in ``write_table``. Raises StorageError as ``write_table`` does.
     """
     described = schema.with_metadata({**(schema.metadata or {}), SHARD_KEY: key.encode()})
     with (
@@ -44,17 +44,18 @@ def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key:
 
 
 def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:
-    """The rows of a file that was written with ``schema`` (``schemas.py``), or some columns of it.
+    """The rows of the file at ``path``, which was written with a ``schema`` of ``schemas.py``.
 
-    Columns that a file of an earlier version did not have are left out.
+    ``columns``: those to read; None for all. Columns that a file of an earlier version lacks are left out.
 
-    StorageError: the file is missing, damaged, of another kind or version, or a column is of another type.
+    Raises StorageError if the file is missing, damaged, of another kind or version, or has a column of
+    another type.
     """
     wanted = schema.metadata[SCHEMA_KEY].decode()
-    found = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
-    if found != wanted:
+    name = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
+    if name != wanted:
         raise StorageError(
-            f"{path} holds table {found}, wanted was {wanted}; is it the right file, written by this version?"
+            f"{path} holds table {name}, wanted was {wanted}; is it the right file, written by this version?"
         )
     with sound(path):
         table = pq.read_table(
@@ -73,7 +74,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
 
 @contextmanager
 def sound(path: Path) -> Iterator[None]:
-    """StorageError in place of whatever is raised by rows that are none of their table's kind."""
+    """Raise StorageError in place of whatever the rows of the file at ``path`` raise if they are unsound."""
     try:
         yield
     except (pa.ArrowException, OSError, AttributeError, LookupError, TypeError, ValueError) as error:
@@ -84,7 +85,7 @@ def sound(path: Path) -> Iterator[None]:
 
 
 def metadata_of(path: Path) -> dict[bytes, bytes]:
-    """The key/value metadata of a Parquet file; a StorageError where it is missing or damaged."""
+    """The metadata of the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
     with sound(path):
         try:
             return dict(pq.read_schema(fetch(path)).metadata or {})
@@ -93,13 +94,13 @@ def metadata_of(path: Path) -> dict[bytes, bytes]:
 
 
 def columns_of(path: Path) -> list[str]:
-    """The columns of a Parquet file; a StorageError where it is missing or damaged."""
+    """The columns of the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
     with sound(path):
         return list(pq.read_schema(fetch(path)).names)
 
 
 def shard_is_done(path: Path, key: str) -> bool:
-    """Whether a readable shard made from the same ``key`` is already there; none is fetched to find out."""
+    """Whether a readable shard at ``path`` was made from the same ``key``; it is not fetched to find out."""
     noted = note_of(path)
     if noted is not None:
         return noted == key
@@ -110,9 +111,9 @@ def shard_is_done(path: Path, key: str) -> bool:
 
 
 def table_of(rows: Sequence[dict[str, Any]], schema: pa.Schema, what: str) -> pa.Table:
-    """Rows as a table of ``schema``; a StorageError where a row's fields or types do not fit it.
+    """``rows`` as a table of a ``schema``; fields that the schema marks as optional may be missing.
 
-    Fields of the schema that are marked optional may be left out; they are null then.
+    ``what``: a row is, for messages. Raises StorageError if a row's fields or types do not fit.
     """
     names = set(schema.names)
     required = {field.name for field in schema if not (field.metadata or {}).get(b"optional")}

@@ -1,4 +1,4 @@
-"""How useful memories were at work, beside what their benchmark promised: one small file each time."""
+"""How useful memories are at work, beside their benchmark: one small file for each file of problems."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ NEWEST: Final = 300  # files that are read
 
 
 def add_watched(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Add what was seen just now: rows of ``storage.tables.schemas.WATCHED`` without their time."""
+    """Add what was seen just now to a ``folder``: ``rows`` of ``schemas.WATCHED`` without their time."""
     at = datetime.now(UTC)
     stamped = [{"at": at, **row} for row in rows]
     write_table(folder / f"{at:%Y%m%dT%H%M%S}-{uuid4().hex[:8]}.parquet", table_of(stamped, WATCHED, "seen"))
 
 
 def read_watched(folder: Path) -> tuple[pd.DataFrame, list[str]]:
-    """What was seen, the oldest first, of the newest files, and what is wrong with those left out."""
+    """The rows in the newest files of a ``folder``, the oldest first, and a line for each unreadable file."""
     tables, faults = [WATCHED.empty_table()], []
     for path in files_in(folder, "[!.]*.parquet")[-NEWEST:]:
         try:

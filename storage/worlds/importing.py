@@ -1,4 +1,4 @@
-"""Problems of other people's worlds and maps: read or cut, and checked; what is unfit is listed with why."""
+"""Problems of worlds and maps of others, read or cut, and checked; unfit ones are listed with why."""
 
 from __future__ import annotations
 
@@ -22,60 +22,64 @@ from storage.worlds.polygon_scenes import polygon_world
 from storage.worlds.ros_maps import read_ros_map
 from storage.worlds.sources import PARTS, Part, Source
 
-CUT_PROBLEMS: Final = 1_000  # a part of a map, where not said otherwise
+CUT_PROBLEMS: Final = 1_000  # a part of a map, by default
 
-Tell = Callable[[int, int], None]  # how many are done, of how many
+Progress = Callable[[int, int], None]  # called with how many are done, and of how many
 Item = tuple[str, Problem | str]  # where a problem stands, and the problem or what is wrong with it
 
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """How worlds and maps are understood."""
+    """How worlds and maps are read."""
 
-    vehicle: Vehicle = CAR  # which must have room to start
+    vehicle: Vehicle = CAR  # must have room to start
     strict: bool = False  # stop at the first unfit world
-    count: int | None = None  # problems of a part at most; of a map exactly
+    count: int | None = None  # problems of a part: at most, or of a map exactly
     seed: int = 1  # of the poses on a map
     scale: float = 1.0  # metres of a map in a canonical metre
-    resolution: float | None = None  # metres a cell of a map that does not say
+    resolution: float | None = None  # metres a cell, for a map that does not say
     unknown: Literal["occupied", "free"] = "occupied"  # what unknown cells are
     tolerance_m: float = 0.0  # how far the outline of what is occupied on a map may move
 
 
 @dataclass(frozen=True)
 class Imported:
-    """A part's problems, and what was left out."""
+    """The problems of a part, and what was left out."""
 
     problems: list[Problem]
     skipped: list[tuple[str, str]]  # where it stands, and why
-    cuts: list[Cut]  # of a map: the problems, and where they lie
+    cuts: list[Cut]  # of a map: the problems and where they lie
 
     def explained(self) -> str:
         """What was left out, in a few words."""
-        return (
-            f"{len(self.skipped)} were skipped; the first {self.skipped[0][1]}"
-            if self.skipped
-            else "it is empty"
-        )
+        if not self.skipped:
+            return "it is empty"
+        return f"{len(self.skipped)} were skipped; the first {self.skipped[0][1]}"
 
 
 def import_part(
-    source: Source, part: Part, settings: ImportSettings | None = None, tell: Tell = lambda done, total: None
+    source: Source,
+    part: Part,
+    settings: ImportSettings | None = None,
+    progress: Progress = lambda done, total: None,
 ) -> Imported:
-    """The problems of one part of a source, in an order that stays, each checked for the vehicle.
+    """The problems of one ``part`` of a ``source``, always in the same order, each checked for the vehicle.
 
-    Worlds in folders of parts are those of the part's folder; otherwise every second world is for testing. A
-    map's blocks lie in the pattern of a chequerboard. StorageError: nothing can be read, or with
-    ``strict`` one is unfit.
+    If a source has folders for parts, these hold a part's worlds; otherwise every second world is for
+    testing. The blocks of a map belong to its parts like the squares of a chequerboard. ``settings``: how to
+    read the source.
+    ``progress``: is told how far the import is.
+
+    Raises StorageError if nothing can be read, or if a world is unfit and the settings are strict.
     """
     if part not in PARTS:
-        raise StorageError(f"{part!r} is no part of worlds; wanted is one of {', '.join(PARTS)}.")
+        raise StorageError(f"{part!r} is not a part of worlds; wanted is one of {', '.join(PARTS)}.")
     settings = settings or ImportSettings()
     if source.is_map:
-        return _of_map(source, part, settings, tell)
+        return _of_map(source, part, settings, progress)
     problems: dict[str, Problem] = {}
     skipped = []
-    for number, (place, item) in enumerate(_worlds(source, part, settings, tell)):
+    for number, (where, item) in enumerate(_worlds(source, part, settings, progress)):
         if not source.has_parts and (number % 2 == 1) != (part == "test"):
             continue
         if isinstance(item, Problem) and item.id in problems:
@@ -83,16 +87,16 @@ def import_part(
         if isinstance(item, Problem):
             problems[item.id] = item
         elif settings.strict:
-            raise StorageError(sentence(place, item))
+            raise StorageError(sentence(where, item))
         else:
-            skipped.append((place, item))
+            skipped.append((where, item))
         if len(problems) == settings.count:
             break
     return Imported(list(problems.values()), skipped, [])
 
 
 def load_map(source: Source, settings: ImportSettings | None = None) -> OccupancyMap:
-    """The map of a source; StorageError with what is wrong with it."""
+    """The map of a ``source``, read by ``settings``. Raises StorageError with what is wrong with it."""
     settings = settings or ImportSettings()
     name, unknown_is_occupied = source.class_name, settings.unknown == "occupied"
     try:
@@ -107,29 +111,24 @@ def load_map(source: Source, settings: ImportSettings | None = None) -> Occupanc
         raise StorageError(sentence(source.path, error)) from None
 
 
-def _of_map(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Imported:
+def _of_map(source: Source, part: Part, settings: ImportSettings, progress: Progress) -> Imported:
     if part == "validation":
-        raise StorageError(f"{source.path} is a map, whose parts are train and test; ask for one of them.")
+        raise StorageError(f"{source.path} is a map, with the parts train and test; ask for one of them.")
     world = load_map(source, settings)
     surroundings = surroundings_of(world, settings.scale, settings.tolerance_m)
     try:
         if source.path.suffix != ".scen":
             count = CUT_PROBLEMS if settings.count is None else settings.count
             cuts = cut_problems(
-                world,
-                surroundings,
-                part,
-                count,
-                settings.seed,
-                settings.vehicle,
-                lambda done: tell(done, count),
-            )
+                world, surroundings, part, count, settings.seed, settings.vehicle,
+                lambda done: progress(done, count),
+            )  # fmt: skip
             return Imported([cut.problem for cut in cuts], [], cuts)
         cuts, skipped = [], []
         ends = read_scenarios(source.path, world)[: settings.count]
-        found = cut_scenarios(world, surroundings, part, ends, settings.vehicle)
-        for number, cut in enumerate(found, start=1):
-            tell(number, len(ends))
+        scenarios = cut_scenarios(world, surroundings, part, ends, settings.vehicle)
+        for number, cut in enumerate(scenarios, start=1):
+            progress(number, len(ends))
             if isinstance(cut, Cut):
                 cuts.append(cut)
             else:
@@ -139,17 +138,17 @@ def _of_map(source: Source, part: Part, settings: ImportSettings, tell: Tell) ->
         raise StorageError(sentence(source.path, error)) from None
 
 
-def _worlds(source: Source, part: Part, settings: ImportSettings, tell: Tell) -> Iterator[Item]:
-    """Every world of a source's files, checked."""
+def _worlds(source: Source, part: Part, settings: ImportSettings, progress: Progress) -> Iterator[Item]:
+    """Every world in the files of a source, checked."""
     files = source.files(part)
     for number, file in enumerate(files, start=1):
         try:
-            for place, item in _worlds_of(file, source, part, settings):
+            for where, item in _worlds_of(file, source, part, settings):
                 fault = problem_fault(item, settings.vehicle) if isinstance(item, Problem) else None
-                yield place, item if fault is None else f"cannot be planned in: {fault}"
+                yield where, item if fault is None else f"cannot be planned in: {fault}"
         except (ValueError, StorageError) as error:
             yield str(file), str(error).removeprefix(str(file)).strip(" .")
-        tell(number, len(files))
+        progress(number, len(files))
 
 
 def _worlds_of(file: Path, source: Source, part: Part, settings: ImportSettings) -> Iterator[Item]:
@@ -163,7 +162,7 @@ def _worlds_of(file: Path, source: Source, part: Part, settings: ImportSettings)
         case "polygons":
             yield str(file), polygon_world(file, identity, name)
         case "numpy":
-            for place, problem in grid_worlds(file, identity, name, settings.unknown == "occupied"):
-                yield f"{file} {place}", problem
+            for where, problem in grid_worlds(file, identity, name, settings.unknown == "occupied"):
+                yield f"{file} {where}", problem
         case _:
             yield from problems_or_faults(file, settings.vehicle)

@@ -1,18 +1,32 @@
-"""How large a map may be, in cells and in metres; files that ask for more are refused unread."""
+"""How large files and maps may be; those that ask for more are refused unread."""
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Final
 
 MOST_CELLS: Final = 25_000_000  # 5,000 x 5,000: some seconds and a gigabyte while it is made into pieces
 SMALLEST_CELL_M: Final = 0.001
 LARGEST_CELL_M: Final = 100.0
-LARGEST_FILE: Final = 200_000_000  # bytes
+
+
+def check_file(file: Path, most: int, advice: str) -> None:
+    """Raise ValueError, the end of a sentence, if a ``file`` has more than ``most`` bytes.
+
+    ``advice``: what to do then.
+    """
+    if file.is_file() and file.stat().st_size > most:
+        raise ValueError(f"is larger than {most:,} bytes; {advice}")
+
+
+def whole_number(word: str) -> int | None:
+    """The number that a ``word`` of up to seven digits writes; None if it is not one."""
+    return int(word) if word.isascii() and word.isdigit() and len(word) < 8 else None
 
 
 def check_size(rows: int, columns: int) -> None:
-    """ValueError, the end of a sentence, where a grid is empty or too large."""
+    """Raise ValueError, the end of a sentence, if ``rows`` by ``columns`` cells are none or too many."""
     if rows < 1 or columns < 1:
         raise ValueError(f"has {rows} x {columns} cells; wanted is at least one")
     if rows * columns > MOST_CELLS:
@@ -22,7 +36,7 @@ def check_size(rows: int, columns: int) -> None:
 
 
 def check_resolution(metres: float) -> None:
-    """ValueError, the end of a sentence, where a cell's side is no length that a map could have."""
+    """Raise ValueError, the end of a sentence, if no map could have cells of so many ``metres``."""
     if not (math.isfinite(metres) and SMALLEST_CELL_M <= metres <= LARGEST_CELL_M):
         raise ValueError(
             f"has resolution {metres:g}; wanted are metres a cell, {SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g}"

@@ -1,6 +1,7 @@
 """Maps and scenarios of the Moving AI benchmarks (Sturtevant 2012): characters as cells, row 0 at the top.
 
-A cell is one metre unless said otherwise, the lower left corner of the map is at (0, 0), y goes up.
+A cell is one metre unless another resolution is given. The lower left corner of the map is at (0, 0), y goes
+up.
 """
 
 from __future__ import annotations
@@ -13,20 +14,25 @@ import numpy as np
 from planners.maps.occupancy_map import OccupancyMap
 from planners.world.arrays import Floats
 from storage.places.files import read_text
-from storage.worlds.limits import LARGEST_FILE, check_resolution, check_size
+from storage.worlds.limits import check_file, check_resolution, check_size, whole_number
 
 CELL_M: Final = 1.0
+LARGEST_FILE: Final = 200_000_000  # bytes
 PASSABLE: Final = ".GS"  # ground, and swamp
 BLOCKED: Final = "@OTW"  # out of bounds, trees, and water
+_ADVICE: Final = "cut it into several"
 _HEADER: Final = ("type", "height", "width", "map")
 _SCENARIO: Final = ("bucket", "map", "width", "height", "x", "y", "x", "y", "length")
 
 
 def read_map(file: Path, name: str, resolution: float | None = None) -> OccupancyMap:
-    """The map of a ``.map`` file; ValueError or StorageError with what is wrong with it."""
+    """The map called ``name`` in a ``.map`` file, with cells of ``resolution`` metres.
+
+    Raises ValueError, the end of a sentence, or StorageError with what is wrong with the file.
+    """
     metres = CELL_M if resolution is None else resolution
     check_resolution(metres)
-    _check_file(file)
+    check_file(file, LARGEST_FILE, _ADVICE)
     lines = read_text(file).splitlines()
     words = [line.split() for line in lines[:4]]
     if [word[0] if word else "" for word in words] != list(_HEADER):
@@ -37,11 +43,11 @@ def read_map(file: Path, name: str, resolution: float | None = None) -> Occupanc
     while cells and not cells[-1].strip():
         cells.pop()
     if len(cells) != rows or any(len(row) != columns for row in cells):
-        wrong = next((i for i, row in enumerate(cells) if len(row) != columns), len(cells))
-        found = (
-            f"row {wrong + 1} has {len(cells[wrong])} cells" if wrong < len(cells) else f"it has {wrong} rows"
+        wrong = next((i for i, row in enumerate(cells) if len(row) != columns), None)
+        fault = (
+            f"it has {len(cells)} rows" if wrong is None else f"row {wrong + 1} has {len(cells[wrong])} cells"
         )
-        raise ValueError(f"should have {rows} rows of {columns} cells, but {found}; is it cut off?")
+        raise ValueError(f"should have {rows} rows of {columns} cells, but {fault}; is it cut off?")
     text = "".join(cells)
     odd = sorted(set(text) - set(PASSABLE + BLOCKED))
     if odd:
@@ -52,21 +58,21 @@ def read_map(file: Path, name: str, resolution: float | None = None) -> Occupanc
 
 
 def map_of_scenarios(file: Path) -> Path:
-    """The ``.map`` file beside a ``.scen`` file that belongs to it; ValueError where there is none."""
+    """The ``.map`` file that a ``.scen`` file belongs to, beside it. Raises ValueError if there is none."""
     first = next(iter(_rows(file)), None)
     if first is None:
         raise ValueError("holds no scenario")
     name = first[1].replace("\\", "/").rpartition("/")[2]
-    place = file.parent / name
-    if not name.endswith(".map") or not place.is_file():
+    path = file.parent / name
+    if not name.endswith(".map") or not path.is_file():
         raise ValueError(f"is of map {name[:60]!r}, which does not lie beside it; put it there")
-    return place
+    return path
 
 
 def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
-    """Where the scenarios of a ``.scen`` file start and end: ``[n, 2, 2]`` grid metres, middles of cells.
+    """Starts and ends ``[n, 2, 2]`` of the scenarios in a ``.scen`` file, grid metres, middles of cells.
 
-    ValueError: a line is malformed, or of a map of another size.
+    ``world``: the map they belong to. Raises ValueError if a line is malformed, or of a map of another size.
     """
     rows, columns = world.occupied.shape
     ends = []
@@ -74,7 +80,7 @@ def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
         try:
             width, height, *cells = (int(word) for word in words[2:8])
         except ValueError:
-            raise ValueError(f"scenario {number} is not {' '.join(_SCENARIO)}") from None
+            raise ValueError(f"scenario {number} does not consist of {' '.join(_SCENARIO)}") from None
         if (width, height) != (columns, rows):
             raise ValueError(
                 f"scenario {number} is of a map of {width} x {height} cells, the map has {columns} x {rows}"
@@ -82,13 +88,13 @@ def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
         if not all(0 <= cell < most for cell, most in zip(cells, (columns, rows) * 2, strict=True)):
             raise ValueError(f"scenario {number} begins or ends outside of the map")
         ends.append(cells)
-    places = np.array(ends, float).reshape(-1, 2, 2) + 0.5
-    places[..., 1] = rows - places[..., 1]
-    return world.resolution * places
+    middles = np.array(ends, float).reshape(-1, 2, 2) + 0.5
+    middles[..., 1] = rows - middles[..., 1]
+    return world.resolution * middles
 
 
 def _rows(file: Path) -> list[list[str]]:
-    _check_file(file)
+    check_file(file, LARGEST_FILE, _ADVICE)
     lines = read_text(file).splitlines()
     if not lines or not lines[0].startswith("version"):
         raise ValueError("does not begin with a version; is it a file of scenarios?")
@@ -99,12 +105,8 @@ def _rows(file: Path) -> list[list[str]]:
     return rows
 
 
-def _check_file(file: Path) -> None:
-    if file.is_file() and file.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"is larger than {LARGEST_FILE:,} bytes; cut it into several")
-
-
 def _count(words: list[str], what: str) -> int:
-    if len(words) != 2 or not (words[1].isascii() and words[1].isdigit() and len(words[1]) < 8):
+    count = whole_number(words[1]) if len(words) == 2 else None
+    if count is None:
         raise ValueError(f"has no whole number as its {what}; is it a map of Moving AI?")
-    return int(words[1])
+    return count

@@ -15,25 +15,29 @@ from storage.worlds.limits import check_resolution, check_size
 from storage.worlds.pictures import PIXELS, problem_of_cells
 
 CELL_M: Final = 1.0
-MOST_NUMBERS: Final = 100_000_000  # of a stack of worlds: 2,475 of them
+MOST_NUMBERS: Final = 100_000_000  # in a stack of worlds: 2,475 of them
 Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 
 
 def is_stack(file: Path) -> bool:
-    """Whether a file holds worlds ``[n, 201, 201]`` and no map ``[rows, columns]``."""
+    """Whether a ``file`` holds worlds ``[n, 201, 201]`` rather than a map ``[rows, columns]``."""
     return any(len(shape) == 3 for _, shape in _shapes(file))
 
 
 def read_grid(
     file: Path, name: str, resolution: float | None = None, unknown_is_occupied: bool = True
 ) -> OccupancyMap:
-    """The map of a file with one array ``[rows, columns]``; ValueError with what is wrong with it."""
+    """The map called ``name`` in a ``file`` with one array ``[rows, columns]``, ``resolution`` metres a cell.
+
+    Unknown cells are occupied or free. Raises ValueError, the end of a sentence, with what is wrong with the
+    file.
+    """
     metres = CELL_M if resolution is None else resolution
     check_resolution(metres)
     shapes = list(_shapes(file))
     if len(shapes) != 1 or len(shapes[0][1]) != 2:
-        found = ", ".join(str(list(shape)) for _, shape in shapes[:5]) or "nothing"
-        raise ValueError(f"holds {found}; wanted was one array [rows, columns]")
+        arrays = ", ".join(str(list(shape)) for _, shape in shapes[:5]) or "nothing"
+        raise ValueError(f"holds {arrays}; wanted was one array [rows, columns]")
     check_size(*shapes[0][1])
     cells = _occupied(_arrays(file)[0][1], unknown_is_occupied)
     return OccupancyMap(name, cells[::-1], metres)
@@ -42,9 +46,10 @@ def read_grid(
 def grid_worlds(
     file: Path, identity: str, class_name: str, unknown_is_occupied: bool = True
 ) -> Iterator[tuple[str, Problem]]:
-    """The canonical problems of arrays ``[201, 201]`` or ``[n, 201, 201]``, each with its place in the file.
+    """The canonical problems of arrays ``[201, 201]`` or ``[n, 201, 201]``, and where each stands in them.
 
-    ValueError with what is wrong with the file.
+    ``file``: the arrays lie in. ``identity``: beginning of their ids. ``class_name``: their class. Unknown
+    cells are occupied or free. Raises ValueError, the end of a sentence, with what is wrong with the file.
     """
     shapes = list(_shapes(file))
     for name, shape in shapes:
@@ -65,14 +70,16 @@ def _occupied(cells: Array, unknown_is_occupied: bool) -> Cells:
     if cells.dtype.kind in "if":
         unknown = unknown | (cells == -1)
     occupied: Cells = cells == 1
-    odd = ~(unknown | occupied | (cells == 0))
-    if odd.any():
-        raise ValueError(f"holds {cells[odd][0]}; wanted are 0 (free), 1 (occupied) and -1 or NaN (unknown)")
+    other = ~(unknown | occupied | (cells == 0))
+    if other.any():
+        raise ValueError(
+            f"holds {cells[other][0]}; wanted are 0 (free), 1 (occupied) and -1 or NaN (unknown)"
+        )
     return occupied | unknown if unknown_is_occupied else occupied
 
 
 def _shapes(file: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
-    """The arrays of a file by name with their shapes, which stand at their beginnings."""
+    """The names and shapes of the arrays in a file, from the headers alone."""
     try:
         if file.suffix == ".npz":
             with zipfile.ZipFile(file) as archive:
@@ -84,7 +91,7 @@ def _shapes(file: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
                 yield file.stem, _shape(stream)
     except FileNotFoundError:
         raise ValueError("does not exist; check the name") from None
-    except Exception as error:  # of a malformed header NumPy raises whatever its parsers raise
+    except Exception as error:  # NumPy raises whatever its parsers raise for a malformed header
         raise _broken(error) from None
 
 
@@ -100,7 +107,7 @@ def _shape(stream: IO[bytes]) -> tuple[int, ...]:
 
 
 def _arrays(file: Path) -> list[tuple[str, Array]]:
-    """The arrays of a file whose shapes have been looked at."""
+    """The arrays of a file whose shapes were checked."""
     try:
         if file.suffix != ".npz":
             return [(file.stem, np.load(file, allow_pickle=False))]

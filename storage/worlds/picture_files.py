@@ -1,4 +1,4 @@
-"""Pictures as numbers: whole, of a kind that is understood, and not larger than memory allows."""
+"""Pictures as numbers; only whole ones of known kinds that fit into memory."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ _MODES: Final = ("1", "L", "LA", "P", "RGB", "RGBA")
 class Picture(NamedTuple):
     """A picture's pixels, row 0 at the top."""
 
-    levels: Levels  # [rows, columns] grey, 0 black to 255 white, on white paper where transparent
-    drawn: Cells  # [rows, columns] whether there is any colour; False where wholly transparent
+    levels: Levels  # [rows, columns] grey, 0 black to 255 white, with white paper behind transparent ones
+    drawn: Cells  # [rows, columns] False for wholly transparent pixels
 
 
 def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | None = None) -> Picture:
-    """The picture in a file of one of Pillow's ``kinds``, such as PNG, of ``wanted`` width and height.
+    """The picture in a ``file`` of one of Pillow's ``kinds``, such as PNG, of ``wanted`` width and height.
 
-    ValueError, the end of a sentence: it is no whole picture, of another size or kind, or too large.
+    Raises ValueError, the end of a sentence, if it is not a whole picture, of another size or kind, or too
+    large.
     """
     if not file.is_file():
-        raise ValueError("is no file")
+        raise ValueError("is not a file")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", Image.DecompressionBombWarning)
@@ -39,7 +40,7 @@ def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | N
                 coloured = picture.convert("RGBA")
     except _WrongPictureError:
         raise
-    except Exception as error:  # of a file that only begins like a picture Pillow raises anything
+    except Exception as error:  # Pillow raises anything for a file that only begins like a picture
         reason = str(error).partition("\n")[0]
         raise ValueError(f"is no whole {' or '.join(kinds)} picture ({reason})") from None
     paper = Image.new("RGBA", coloured.size, "white")
@@ -60,4 +61,4 @@ def _check_shape(picture: Image.Image, wanted: tuple[int, int] | None) -> None:
 
 
 class _WrongPictureError(ValueError):
-    """A whole picture, but not the one wanted."""
+    """The picture is whole, but of another kind or size."""

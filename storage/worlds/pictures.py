@@ -27,13 +27,16 @@ DARK: Final = 128  # grey levels below are obstacles
 
 
 def picture_world(file: Path, identity: str, class_name: str) -> Problem:
-    """The canonical problem that a picture shows; ValueError with the reason why it shows none."""
+    """The canonical problem that the picture in a ``file`` shows, with an id ``identity`` and a class.
+
+    Raises ValueError, the end of a sentence, with what is wrong with the file.
+    """
     levels = read_picture(file, ("PNG",), (PIXELS, PIXELS)).levels
     return problem_of_cells(levels < DARK, identity, class_name)
 
 
 def problem_of_cells(occupied: Cells, identity: str, class_name: str) -> Problem:
-    """The canonical problem with these of its 201 x 201 pixels occupied, row 0 at the top."""
+    """The canonical problem with pixels ``occupied [201, 201]``, row 0 at the top, an id and a class."""
     low, high = np.round(CORNER_M + PIXEL_M * np.array([0, PIXELS]), 6).tolist()
     bounds = (low, low, high, high)
     obstacles = obstacles_of_cells(occupied)
@@ -41,15 +44,15 @@ def problem_of_cells(occupied: Cells, identity: str, class_name: str) -> Problem
 
 
 def obstacles_of_cells(occupied: Cells) -> Obstacles:
-    """The fewest rectangles that cover exactly the occupied pixels ``[rows, columns]``, row 0 at the top.
+    """The fewest rectangles that cover exactly the ``occupied [rows, columns]`` pixels, row 0 at the top.
 
-    One obstacle holds the rectangles of one region whose pixels share sides.
+    An obstacle holds the rectangles of a region whose pixels share sides.
     """
     upright = occupied[::-1]
-    found = rectangles_of(upright)
+    fewest = rectangles_of(upright)
     regions, count = ndimage.label(upright)
-    region = regions[found.first_rows, found.first_columns]
-    edges = np.stack([found.first_columns, found.first_rows, found.last_columns, found.last_rows], axis=1)
+    region = regions[fewest.first_rows, fewest.first_columns]
+    edges = np.stack([fewest.first_columns, fewest.first_rows, fewest.last_columns, fewest.last_rows], axis=1)
     boxes = np.round(CORNER_M + PIXEL_M * edges, 6)
     corners = boxes[:, [[0, 1], [2, 1], [2, 3], [0, 3]]]
     order = np.argsort(region, kind="stable")

@@ -1,7 +1,7 @@
-"""Worlds as text: how many polygons, then of each how many corners, and their x y pairs (DROMOS).
+"""Worlds as text (DROMOS): the number of polygons, then of each the number of corners and their x y pairs.
 
-The workspace is 50 x 50 m, start and goal its lower left and upper right corners; around it there is the
-canonical frame's margin. Polygons may be non-convex, and touch the workspace's border.
+The workspace is 50 x 50 m, with start and goal in its lower left and upper right corners, inside the margin
+of the canonical frame. Polygons may be non-convex, and may touch the border of the workspace.
 """
 
 from __future__ import annotations
@@ -15,14 +15,17 @@ import numpy as np
 from planners.world.geometry.polygons import PolygonError, convex_pieces
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Problem, obstacles_of
 from storage.places.files import read_text
+from storage.worlds.limits import check_file, whole_number
 
 LARGEST_FILE: Final = 10_000_000  # bytes
 
 
 def polygon_world(file: Path, identity: str, class_name: str) -> Problem:
-    """The canonical problem that a scene describes; ValueError or StorageError with the reason why none."""
-    if file.is_file() and file.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"is larger than {LARGEST_FILE:,} bytes; is it a scene of polygons?")
+    """The canonical problem in a ``file``, with an id ``identity`` and a class.
+
+    Raises ValueError, the end of a sentence, or StorageError with what is wrong with the file.
+    """
+    check_file(file, LARGEST_FILE, "is it a scene of polygons?")
     words = iter(read_text(file).split())
     groups = []
     for number in range(1, _whole(words, "the number of polygons") + 1):
@@ -41,9 +44,10 @@ def polygon_world(file: Path, identity: str, class_name: str) -> Problem:
 
 def _whole(words: Iterator[str], what: str) -> int:
     word = next(words, "")
-    if not (word.isascii() and word.isdigit() and len(word) < 8):
+    number = whole_number(word)
+    if number is None:
         raise ValueError(f"has {word[:20]!r} where {what} was wanted; is it cut off?")
-    return int(word)
+    return number
 
 
 def _number(words: Iterator[str], polygon: int) -> float:

@@ -1,7 +1,7 @@
 """Maps of ROS's map_server: a YAML file beside a PGM or PNG picture.
 
-The YAML gives metres a pixel, the pose of the picture's lower left corner, and how dark a pixel is free or
-occupied; see docs/worlds.md for the three modes.
+The YAML says how many metres a pixel takes, where the picture's lower left corner lies, and how dark free and
+occupied pixels are; docs/worlds.md describes the three modes.
 """
 
 from __future__ import annotations
@@ -15,27 +15,24 @@ import yaml
 
 from planners.maps.occupancy_map import Cells, OccupancyMap
 from storage.places.files import read_text
-from storage.worlds.limits import check_resolution
+from storage.worlds.limits import check_file, check_resolution
 from storage.worlds.picture_files import Picture, read_picture
 
 LARGEST_YAML: Final = 16_384  # bytes
-MOST_BRACKETS: Final = 64  # a map has one list; unclosed ones cost the parser the square of their number
+MOST_BRACKETS: Final = 64  # a map has one list; the parser takes the square of the number of unclosed ones
 MODES: Final = ("trinary", "scale", "raw")
 FARTHEST_ORIGIN_M: Final = 1e8  # beyond any grid of the earth
 _BROKEN: Final = (
-    yaml.YAMLError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    LookupError,
-    ArithmeticError,
-    RecursionError,
-)
+    yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RecursionError,
+)  # fmt: skip
 _REQUIRED: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 
 
 def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> OccupancyMap:
-    """The map of a YAML file; ValueError or StorageError with what is wrong with it or its picture."""
+    """The map called ``name`` in a YAML ``file``; unknown cells are occupied or free.
+
+    Raises ValueError, the end of a sentence, or StorageError with what is wrong with the file or its picture.
+    """
     fields = _fields(file)
     resolution = _number(fields["resolution"], "resolution")
     check_resolution(resolution)
@@ -51,12 +48,12 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
 
 
 def picture_of(file: Path) -> Path:
-    """The picture that a map's YAML file names."""
+    """The picture that a map's YAML ``file`` names."""
     return _picture_file(file, _fields(file)["image"])
 
 
 def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
-    """Which pixels are surely occupied, and which surely free; the others are unknown."""
+    """Which pixels are surely occupied, and which are surely free; the others are unknown."""
     occupied_from = _share(fields["occupied_thresh"], "occupied_thresh")
     free_to = _share(fields["free_thresh"], "free_thresh")
     mode = fields.get("mode", "trinary")
@@ -68,26 +65,25 @@ def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
         )
     levels = picture.levels.astype(float)
     if mode == "raw":
-        known = picture.drawn & (levels <= 100.0)  # percent; 101 to 255 is unknown
+        is_known = picture.drawn & (levels <= 100.0)  # percent; 101 to 255 is unknown
         share = levels / 100.0
-        return known & (share >= occupied_from), known & (share <= free_to)
+        return is_known & (share >= occupied_from), is_known & (share <= free_to)
     negate = fields.get("negate", 0)
     if negate not in (0, 1):
         raise ValueError("has a negate that is neither 0 nor 1")
     share = (levels if negate else 255.0 - levels) / 255.0
-    if mode == "scale":  # between the thresholds a pixel is what it is more likely to be
+    if mode == "scale":  # a pixel between the thresholds is what it is more likely to be
         free_to = occupied_from = 0.5 * (free_to + occupied_from)
         return picture.drawn & (share > occupied_from), picture.drawn & (share <= free_to)
     return picture.drawn & (share > occupied_from), picture.drawn & (share < free_to)
 
 
 def _fields(file: Path) -> Mapping[str, Any]:
-    if file.is_file() and file.stat().st_size > LARGEST_YAML:
-        raise ValueError(f"is larger than {LARGEST_YAML:,} bytes; is it the YAML of a map?")
+    check_file(file, LARGEST_YAML, "is it the YAML of a map?")
     text = read_text(file)
     if text.count("[") + text.count("{") > MOST_BRACKETS:
         raise ValueError("has more lists in it than any map")
-    try:  # an alias refers to what was said before: a few lines of them could fill memory
+    try:  # an alias stands for what was written before: a few lines of them could fill memory
         aliases = any(
             isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)
         )
@@ -108,15 +104,15 @@ def _picture_file(file: Path, image: object) -> Path:
         raise ValueError("has no picture's name as its image")
     folder = file.resolve().parent
     try:
-        place = (folder / image).resolve()
-        there = place.is_file()
+        path = (folder / image).resolve()
+        exists = path.is_file()
     except (OSError, RuntimeError):  # too long a name, links in a circle
         raise ValueError(f"names the image {image[:60]!r}, which no file can be called") from None
-    if not place.is_relative_to(folder):
+    if not path.is_relative_to(folder):
         raise ValueError(f"has its image {image[:60]!r} outside of its own folder; put it beside the YAML")
-    if not there:
+    if not exists:
         raise ValueError(f"names the image {image[:60]!r}, which is not there; put it beside the YAML")
-    return place
+    return path
 
 
 def _share(value: object, what: str) -> float:

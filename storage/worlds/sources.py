@@ -1,4 +1,4 @@
-"""What lies at a path: worlds or a map, in which format, in which files."""
+"""What lies at a path: worlds or a map, in which format, and in which files."""
 
 from __future__ import annotations
 
@@ -16,23 +16,14 @@ from storage.worlds.ros_maps import picture_of
 Part = Literal["train", "test", "validation"]
 
 PARTS: Final[tuple[Part, ...]] = ("train", "test", "validation")
-WORLDS: Final = {
-    ".png": "png",
-    ".txt": "polygons",
-    ".npy": "numpy",
-    ".npz": "numpy",
-    ".json": "problems",
-    ".jsonl": "problems",
-    ".parquet": "problems",
-}
+WORLDS: Final = {  # formats by ending
+    ".png": "png", ".txt": "polygons", ".npy": "numpy", ".npz": "numpy",
+    **dict.fromkeys((".json", ".jsonl", ".parquet"), "problems"),
+}  # fmt: skip
 MAPS: Final = {
-    ".map": "moving-ai",
-    ".scen": "moving-ai",
-    ".yaml": "ros",
-    ".yml": "ros",
-    ".npy": "numpy",
-    ".npz": "numpy",
-}
+    ".map": "moving-ai", ".scen": "moving-ai", ".yaml": "ros", ".yml": "ros",
+    ".npy": "numpy", ".npz": "numpy",
+}  # fmt: skip
 FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values()}))
 
 
@@ -40,24 +31,24 @@ FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values()}))
 class Source:
     """Worlds, or a map to cut problems from."""
 
-    path: Path  # absolute; of a file, or of a folder of files
+    path: Path  # absolute, of a file or of a folder of files
     format: str  # one of FORMATS
     is_map: bool
 
     @property
     def class_name(self) -> str:
-        """The class of its problems: its own name without ending."""
+        """The class of its problems: its own name without the ending."""
         return class_of(self.path)
 
     @property
     def has_parts(self) -> bool:
-        """Whether it is a folder that holds a folder for each part."""
+        """Whether it is a folder with a folder for each part."""
         return any((self.path / part).is_dir() for part in PARTS)
 
     def files(self, part: Part) -> list[Path]:
-        """The files of its worlds, by number: of a part, or all where it has no folder for each.
+        """The files of the worlds of a ``part``, by number, or all files if there are no folders for parts.
 
-        StorageError: it has folders for other parts only.
+        Raises StorageError if there are folders for other parts only.
         """
         folder = self.path / part if self.has_parts else self.path
         if not folder.exists():
@@ -67,7 +58,7 @@ class Source:
         return _files(folder) if folder.is_dir() else [folder]
 
     def contents(self) -> list[Path]:
-        """Every file that its problems depend on, in an order that stays."""
+        """Every file that its problems depend on, always in the same order."""
         if self.path.is_dir():
             return sorted(file for file in self.path.rglob("*") if file.is_file())
         try:
@@ -81,37 +72,37 @@ class Source:
 
 
 def class_of(path: Path) -> str:
-    """The class that a path of worlds names; StorageError where it cannot name one."""
+    """The class that worlds at a ``path`` are named after. Raises StorageError if it cannot name one."""
     return checked_name(path.name if path.is_dir() else path.stem)
 
 
 def source_at(path: Path, named: str | None = None) -> Source:
-    """The worlds or the map at a path, in the format ``named`` or recognised by the files' endings.
+    """The worlds or the map at a ``path``, in the format ``named``, or else recognised by the files' endings.
 
-    StorageError: nothing is there, or nothing of a known format.
+    Raises StorageError if there is nothing, or nothing of a known format.
     """
     if named is not None and named not in FORMATS:
         raise StorageError(f"Unknown format {named!r}; known are {', '.join(FORMATS)}.")
     path = path.absolute()
     if not path.exists():
         raise StorageError(f"{path} does not exist; check the name.")
-    class_of(path)  # which raises where the name cannot be a class's
+    class_of(path)  # raises if the name cannot be that of a class
     if path.is_dir():
         return Source(path, named or _format_of_folder(path), is_map=False)
-    found = named or MAPS.get(path.suffix) or WORLDS.get(path.suffix)
-    if found is None:
-        known = ", ".join(dict.fromkeys([*WORLDS, *MAPS]))
-        raise StorageError(f"{path} is of no known format ({known}); name it with --format.")
-    if found != "numpy":
-        return Source(path, found, is_map=found in MAPS.values())
+    format_ = named or MAPS.get(path.suffix) or WORLDS.get(path.suffix)
+    if format_ is None:
+        endings = ", ".join(dict.fromkeys([*WORLDS, *MAPS]))
+        raise StorageError(f"{path} is not of a known format ({endings}); name it with --format.")
+    if format_ != "numpy":
+        return Source(path, format_, is_map=format_ in MAPS.values())
     try:
-        return Source(path, found, is_map=not is_stack(path))
+        return Source(path, format_, is_map=not is_stack(path))
     except ValueError as error:
         raise StorageError(sentence(path, error)) from None
 
 
 def _format_of_folder(folder: Path) -> str:
-    """The format of most files of a folder of worlds."""
+    """The format of most files in a folder of worlds."""
     parts = [folder / part for part in PARTS if (folder / part).is_dir()] or [folder]
     endings = Counter(file.suffix for part in parts for file in _files(part) if file.suffix in WORLDS)
     if endings:

@@ -111,7 +111,7 @@ def _parts_of(asked: Asked, _changed: tuple[int, int] | None) -> list[Part]:
 
 
 def _described(piece: ProblemSlice) -> tuple[str, int, int, int]:
-    return piece.digest, piece.first, piece.count, piece.place if piece.path.suffix == ".parquet" else 0
+    return piece.digest, piece.first, piece.count, piece.offset if piece.path.suffix == ".parquet" else 0
 
 
 def is_solved(part: Part) -> bool:

@@ -37,7 +37,7 @@ def object_storage() -> Iterator[Any]:
 def forget() -> None:
     """Be like a process that has just begun."""
     objects._client.cache_clear()
-    objects._known_errors.cache_clear()
+    objects._client_errors.cache_clear()
     layout._open_remote.cache_clear()
 
 

@@ -160,7 +160,7 @@ def test_a_name_that_reaches_out_of_the_folder_is_never_opened(archive: Path, na
         ({"version": "9" * 1000}, "this program reads version 2"),
         ({"kind": "encoder"}, "does not describe a memory"),
         ({"grid": 32}, "grids of 32 cells"),
-        ({"files": {}}, "no part of the memory"),
+        ({"files": {}}, "the memory again"),
         ({"files": None}, "damaged"),
         ({"files": {"dt.npy": "x"}}, "damaged"),
         ({"files": {"dt.npy": {"bytes": -1, "sha256": ""}}}, "damaged"),

@@ -16,10 +16,10 @@ from storage.errors import InUseError
 from storage.places import lease, objects
 from storage.places.data_folder import open_data_folder
 from storage.places.lease import leased
-from storage.places.objects import Place
+from storage.places.objects import Address
 from tests.storage.object_storage import BUCKET, DATA, machine, object_storage
 
-PLACE = Place(BUCKET, "folder/.lock")
+PLACE = Address(BUCKET, "folder/.lock")
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # of the server's libraries
 
@@ -49,7 +49,7 @@ def test_who_comes_back_to_the_same_copy_need_not_wait(storage: Any) -> None:
         pass
     with leased(PLACE, "me", "it"):
         pass
-    assert objects.look(PLACE) is None
+    assert objects.head(PLACE) is None
 
 
 def test_a_lease_that_was_not_renewed_is_taken_by_one_of_those_who_come(
@@ -57,7 +57,7 @@ def test_a_lease_that_was_not_renewed_is_taken_by_one_of_those_who_come(
 ) -> None:
     objects.put_if(PLACE, b'{"owner": "dead"}', None)
     monkeypatch.setattr(lease, "LOST_SECONDS", -1.0)
-    found = objects.look(PLACE)
+    found = objects.head(PLACE)
     assert found is not None
     with leased(PLACE, "me", "it"):
         assert objects.put_if(PLACE, b'{"owner": "who looked when I did"}', found.etag) is None
@@ -100,7 +100,7 @@ def test_a_lease_is_renewed_and_its_loss_ends_the_command(
         assert ended.wait(5.0)
     assert signals == [signal.SIGINT]
     assert "Another command took it over" in capsys.readouterr().err
-    assert objects.look(PLACE) is not None  # the other's
+    assert objects.head(PLACE) is not None  # the other's
 
 
 def test_an_answer_that_was_lost_is_not_taken_for_another_command(
@@ -111,7 +111,7 @@ def test_an_answer_that_was_lost_is_not_taken_for_another_command(
     calls = threading.Event()
     given_up: list[object] = []
 
-    def twice(place: Place, body: bytes, etag: str | None) -> str | None:
+    def twice(place: Address, body: bytes, etag: str | None) -> str | None:
         put_if(place, body, etag)
         calls.set()
         return None  # as if the first answer was lost, and the attempt after it met what the first had put
@@ -122,4 +122,4 @@ def test_an_answer_that_was_lost_is_not_taken_for_another_command(
         assert calls.wait(5.0)
         monkeypatch.setattr(objects, "put_if", put_if)
     assert not given_up
-    assert objects.look(PLACE) is None
+    assert objects.head(PLACE) is None

@@ -69,7 +69,7 @@ def test_a_place_in_storage_and_the_path_that_stands_for_it_name_each_other(
 
 @pytest.mark.parametrize("place", ["s3://bucket/../other", "s3://../x", "s3://bucket/./x"])
 def test_a_place_that_reaches_out_of_its_bucket_is_refused(place: str) -> None:
-    with pytest.raises(StorageError, match="names no place in object storage"):
+    with pytest.raises(StorageError, match=r"^s3://"):
         local_place(place)
 
 
@@ -229,7 +229,7 @@ def test_errors_that_stay_are_told_in_one_line(here: Path, monkeypatch: pytest.M
         failing = Failing(storage)
         for act in (lambda: write_json(path, 1), lambda: fetch(path), lambda: files_in(path.parent, "*")):
             failing.left = 1000
-            with pytest.raises(UnreachableError, match="the same command goes on") as told:
+            with pytest.raises(UnreachableError, match=r"^s3://") as told:
                 act()
             assert "\n" not in str(told.value)
             failing.left = 0
