@@ -85,11 +85,11 @@ def guarded_dashboard(data: DataFolder, versions: Versions) -> Guard:
 def _versions(registry: Registry) -> Sequence[MemoryVersion]:
     """Each version of each memory, oldest first. Raises NoticeError if the registry does not answer."""
     try:
-        versions = []
+        memory_versions = []
         for name in registry.names():
             champion = registry.aliased(name)
-            versions += [_memory_version(version, champion) for version in registry.versions(name)]
-        return versions
+            memory_versions += [_memory_version(version, champion) for version in registry.versions(name)]
+        return memory_versions
     except RunError as error:
         raise NoticeError(str(error)) from None
 
