@@ -37,6 +37,7 @@ class Example(NamedTuple):
     answer: Plan | None  # None if the attempt failed
     caption: str
     vehicle: Vehicle = CAR
+    collisions: bool = False  # mark every state in collision, not only the first
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -68,8 +69,11 @@ def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, colour: str = GREE
     _draw_bodies(axes, shown, vehicle, facecolor=(colour, 0.2), edgecolor=colour, linewidth=0.8, zorder=3)
 
 
-def draw_recalled(axes: Axes, recalled: CheckedPlan) -> None:
-    """Draw a ``recalled`` plan: a wide pale line if it is free, else dashed, with its collisions marked."""
+def draw_recalled(axes: Axes, recalled: CheckedPlan, collisions: bool = False) -> None:
+    """Draw a ``recalled`` plan: wide and pale if it is free, else dashed to a cross where it first collides.
+
+    ``collisions``: whether every state in collision is marked.
+    """
     way, first = recalled.plan.states[:, :2], recalled.first_blocked
     if first is None:  # wide and below: a rim around the answer where the recalled plan is the answer
         axes.plot(*way.T, color=SKY, linewidth=4.5, zorder=2.5)
@@ -77,7 +81,8 @@ def draw_recalled(axes: Axes, recalled: CheckedPlan) -> None:
     before, after, blocked = way[: first + 1].T, way[first:].T, way[recalled.blocked]
     axes.plot(*before, color=VERMILLION, linewidth=1.3, linestyle=(0, (4, 1.5)), zorder=4)
     axes.plot(*after, color=VERMILLION, linewidth=0.8, linestyle=":", alpha=0.8, zorder=3)
-    axes.scatter(blocked[:, 0], blocked[:, 1], s=7, color=VERMILLION, linewidths=0, zorder=5)
+    if collisions:
+        axes.scatter(blocked[:, 0], blocked[:, 1], s=7, color=VERMILLION, linewidths=0, zorder=5)
     axes.plot(*way[first], marker="X", color=VERMILLION, markersize=8, markeredgecolor="white", zorder=7)
 
 
@@ -97,9 +102,21 @@ def gallery(examples: Sequence[Example], title: str = "Recalled, repaired and fo
     return figure
 
 
-def picture(example: Example, called: str = "recalled") -> Figure:
-    """A figure of one ``example``; its recalled plans are ``called`` so in the legend."""
-    figure = new_figure(6.4, 7.2, example.problem.id or "Problem")
+def picture(
+    problem: Problem,
+    answer: Plan | None,
+    caption: str,
+    recalled: Sequence[Plan] = (),
+    vehicle: Vehicle = CAR,
+    called: str = "recalled",
+    collisions: bool = False,
+) -> Figure:
+    """A figure of one ``problem``; the other arguments are those of ``Example``.
+
+    ``called``: what the legend calls the ``recalled`` plans.
+    """
+    example = Example(problem, recalled, answer, caption, vehicle, collisions)
+    figure = new_figure(6.4, 7.2, problem.id or "Problem")
     _draw_example(figure.add_subplot(), example)
     legend_below(figure, _legend([example], called), 3)
     return figure
@@ -120,7 +137,7 @@ def _draw_example(axes: Axes, example: Example) -> None:
     if example.answer is not None:
         draw_plan(axes, example.answer, example.vehicle)
     for plan in example.recalled:
-        draw_recalled(axes, checked(plan, scene, example.vehicle))
+        draw_recalled(axes, checked(plan, scene, example.vehicle), example.collisions)
     failed = example.answer is None
     title = f"{example.caption}, no plan found" if failed else example.caption
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
@@ -137,8 +154,11 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D]:
         Line2D([], [], color=GREEN, linewidth=1.8, label=f"plan found, with the vehicle every {every}"),
         Line2D([], [], color=SKY, linewidth=4.5, label=f"{called}, free"),
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
-               markersize=8, label=f"{called}, first collides at the cross"),
-        Line2D([], [], color=VERMILLION, marker="o", markersize=3, linestyle="none",
-               label=f"{called}, in collision"),
+               markersize=8, label=f"{called}, collides at the cross"),
     ]  # fmt: skip
+    if any(example.collisions for example in examples):
+        label = f"{called}, in collision"
+        handles.append(
+            Line2D([], [], color=VERMILLION, marker="o", markersize=3, linestyle="none", label=label)
+        )
     return handles if any(example.recalled for example in examples) else handles[:3]

@@ -19,7 +19,8 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from dashboards.palette import style_sheet
-from dashboards.web.chart_files import csv_file, svg_file
+from dashboards.report.tables import as_csv
+from dashboards.web.chart_file import svg_file
 from dashboards.web.data_reader import DataReader
 from dashboards.web.memory_versions import Versions
 from dashboards.web.notices import BadRequestError, MissingError, NoticeError
@@ -125,7 +126,9 @@ def _file(page: Page, name: str, kind: str) -> Response:
     chart = next((chart for chart in page.charts if chart.name == name), None)
     if chart is None:
         raise MissingError(f"This page has no chart {name[:60]!r}.")
-    content, media = (svg_file(chart), "image/svg+xml") if kind == "svg" else (csv_file(chart), "text/csv")
+    content, media = (
+        (svg_file(chart), "image/svg+xml") if kind == "svg" else (as_csv(chart.table), "text/csv")
+    )
     file_name = "-".join(part for part in (page.run, chart.name) if part)
     headers = {
         "Content-Disposition": f'attachment; filename="{file_name}.{kind}"',

@@ -69,8 +69,8 @@ def recalled_layer(recalled: CheckedPlan, number: int, order: int, is_answer: bo
         marks.append(element("polyline", points=points(way[first:]), class_="rest"))
         marks += [element("circle", cx=x, cy=y, r=0.45) for x, y in collisions]
         marks.append(element("path", d=cross))
-    fate = "free" if first is None else f"{len(collisions)} states in collision"
     kind = "free" if first is None else "blocked"
+    fate = kind if first is None else f"{len(collisions)} states in collision"
     return element(
         "g", tooltip(f"recalled {order}: plan {number}, {fate}"), *marks,
         class_=f"recalled {kind}{' answer' if is_answer else ''}", data_order=order,

@@ -156,7 +156,7 @@ def plan_one(
 ) -> None:
     """Plan for the one problem of a file; RunError when it has another number, or no plan was found.
 
-    ``explained``: say what was recalled, where it collides and what was done then. ``learn``: the
+    ``explained``: say and draw what was recalled, where it collides and what was done then. ``learn``: the
     data folder that the problem and its plan are added to as an experience.
     """
     check_picture(drawing)
@@ -173,11 +173,11 @@ def plan_one(
     recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
     told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
-        from dashboards.figures.pictures import Example, picture  # late: Matplotlib costs a third of a second
+        from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
 
         with whole_file(drawing) as temporary:
             caption = f"{assistant.planner}, {assistant.assist}: {told}"
-            figure = picture(Example(problems[0], recalled, plan, caption, assistant.vehicle))
+            figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     if explained:
         _explain(assistant, problems[0], attempt, recalled)

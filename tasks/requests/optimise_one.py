@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Final
 
-from dashboards.figures.pictures import Example, picture
+from dashboards.figures.pictures import picture
 from planners.optimisation.clearance_field import least_clearance
 from planners.optimisation.guesses import straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise
@@ -98,8 +98,7 @@ def optimise_one(
     if drawing is not None:
         with whole_file(drawing) as temporary:
             caption = f"optimised, {planner}: {told}"
-            example = Example(asked, [guess], found.plan, caption, begin.vehicle)
-            figure = picture(example, called="guess")
+            figure = picture(asked, found.plan, caption, [guess], begin.vehicle, called="guess")
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     if found.plan is None:
         raise RunError(f"No plan for {asked.id or problem}: {told}.")

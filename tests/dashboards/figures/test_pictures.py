@@ -73,7 +73,7 @@ def test_a_plan_in_collision_is_marked_where_it_first_collides(straight: Plan) -
 def test_every_state_in_collision_has_a_dot(straight: Plan) -> None:
     axes = Figure().add_subplot()
     recalled = checked(straight, scene_of(problem(WALL)))
-    draw_recalled(axes, recalled)
+    draw_recalled(axes, recalled, collisions=True)
     (dots,) = axes.collections
     assert np.array_equal(dots.get_offsets(), straight.states[recalled.blocked, :2])
 
@@ -121,5 +121,5 @@ def test_a_plan_of_one_state_can_be_drawn() -> None:
 
 def test_a_picture_of_a_problem_is_written_with_and_without_a_plan(tmp_path: Path, straight: Plan) -> None:
     for name, plan in (("with", straight), ("without", None)):
-        for path in save(picture(Example(problem(WALL), [], plan, "RRT, none")), tmp_path, name):
+        for path in save(picture(problem(WALL), plan, "RRT, none"), tmp_path, name):
             assert path.stat().st_size > 5000

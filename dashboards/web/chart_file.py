@@ -1,4 +1,4 @@
-"""A chart as a file: SVG that needs no other file, or the numbers behind it."""
+"""A chart as an SVG file that needs no other file."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from importlib.resources import files
 from typing import Final
 
 from dashboards.palette import style_sheet
-from dashboards.report.tables import as_csv
 from dashboards.web.charts import Chart
 from dashboards.web.svg import element, text
 
@@ -51,8 +50,3 @@ def svg_file(chart: Chart) -> str:
         "svg", element("style", style), ground, *marks, xmlns="http://www.w3.org/2000/svg", width=width,
         height=height, viewBox=f"0 0 {width:g} {height:g}",
     )  # fmt: skip
-
-
-def csv_file(chart: Chart) -> str:
-    """The numbers behind a ``chart``, unrounded."""
-    return as_csv(chart.table)
