@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.fan_out.fan_out import run_stage, task_runner
 from tasks.reports.stage_times import timed
 from tasks.session.hold import holding
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.benchmark import benchmark_chunks, benchmark_problems, is_benchmarked
+from tasks.stages.benchmark import BENCHMARK
 
 
 @flow(name="benchmark", task_runner=task_runner())
@@ -16,4 +16,4 @@ from tasks.stages.benchmark import benchmark_chunks, benchmark_problems, is_benc
 @timed
 def benchmark(settings: RunSettings, data: str) -> None:
     """Solve unseen problems of each class in every configuration, and keep a row of every attempt."""
-    fan_out(benchmark_problems, benchmark_chunks(data, settings), "benchmark", is_benchmarked)
+    run_stage(BENCHMARK, data, settings)

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.fan_out.fan_out import fan_out, task_runner
-from tasks.fan_out.stage import Chunk, keep_settings
-from tasks.inputs.problem_sources import read_worlds, tell_skipped, world_chunks, worlds_are_read
+from tasks.fan_out.chunk import keep_settings
+from tasks.fan_out.fan_out import run_stage, task_runner
 from tasks.reports.stage_times import timed
 from tasks.session.hold import holding
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.collect import chunks_wanted, collect_problems, is_collected
-from tasks.stages.curate import (
-    curate_candidates,
-    curation_chunks,
-    improve_kept,
-    improvement_chunks,
-    is_curated,
-    is_improved,
-    keep_experiences,
-)
+from tasks.stages.collect import COLLECT
+from tasks.stages.curate import CURATE
+from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
+from tasks.stages.read_worlds import READ_WORLDS, tell_skipped
 
 
 @flow(name="collect", task_runner=task_runner())
@@ -28,12 +21,10 @@ from tasks.stages.curate import (
 def collect(settings: RunSettings, data: str) -> None:
     """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""
     keep_settings(data, settings)
-    tell_skipped(fan_out(read_worlds, world_chunks(data, settings), "read worlds", worlds_are_read))
-    done: dict[Chunk, dict[str, int]] = {}
-    while chunks := chunks_wanted(data, settings, done):
-        done |= zip(chunks, fan_out(collect_problems, chunks, "collect", is_collected), strict=True)
-    curated = curation_chunks(data, settings, done)
-    fan_out(curate_candidates, curated, "curate", is_curated)
-    improved = improvement_chunks(data, settings, curated)
-    fan_out(improve_kept, improved, "optimise", is_improved)
-    keep_experiences(data, settings, curated, improved)
+    worlds = run_stage(READ_WORLDS, data, settings)
+    tell_skipped(worlds.values())
+    run_stage(COLLECT, data, settings)
+    run_stage(CURATE, data, settings)
+    run_stage(IMPROVE, data, settings)
+    run_stage(KEEP, data, settings)
+    run_stage(COMBINE, data, settings)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from prefect import flow
 
-from tasks.fan_out.fan_out import fan_out, task_runner
+from tasks.fan_out.fan_out import run_stage, task_runner
 from tasks.reports.stage_times import timed
 from tasks.session.hold import holding
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.judge import check_plans, is_judged, judge_chunks, judge_problems, plan_chunks
+from tasks.stages.judge import CHECK_PLANS, JUDGE
 
 
 @flow(name="judge", task_runner=task_runner())
@@ -16,5 +16,5 @@ from tasks.stages.judge import check_plans, is_judged, judge_chunks, judge_probl
 @timed
 def judge(settings: RunSettings, data: str) -> None:
     """Check every plan once more, then attempt held-back problems with champions and challengers."""
-    fan_out(check_plans, plan_chunks(data, settings), "check plans", lambda _: True)
-    fan_out(judge_problems, judge_chunks(data, settings), "judge", is_judged)
+    run_stage(CHECK_PLANS, data, settings)
+    run_stage(JUDGE, data, settings)

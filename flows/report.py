@@ -1,16 +1,16 @@
-"""Report what a run found."""
+"""Report on a run."""
 
 from __future__ import annotations
 
 from prefect import flow
 
-from tasks.fan_out.fan_out import fan_out, task_runner
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
+from tasks.fan_out.fan_out import run_stage, task_runner
 from tasks.reports.report import report_run, show
 from tasks.reports.stage_times import timed
 from tasks.session.hold import holding
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.draw_examples import draw_figures, figure_chunks, is_drawn
+from tasks.stages.draw_examples import DRAW_EXAMPLES
 from tasks.tracking.artifacts import publish
 from tasks.tracking.logbook import log_report
 
@@ -20,8 +20,8 @@ from tasks.tracking.logbook import log_report
 @timed
 def report(settings: RunSettings, data: str) -> None:
     """Turn the rows of a run into tables and figures, print the tables, and log all of it."""
-    fan_out(draw_figures, figure_chunks(data, settings), "draw", is_drawn)
-    found, run = report_run(data, settings), run_folder(data, settings)
-    log_report(data, settings, found)
-    publish(run, found.claims)
-    show(found, run)
+    run_stage(DRAW_EXAMPLES, data, settings)
+    results, run = report_run(data, settings), run_folder(data, settings)
+    log_report(data, settings, results)
+    publish(run, results.claims)
+    show(results, run)

@@ -25,8 +25,9 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
-from storage.places.data_folder import NAME, DataFolder, RunFolder, open_run
+from storage.places.data_folder import DataFolder, open_run
 from storage.places.files import read_json, read_text
+from storage.places.run_folder import NAME, RunFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.imported_problems import read_imported
 

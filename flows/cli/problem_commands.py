@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
+
+if TYPE_CHECKING:
+    from tasks.requests.problem_parts import PartSolved, SolveRequest
 
 _USUAL: Final = SolveOptions()
 
@@ -128,4 +131,11 @@ def solve(
     """
     from tasks.requests.solve_many import solve_many
 
-    solve_many(options.way(assist, improve_seconds), problems, out, plans, learn, worker_count(workers))
+    way = options.way(assist, improve_seconds)
+    solve_many(way, problems, out, plans, learn, worker_count(workers), _solve_parts)
+
+
+def _solve_parts(request: SolveRequest) -> list[PartSolved]:
+    from flows.solve import solve  # late: Prefect reads its environment when it is imported
+
+    return solve(request)

@@ -30,7 +30,7 @@ from storage.archives.arrays import array_of
 from storage.archives.tensors import check_floats, packed, unpacked
 from storage.errors import StorageError
 from storage.fields import scale_of, short, text_of
-from storage.places.data_folder import checked_name
+from storage.places.run_folder import checked_name
 
 _KIND: Final = "memory"
 _WEIGHTS: Final = "encoder.safetensors"

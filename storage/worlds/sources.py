@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from storage.errors import StorageError, sentence
-from storage.places.data_folder import checked_name
+from storage.places.run_folder import checked_name
 from storage.worlds.moving_ai import map_of_scenarios
 from storage.worlds.numpy_grids import is_stack
 from storage.worlds.ros_maps import picture_of

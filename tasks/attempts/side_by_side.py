@@ -13,7 +13,7 @@ from planners.world.vehicles.vehicle import vehicle_named
 from tasks.attempts.attempt_rows import attempt_row, check_attempt
 from tasks.attempts.compile_assists import compile_assists
 from tasks.attempts.timing import no_garbage_collection
-from tasks.fan_out.stage import Chunk
+from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import Generated, Worlds
 
 COLLECTED_EVERY: Final = 10  # problems; collecting garbage takes as long as some ten attempts

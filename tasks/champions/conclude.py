@@ -19,8 +19,8 @@ from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from tasks.champions.new_experience import Round
 from tasks.champions.promote import promote
+from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.keys import key_of
-from tasks.fan_out.stage import run_folder
 from tasks.registry.champion_registry import (
     AWAITING,
     CHALLENGER,
@@ -34,7 +34,7 @@ from tasks.registry.champion_registry import (
 from tasks.registry.model_uris import memory_digest
 from tasks.reports.report import console
 from tasks.settings.retraining_settings import number_of
-from tasks.stages.build_memory import memory_chunks
+from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.judge import judged
 from tasks.tracking.artifacts import publish_judgements
 from tasks.tracking.logbook import log_judgement, tracker
@@ -79,7 +79,7 @@ def _outcome(data: str, made: Round, registry: Registry, memory: str, approve: b
     judgement = None if champion is None else judge(*attempts)
     verdict = _verdict(judgement, approve)
     load_memory(run.memory(memory), vehicle_named(settings.vehicle))  # whole, or a StorageError
-    key = next(chunk.key for chunk in memory_chunks(data, settings) if chunk.class_name == memory)
+    (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
     markdown = _markdown(made, memory, judgement)
     tags = {

@@ -16,7 +16,8 @@ from typing import Any, Final, NamedTuple
 
 from dashboards.verdicts.drift import Drift, Usefulness, drifts, usefulness
 from storage.errors import StorageError
-from storage.places.data_folder import MARK, DataFolder, RunFolder
+from storage.places.data_folder import MARK, DataFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import read_attempts
 from storage.tables.watched import add_watched
 from tasks.registry.champion_registry import CHAMPION, Registry

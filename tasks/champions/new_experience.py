@@ -13,13 +13,12 @@ from storage.archives.memories import load_memory, save_memory
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
 from storage.tables.learned_experiences import read_learned, snapshot_ids
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.inputs.learned_on_the_job import with_learned
 from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version, registered_name
 from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import Champion, Retraining
 from tasks.settings.run_settings import COMBINED, RunSettings, world_class
-from tasks.stages.train import memory_names
 
 WARM_SHARE: Final = 0.5  # of the epochs: an encoder that begins where another ended needs fewer
 
@@ -46,7 +45,7 @@ class News(NamedTuple):
 def news(folder: DataFolder, settings: RunSettings, registry: Registry) -> News:
     """Look at registry and data folder; nothing is written. RunError: the registry cannot be reached."""
     champions, last, seen = {}, {}, {}
-    for memory in memory_names(settings):
+    for memory in settings.memory_names:
         versions = registry.versions(registered_name(memory, settings.vehicle))
         champion = registry.aliased(registered_name(memory, settings.vehicle))
         if champion is None:
@@ -54,7 +53,7 @@ def news(folder: DataFolder, settings: RunSettings, registry: Registry) -> News:
         known = [each for each in versions if _is_judged(each, champion)]
         champions[memory], last[memory] = champion, known[-1] if known else champion
         seen[memory] = {each.tag("learned") for each in known}
-    without = [memory for memory in memory_names(settings) if memory not in champions]
+    without = [memory for memory in settings.memory_names if memory not in champions]
     everything = read_learned(folder.learned(settings.vehicle), vehicle_named(settings.vehicle))
     learned = {
         name: [each for each in everything if each.problem.class_name == name]
@@ -87,7 +86,7 @@ def rounds(folder: DataFolder, settings: RunSettings, registry: Registry) -> lis
     What was learned is frozen under the retraining's number, and champions are copied into the run's folder;
     a retraining that was interrupted finds both again.
     """
-    for name in (registered_name(memory, settings.vehicle) for memory in memory_names(settings)):
+    for name in (registered_name(memory, settings.vehicle) for memory in settings.memory_names):
         _note_verdict(registry, registry.aliased(name))
     found = news(folder, settings, registry)
     made = [] if found.first is None else [Round(found.first, found.without, {})]
@@ -107,7 +106,7 @@ def _note_verdict(registry: Registry, champion: Version | None) -> None:
 def _retraining(folder: DataFolder, settings: RunSettings, registry: Registry, found: News) -> Round:
     whole = settings.combined and COMBINED in found.champions
     asked = settings if whole else restricted(settings, list(found.fresh))
-    against = {name: found.champions[name] for name in memory_names(asked) if name in found.champions}
+    against = {name: found.champions[name] for name in asked.memory_names if name in found.champions}
     number = _next_number(registry)
     asked = with_learned(asked, folder.path, f"retrain-{number:04d}")
     vehicle = vehicle_named(settings.vehicle)

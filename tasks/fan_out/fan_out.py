@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -14,17 +14,18 @@ import dask
 import distributed
 import yaml
 from dask.system import CPU_COUNT
-from prefect.tasks import Task
 from prefect_dask.task_runners import DaskTaskRunner
 
 from storage.places.scratch import scratch_folder
 from tasks.fan_out.certificate import own_certificate
+from tasks.fan_out.chunk import Chunk, Piece
+from tasks.fan_out.piece_task import piece_task
 from tasks.fan_out.progress import progress
 from tasks.fan_out.progress_artifact import progress_artifact
-from tasks.fan_out.stage import AnyPiece, Piece, kept_result
-from tasks.fan_out.workload import WORK, note
+from tasks.fan_out.stage import AnyPiece, Done, Job, Result, Stage
+from tasks.fan_out.workload import record_load
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import RunError, UsageError, default_scheduler
+from tasks.settings.run_settings import RunError, RunSettings, UsageError, default_scheduler
 
 SETTINGS: Final = Path(__file__).with_name("dask.yaml")
 CONNECT_SECONDS: Final = 5
@@ -154,40 +155,57 @@ def _close(local: Any) -> None:
         local.close(timeout=CLOSE_SECONDS)
 
 
-def fan_out(
-    task: Task[[AnyPiece], dict[str, Any]],
-    chunks: Sequence[AnyPiece],
-    description: str,
-    is_done: Callable[[AnyPiece], bool],
-    units: Callable[[AnyPiece], int] = lambda chunk: chunk.last - chunk.first,
-    partly_done: Callable[[], int] = lambda: 0,
-) -> list[dict[str, Any]]:
-    """Do chunks on the flow's workers; results in the order of the chunks.
+def run_stage(stage: Stage[Result], data: str, settings: RunSettings) -> dict[Chunk, Result]:
+    """Do the chunks of a stage on the flow's workers; those of which nothing has changed are not done again.
 
-    A chunk that ``is_done``, and has left what it told, is not done again. ``units`` are what the bar counts;
-    ``partly_done`` tells those of chunks still at work. A scheduler that goes away and comes back is given
-    anew what it had not finished. ChunkError at the first failure of a chunk, RunError without a scheduler.
+    How many chunks a stage has may follow from the results of the first ones: it is asked again until no
+    chunk is left.
+
+    Returns:
+        the result of every chunk, in the order of the chunks.
+
+    Raises:
+        ChunkError: a chunk failed.
+        RunError: the scheduler went away.
+
     """
-    results: dict[int, dict[str, Any]] = {}
-    kept: set[int] = set()  # of these, what was done before
-    sizes = [units(chunk) for chunk in chunks]
+    results: dict[Chunk, Result] = {}
+    while left := [chunk for chunk in stage.chunks(data, settings) if chunk not in results]:
+        results |= zip(left, fan_out(stage, left), strict=True)
+    return results
+
+
+def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Result]:
+    """Do pieces of work on the flow's workers, but for those that are done already.
+
+    A scheduler that goes away and comes back is given anew what it had not finished.
+
+    Returns:
+        the results, in the order of the pieces.
+
+    Raises:
+        ChunkError: a piece failed; the others are not waited for.
+        RunError: the scheduler went away.
+
+    """
+    task, sizes = piece_task(job), [job.units(piece) for piece in pieces]
+    done: dict[int, Done[Result]] = {}
     with (
-        progress(description, sum(sizes)) as bar,
-        progress_artifact(description, sum(sizes), bar) as show,
+        progress(job.title, sum(sizes)) as bar,
+        progress_artifact(job.title, sum(sizes), bar) as show,
     ):
-        waiting = deque(range(len(chunks)))
+        waiting = deque(range(len(pieces)))
         pending: dict[int, Any] = {}
-        done = begun = losses = 0
+        units_done = units_begun = losses = 0
         looked = time.monotonic()
-        while len(results) < len(chunks):
+        while len(done) < len(pieces):
             for i in [waiting.popleft() for _ in range(min(len(waiting), AHEAD - len(pending)))]:
-                known = kept_result(chunks[i]) if is_done(chunks[i]) else None
-                if known is None:
-                    pending[i] = task.submit(chunks[i])
+                kept = job.kept(pieces[i])
+                if kept is None:
+                    pending[i] = task.submit(pieces[i])
                 else:
-                    results[i] = known
-                    kept.add(i)
-                    done += sizes[i]
+                    done[i] = kept
+                    units_done += sizes[i]
             ended = [i for i, future in pending.items() if future.wrapped_future.done()]
             lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
             if lost:
@@ -198,15 +216,15 @@ def fan_out(
                 if i in lost:
                     waiting.append(i)
                 else:
-                    results[i] = _result(future, chunks[i], description)
-                    done += sizes[i]
+                    done[i] = _result(future, pieces[i], job.title)
+                    units_done += sizes[i]
             if time.monotonic() - looked >= LOOK_SECONDS:
-                begun, looked = partly_done(), time.monotonic()
-            show(max(done, min(begun, sum(sizes))))
+                units_begun = units_done + sum(job.units_done(pieces[i]) for i in pending)
+                looked = time.monotonic()
+            show(max(units_done, min(units_begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
-    ordered = [results[i] for i in range(len(chunks))]
-    note(description, [result for i, result in enumerate(ordered) if i not in kept])
-    return [{name: value for name, value in result.items() if name != WORK} for result in ordered]
+    record_load(job.title, [each.work for each in done.values() if each.work is not None])
+    return [done[i].result for i in range(len(pieces))]
 
 
 def _wait_for_scheduler(client: Any, losses: int) -> None:
@@ -220,8 +238,8 @@ def _wait_for_scheduler(client: Any, losses: int) -> None:
         )
 
 
-def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
-    where = f"{description}: chunk {chunk.index} of {chunk.class_name}"
+def _result(future: Any, chunk: Piece, title: str) -> Any:
+    where = f"{title}: chunk {chunk.index} of {chunk.class_name}"
     dask_future = future.wrapped_future
     if dask_future.status != "finished":
         cause = dask_future.exception()
@@ -232,8 +250,7 @@ def _result(future: Any, chunk: Piece, description: str) -> dict[str, Any]:
             ) from cause
         raise ChunkError(redacted(f"{where} was lost: {cause}")) from cause
     try:
-        result: dict[str, Any] = future.result()
+        return future.result()
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ChunkError(redacted(f"{where} failed: {reason or type(error).__name__}")) from error
-    return result

@@ -1,23 +1,20 @@
-"""What the workers of a fan-out did: how much of their time went into chunks, how much memory they hold."""
+"""How busy the workers of a fan-out were, and how much memory they held."""
 
 from __future__ import annotations
 
-import functools
 import os
 import platform
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Final, NamedTuple
+from typing import NamedTuple
 
 import psutil
 
-WORK: Final = "work"  # of a chunk's result
-
 
 class Work(NamedTuple):
-    """One chunk, as the worker saw it."""
+    """What a worker spent on one chunk."""
 
     worker: str  # host and process
     began: float  # seconds on a clock of that machine that nobody sets
@@ -26,7 +23,7 @@ class Work(NamedTuple):
 
 
 class Load(NamedTuple):
-    """What chunks a fan-out did, and what it cost to have them done."""
+    """What the workers of a fan-out spent on its chunks, and on waiting between them."""
 
     what: str
     chunks: int  # done now, not before
@@ -38,72 +35,63 @@ class Load(NamedTuple):
 
     @property
     def orchestration(self) -> float:
-        """Share of a worker's time between its first and last chunk that went into none."""
+        """Share of the workers' time, from first to last chunk, that they spent in no chunk."""
         return 1.0 - self.busy_seconds / self.span_seconds if self.span_seconds else 0.0
 
 
-def measured(function: Callable[[Any], dict[str, Any]]) -> Callable[[Any], dict[str, Any]]:
-    """Wrap a chunk's function so that its result says when and where it was done."""
-
-    @functools.wraps(function)
-    def wrapped(chunk: Any) -> dict[str, Any]:
-        began = time.monotonic()
-        result = function(chunk)
-        worker = f"{platform.node()}-{os.getpid()}"
-        work = Work(worker, began, time.monotonic(), psutil.Process().memory_info().rss)
-        return result | {WORK: work._asdict()}
-
-    return wrapped
+def work_since(began: float) -> Work:
+    """The work on a chunk that this process began at a time of ``time.monotonic`` and ends now."""
+    worker = f"{platform.node()}-{os.getpid()}"
+    return Work(worker, began, time.monotonic(), psutil.Process().memory_info().rss)
 
 
 def load_of(what: str, works: Sequence[Work]) -> Load:
-    """What a fan-out's chunks come to."""
-    of_worker: dict[str, list[Work]] = {}
+    """The load of a fan-out called ``what``, summed over its chunks."""
+    by_worker: dict[str, list[Work]] = {}
     for work in sorted(works, key=lambda work: work.began):
-        of_worker.setdefault(work.worker, []).append(work)
+        by_worker.setdefault(work.worker, []).append(work)
     return Load(
         what,
         len(works),
-        len(of_worker),
+        len(by_worker),
         sum(work.ended - work.began for work in works),
-        sum(mine[-1].ended - mine[0].began for mine in of_worker.values()),
-        max((mine[0].memory_bytes for mine in of_worker.values()), default=0),
-        max((mine[-1].memory_bytes for mine in of_worker.values()), default=0),
+        sum(own[-1].ended - own[0].began for own in by_worker.values()),
+        max((own[0].memory_bytes for own in by_worker.values()), default=0),
+        max((own[-1].memory_bytes for own in by_worker.values()), default=0),
     )
 
 
-def whole(parts: Sequence[Load]) -> Load | None:
-    """Several fan-outs, one after another, as one; None where there is none."""
-    if not parts:
+def total_load(loads: Sequence[Load]) -> Load | None:
+    """The load of several fan-outs, one after another; None if there are none."""
+    if not loads:
         return None
     return Load(
-        ", ".join(part.what for part in parts),
-        sum(part.chunks for part in parts),
-        max(part.workers for part in parts),
-        sum(part.busy_seconds for part in parts),
-        sum(part.span_seconds for part in parts),
-        parts[0].first_bytes,
-        max(part.last_bytes for part in parts),
+        ", ".join(load.what for load in loads),
+        sum(load.chunks for load in loads),
+        max(load.workers for load in loads),
+        sum(load.busy_seconds for load in loads),
+        sum(load.span_seconds for load in loads),
+        loads[0].first_bytes,
+        max(load.last_bytes for load in loads),
     )
 
 
-_noted: ContextVar[list[Load] | None] = ContextVar("loads", default=None)
+_recorded: ContextVar[list[Load] | None] = ContextVar("loads", default=None)
 
 
 @contextmanager
-def loads() -> Iterator[list[Load]]:
-    """The list that fills with every fan-out inside."""
-    found: list[Load] = []
-    token = _noted.set(found)
+def recorded_loads() -> Iterator[list[Load]]:
+    """Yield a list to which every fan-out inside adds its load."""
+    loads: list[Load] = []
+    token = _recorded.set(loads)
     try:
-        yield found
+        yield loads
     finally:
-        _noted.reset(token)
+        _recorded.reset(token)
 
 
-def note(what: str, results: Sequence[dict[str, Any]]) -> None:
-    """Add a fan-out to the list around it, if any: what the chunks that were done now told."""
-    around = _noted.get()
-    works = [Work(**result[WORK]) for result in results if WORK in result]
-    if around is not None and works:
-        around.append(load_of(what, works))
+def record_load(what: str, works: Sequence[Work]) -> None:
+    """Add a fan-out called ``what``, if it did any work, to the list of ``recorded_loads`` around it."""
+    loads = _recorded.get()
+    if loads is not None and works:
+        loads.append(load_of(what, works))

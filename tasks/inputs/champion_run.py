@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder, open_data_folder
-from tasks.fan_out.stage import Chunk
+from storage.places.data_folder import open_data_folder
+from storage.places.run_folder import RunFolder
+from tasks.fan_out.chunk import Chunk
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings
 

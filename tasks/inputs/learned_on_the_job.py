@@ -11,7 +11,8 @@ from planners.memory.plans.experience import Experience
 from planners.solve import Attempt
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of, vehicle_named
-from storage.places.data_folder import checked_name, open_data_folder
+from storage.places.data_folder import open_data_folder
+from storage.places.run_folder import checked_name
 from storage.tables.learned_experiences import add_learned, take_snapshot
 from tasks.settings.run_settings import RunSettings
 

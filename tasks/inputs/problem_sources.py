@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import sys
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 
-from planners.world.alignment import to_canonical
 from planners.world.classes.problem_classes import ProblemClass, problem_class
 from planners.world.problem import Obstacles, Problem
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.mirror import fetch
-from storage.tables.imported_problems import read_imported, write_imported
-from storage.worlds.importing import ImportSettings, import_part
+from storage.places.run_folder import RunFolder
+from storage.tables.imported_problems import read_imported
 from storage.worlds.sources import Part, source_at
-from tasks.fan_out.stage import Chunk, chunk_task, chunks_of, is_marked, mark_done, run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.settings.retraining_settings import held_back_seed, number_of
 from tasks.settings.run_settings import RunError, RunSettings, world_class
 
 Purpose = Literal["collect", "test"]
-CUT_A_PLAN: Final = 2  # problems cut to collect from for each solved one that is wanted: some are not solved
 PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}
 
 
@@ -53,7 +49,8 @@ class Generated:
 class Worlds:
     """Worlds, or what was cut from a map: their ``train`` part to collect from, ``test`` to test with."""
 
-    folder: Path  # where the run keeps them
+    run: RunFolder
+    class_name: str
 
     def count(self, purpose: Purpose, wanted: int) -> int:
         """How many of the ``wanted`` problems there are."""
@@ -69,10 +66,13 @@ class Worlds:
         return worlds[int(rng.integers(len(worlds)))].obstacles
 
     def _worlds(self, purpose: Purpose) -> tuple[Problem, ...]:
-        path = fetch(_part(self.folder, purpose))
+        path = fetch(self.run.worlds(self.class_name, PARTS[purpose]))
         if not path.exists():
             raise RunError(f"{path} is not there; run collect with these worlds first.")
         return _problems(path, path.stat().st_mtime_ns)
+
+
+Source = Generated | Worlds
 
 
 @functools.lru_cache(maxsize=4)
@@ -80,15 +80,15 @@ def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
     return tuple(read_imported(path))
 
 
-def source_of(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
+def source_of(data: str, settings: RunSettings, class_name: str) -> Source:
     """The problems of a class of the run; worlds must have been read (``read_worlds``)."""
     if class_name in settings.classes:
         vehicle = vehicle_named(settings.vehicle)
         return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
-    return Worlds(run_folder(data, settings).path / "worlds" / class_name)
+    return Worlds(run_folder(data, settings), class_name)
 
 
-def held_back(data: str, settings: RunSettings, class_name: str) -> Generated | Worlds:
+def held_back(data: str, settings: RunSettings, class_name: str) -> Source:
     """Where the problems (``test``) come from that a retraining is judged by: no other run or retraining's.
 
     A folder of worlds, or a map, has but the one part to test with, whoever asks.
@@ -119,55 +119,6 @@ def _named(value: Any) -> Any:
     return {k: _named(v) for k, v in value._asdict().items()} if hasattr(value, "_asdict") else value
 
 
-def _part(folder: Path, purpose: Purpose) -> Path:
-    return folder / f"{PARTS[purpose]}.parquet"
-
-
-def world_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for the worlds or the map of each class of the run."""
-    names = [world_class(folder) for folder in settings.worlds]
-    return [
-        chunk
-        for name in names
-        for chunk in chunks_of(data, settings, "worlds", name, 1, 1, source_key(settings, name))
-    ]
-
-
-def worlds_are_read(chunk: Chunk) -> bool:
-    """Whether a class's worlds have been read into the run's folder."""
-    return is_marked(chunk.run.path / "worlds" / chunk.class_name, chunk.key)
-
-
-def read_worlds_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Read worlds or cut a map, bring the problems to the canonical frame, and list the worlds left out."""
-    settings = chunk.settings
-    source = source_at(next(Path(f) for f in settings.worlds if world_class(f) == chunk.class_name))
-    folder = chunk.run.path / "worlds" / chunk.class_name
-    counts = {
-        "collect": CUT_A_PLAN * settings.wanted,
-        "test": settings.test_problems,
-    }
-    skipped: list[str] = []
-    for purpose, part in PARTS.items():
-        asked = ImportSettings(
-            vehicle_named(settings.vehicle),
-            settings.strict,
-            counts[purpose] if source.is_map else None,
-            settings.seed,
-        )
-        imported = import_part(source, part, asked)
-        if not imported.problems:
-            raise RunError(f"{source.path} holds no usable problem of part {part} ({imported.explained()}).")
-        problems = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
-        write_imported(_part(folder, purpose), problems)
-        skipped += [f"{place}: {reason}" for place, reason in imported.skipped]
-    mark_done(folder, chunk.key)
-    return {"skipped": skipped}
-
-
-read_worlds = chunk_task(read_worlds_chunk)
-
-
 @functools.cache
 def _digest(path: Path) -> str:
     """A digest of worlds' or a map's files."""
@@ -176,15 +127,3 @@ def _digest(path: Path) -> str:
         digest.update(f"{file.relative_to(path.parent)}\0".encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def tell_skipped(results: Sequence[dict[str, Any]]) -> None:
-    """List on the error stream the worlds that were left out, with the reason of each."""
-    skipped = [line for result in results for line in result["skipped"]]
-    if skipped:
-        print(
-            f"{len(skipped)} worlds skipped (use --strict to stop instead):",
-            *skipped,
-            sep="\n  ",
-            file=sys.stderr,
-        )

@@ -8,22 +8,21 @@ from planners.memory.growth import grow
 from planners.memory.plans.experience import Experience
 from planners.memory.recall import Memory
 from planners.world.vehicles.vehicle import vehicle_named
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences
-from tasks.fan_out.stage import Chunk
+from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import source_of
-from tasks.settings.run_settings import COMBINED, RunSettings
+from tasks.settings.run_settings import RunSettings
 
 READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/studies/growth.md)
 
 
 def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list[Experience]:
     """Those of a memory that problems are hallucinated for, class by class; its labels say which are free."""
-    classes = settings.class_names if name == COMBINED else (name,)
     vehicle = vehicle_named(settings.vehicle)
     return [
         experience
-        for each in classes
+        for each in settings.classes_of(name)
         for experience in read_experiences(run.experiences(each), vehicle, settings.taught)
     ]
 
@@ -32,8 +31,7 @@ def grown_memory(chunk: Chunk, memory: Memory) -> Memory:
     """The memory with all plans that were collected, read out from problems as the classes have them."""
     settings, name = chunk.settings, chunk.class_name
     experiences = read_experiences(chunk.run.experiences(name), memory.vehicle)
-    classes = settings.class_names if name == COMBINED else (name,)
-    sources = [source_of(chunk.data, settings, each) for each in classes]
+    sources = [source_of(chunk.data, settings, each) for each in settings.classes_of(name)]
     problems = [
         source.problem("collect", index)
         for source in sources

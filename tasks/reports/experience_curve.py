@@ -12,11 +12,11 @@ from dashboards.figures.style import save
 from dashboards.report.tables import experience_table
 from dashboards.statistics.experience_recall import experience_rows
 from storage.tables.recalls import read_recalls
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.reports.report import console
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.fewer_experiences import runs_of_continual
-from tasks.stages.measure_recall import recall_chunks
+from tasks.stages.measure_recall import MEASURE_RECALL
 
 
 def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
@@ -35,10 +35,9 @@ def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
 
 
 def _rows(data: str, run: RunSettings) -> pd.DataFrame:
-    folder = run_folder(data, run)
     shards = [
-        folder.shard("recalls", chunk.class_name, chunk.index)
-        for chunk in recall_chunks(data, run)
+        chunk.shard("recalls")
+        for chunk in MEASURE_RECALL.chunks(data, run)
         if chunk.index > 0 and chunk.class_name != COMBINED  # those with fewer experiences have none
     ]
     return experience_rows(read_recalls(shards))

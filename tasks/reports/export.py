@@ -9,9 +9,10 @@ from typing import Final
 
 from storage.exchange.ompl_log import write_ompl_logs
 from storage.exchange.planner_arena import Origin, write_planner_arena
-from storage.places.data_folder import RunFolder, open_run
+from storage.places.data_folder import open_run
 from storage.places.files import read_text, whole_file
 from storage.places.mirror import fetch
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import attempt_frames, tables_below
 from tasks.reports.stage_times import stages_of
 from tasks.settings.run_settings import UsageError, check_known

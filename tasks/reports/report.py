@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -33,17 +33,18 @@ from dashboards.verdicts.claim_rules import Claim
 from dashboards.verdicts.claims import claims
 from dashboards.verdicts.evidence import Evidence
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder, open_data_folder
+from storage.places.data_folder import open_data_folder
 from storage.places.files import whole_file
 from storage.places.mirror import is_there
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import distinct_values, read_attempts
 from storage.tables.recalls import read_recalls
-from tasks.fan_out.stage import Chunk, run_folder
+from tasks.fan_out.chunk import Chunk, run_folder
 from tasks.reports.report_details import page_of
 from tasks.reports.stage_times import stage_cells, stages_of
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import COMBINED, RunSettings
-from tasks.stages.measure_recall import recall_chunks
+from tasks.stages.measure_recall import MEASURE_RECALL
 from tasks.stages.sweep import sweep_rows
 
 COLUMNS = 110  # of the tables where there is no terminal
@@ -144,15 +145,13 @@ def report_retrieval(data: str, settings: RunSettings) -> pd.DataFrame:
     run = run_folder(data, settings)
     curve = retrieval_curve(_recall_rows(data, settings))
     retrieval = summarise_retrieval(curve)
-    _write(run.path / "retrieval.csv", as_csv(retrieval))
+    _write(run.retrieval, as_csv(retrieval))
     save(retrieval_curves(curve), run.figures, "retrieval")
     return retrieval
 
 
 def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
-    run = run_folder(data, settings)
-    shards = [run.shard("recalls", chunk.class_name, chunk.index) for chunk in recall_chunks(data, settings)]
-    return read_recalls(shards)
+    return read_recalls([chunk.shard("recalls") for chunk in MEASURE_RECALL.chunks(data, settings)])
 
 
 def show(report: Report, run: RunFolder) -> None:
@@ -167,7 +166,7 @@ def show_retrieval(retrieval: pd.DataFrame) -> None:
     console().print(retrieval_table(retrieval))
 
 
-def show_sweep(chunks: Sequence[Chunk]) -> None:
+def show_sweep(chunks: Iterable[Chunk]) -> None:
     """Print what the variants of a sweep came to."""
     console().print(sweep_table(sweep_rows(chunks)))
 

@@ -13,8 +13,8 @@ import pandas as pd
 from dashboards.report.report_page import Picture, page
 from dashboards.statistics.distributions import endings
 from dashboards.verdicts.claim_rules import Claim
-from storage.places.data_folder import RunFolder
 from storage.places.mirror import fetch, files_in
+from storage.places.run_folder import RunFolder
 from tasks.reports.stage_times import stage_cells, stages_of
 from tasks.settings.run_settings import RunSettings
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from dashboards.cells import NOTHING
-from storage.places.data_folder import RunFolder
 from storage.places.files import read_json, write_json
 from storage.places.mirror import is_there
+from storage.places.run_folder import RunFolder
 from tasks.attempts.attempt_rows import commit
-from tasks.fan_out.stage import run_folder
-from tasks.fan_out.workload import Load, loads, whole
+from tasks.fan_out.chunk import run_folder
+from tasks.fan_out.workload import Load, recorded_loads, total_load
 from tasks.settings.run_settings import RunSettings
 
 PACKAGES: Final = (
@@ -32,7 +32,7 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
     @functools.wraps(stage)
     def wrapped(settings: RunSettings, data: str) -> None:
         began, clock = datetime.now(UTC), time.perf_counter()
-        with loads() as found:
+        with recorded_loads() as loads:
             stage(settings, data)
         seconds = time.perf_counter() - clock
         run = run_folder(data, settings)
@@ -40,7 +40,7 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
             "stage": stage.__name__,
             "began": began.isoformat(timespec="seconds"),
             "seconds": seconds,
-            "fan_outs": [load._asdict() for load in found],
+            "fan_outs": [load._asdict() for load in loads],
         }
         write_json(run.stages, [*stages_of(run), made | machine()])
 
@@ -66,8 +66,8 @@ def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
         name: [Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]]
         for name in seconds
     }
-    rows = [_cells(name, seconds[name], whole(of_stage[name])) for name in seconds]
-    every = whole([load for each in of_stage.values() for load in each])
+    rows = [_cells(name, seconds[name], total_load(of_stage[name])) for name in seconds]
+    every = total_load([load for each in of_stage.values() for load in each])
     return [*rows, _cells("all", sum(seconds.values()), every)] if rows else []
 
 

@@ -1,4 +1,4 @@
-"""A file of problems in parts: what a worker solves at once, and writes whole or not at all."""
+"""A file of problems in parts: a worker solves a part at once, and writes it whole or not at all."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from planners.world.alignment import to_canonical
 from storage.errors import StorageError
@@ -17,10 +17,10 @@ from storage.exchange.problem_files import ProblemSlice, slices_of
 from storage.exchange.problems import problems_or_faults_of
 from storage.places.files import locked, remove_folder, remove_leftovers
 from storage.tables.attempts import write_attempts
-from storage.tables.shards import shard_is_done
 from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.keys import key_of
+from tasks.fan_out.stage import Job
 from tasks.inputs.learned_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, Way, plan_record
 
@@ -30,82 +30,77 @@ FLAT: Final = 10_000  # plans in one folder; of more problems each part has a fo
 COLLECT_EVERY: Final = 50  # problems between two garbage collections
 LONGEST_NAME: Final = 200
 
-Told = Callable[[], object]
-
 
 @dataclass(frozen=True)
-class Asked:
-    """What is to be solved, how, and what is to be left of it."""
+class SolveRequest:
+    """A file of problems to solve, how to solve them, and where to write what."""
 
     problems: Path
-    out: Path  # the rows
+    out: Path  # for the rows
     way: Way  # its memory is a folder
-    memory_digest: str  # of what lies in that folder
-    plans: Path | None = None  # a folder
-    learn: Path | None = None  # a data folder
+    memory_digest: str  # of the files in that folder
+    plans: Path | None = None  # a folder for the plans
+    learn: Path | None = None  # a data folder that remembers what was newly solved
 
     @property
     def folder(self) -> Path:
-        """Where parts lie until all are there."""
+        """The folder of the finished parts, until all are there."""
         return self.out.with_name(f"{self.out.name}.parts")
 
 
 @dataclass(frozen=True)
-class Part:
-    """Some consecutive problems of a file: what a worker does at once."""
+class FilePart:
+    """Some consecutive problems of a file: what a worker solves at once."""
 
-    asked: Asked
+    request: SolveRequest
     piece: ProblemSlice
     index: int
-    own_folder: bool  # for its plans
-    key: str  # what its rows depend on, as a digest
+    own_folder: bool  # whether its plans get a folder of their own
+    key: str  # digest of everything that its rows depend on
 
     @property
     def class_name(self) -> str:
-        """What it is a part of, for people."""
-        return self.asked.problems.name
-
-    @property
-    def first(self) -> int:
-        """Number of its first line or problem."""
-        return self.piece.first
-
-    @property
-    def last(self) -> int:
-        """One past the number of its last problem, if no line is empty."""
-        return self.piece.first + self.piece.count
+        """The name of the file, as messages say it."""
+        return self.request.problems.name
 
     @property
     def result(self) -> Path:
-        """Where what it told is kept."""
-        return self.asked.folder / f"{self.index:06d}-{self.key}.json"
+        """The file that keeps its result."""
+        return self.request.folder / f"{self.index:06d}-{self.key}.json"
 
     @property
     def shard(self) -> Path:
         """Its rows."""
-        return self.asked.folder / f"{self.index:06d}.parquet"
+        return self.request.folder / f"{self.index:06d}.parquet"
 
 
-def parts_of(asked: Asked) -> list[Part]:
-    """The parts of a file of problems; the cut never depends on how many workers there are.
+class PartSolved(NamedTuple):
+    """What came of a part."""
+
+    fault: str | None  # of the first malformed problem; then nothing was written
+
+
+def parts_of(request: SolveRequest) -> list[FilePart]:
+    """The parts of a file of problems; the cut never depends on the number of workers.
 
     StorageError: the file is missing, holds no problem, or is no whole file of its format.
     """
-    stat = asked.problems.stat() if asked.problems.exists() else None
-    return _parts_of(asked, stat and (stat.st_mtime_ns, stat.st_size))
+    stat = request.problems.stat() if request.problems.exists() else None
+    return _parts_of(request, stat and (stat.st_mtime_ns, stat.st_size))
 
 
 @functools.lru_cache(maxsize=1)
-def _parts_of(asked: Asked, _changed: tuple[int, int] | None) -> list[Part]:
-    longest = PART_SECONDS / asked.way.improve_seconds if asked.way.improve_seconds else PART_PROBLEMS
-    pieces = slices_of(asked.problems, max(1, int(min(PART_PROBLEMS, longest))))
+def _parts_of(request: SolveRequest, _changed: tuple[int, int] | None) -> list[FilePart]:
+    way = request.way
+    longest = PART_SECONDS / way.improve_seconds if way.improve_seconds else PART_PROBLEMS
+    pieces = slices_of(request.problems, max(1, int(min(PART_PROBLEMS, longest))))
     if not pieces:
-        raise StorageError(f"{asked.problems} holds no problems; nothing to solve.")
+        raise StorageError(f"{request.problems} holds no problems; nothing to solve.")
     many = sum(piece.count for piece in pieces) > FLAT
-    left = [str(folder.absolute()) if folder else None for folder in (asked.plans, asked.learn)]
-    how = [*asked.way._replace(memory=None), asked.memory_digest, *left, many, asked.problems.stem]
+    folders = [str(folder.absolute()) if folder else None for folder in (request.plans, request.learn)]
+    how = [*way._replace(memory=None), request.memory_digest, *folders, many, request.problems.stem]
     return [
-        Part(asked, piece, index, many, key_of("solve", how, *_described(piece)))
+        FilePart(request, piece, index, many, key_of("solve", how, *_described(piece)))
         for index, piece in enumerate(pieces)
     ]
 
@@ -114,74 +109,78 @@ def _described(piece: ProblemSlice) -> tuple[str, int, int, int]:
     return piece.digest, piece.first, piece.count, piece.offset if piece.path.suffix == ".parquet" else 0
 
 
-def is_solved(part: Part) -> bool:
-    """Whether the rows of a part are there."""
-    return shard_is_done(part.shard, part.key)
-
-
 @contextmanager
-def unfinished(asked: Asked) -> Iterator[None]:
-    """Hold the folder of parts for this process; it goes when there is nothing in it worth keeping."""
+def unfinished(request: SolveRequest) -> Iterator[None]:
+    """Hold the folder of parts for this process, and remove it at the end if no part was finished."""
     with ExitStack() as stack:
         try:
-            asked.folder.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(locked(asked.folder / ".lock", str(asked.out)))
+            request.folder.mkdir(parents=True, exist_ok=True)
+            stack.enter_context(locked(request.folder / ".lock", str(request.out)))
         except OSError as error:
-            reason = f"{asked.folder} cannot be written: {error.strerror}"
+            reason = f"{request.folder} cannot be written: {error.strerror}"
             raise StorageError(f"{reason}; give another --out.") from None
-        remove_leftovers(asked.folder)
+        remove_leftovers(request.folder)
         try:
             yield
         finally:
-            if not any(asked.folder.glob("[0-9]*.parquet")):
-                remove_folder(asked.folder)
+            if not any(request.folder.glob("[0-9]*.parquet")):
+                remove_folder(request.folder)
 
 
-def solve_part(chunk: Part) -> dict[str, Any]:
-    """Solve a part and write its rows; none where a problem of it is malformed: ``fault`` says which."""
-    return solve_telling(chunk, lambda: None)
+def solve_part(chunk: FilePart) -> PartSolved:
+    """Solve a part and write its rows, unless one of its problems is malformed."""
+    return solve_and_tell(chunk, lambda: None)
 
 
-def solve_telling(chunk: Part, told: Told) -> dict[str, Any]:
-    """The same; ``told`` is called after each problem."""
-    asked = chunk.asked
-    assistant = _assistant(asked.way, asked.memory_digest)
+def solve_and_tell(chunk: FilePart, on_problem: Callable[[], object]) -> PartSolved:
+    """Like ``solve_part``; ``on_problem`` is called after each problem."""
+    request = chunk.request
+    assistant = _assistant(request.way, request.memory_digest)
     rows: list[dict[str, Any]] = []
     solved: list[Solved] = []
     with no_garbage_collection():
         for place, problem in problems_or_faults_of(chunk.piece, assistant.vehicle):
             if isinstance(problem, str):
-                return {"fault": f"{place}: {problem}"}
+                return PartSolved(f"{place}: {problem}")
             if not rows:
                 assistant.warm_up(problem)
             attempt, plan = assistant(problem)
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
-            if asked.learn is not None:
+            if request.learn is not None:
                 solved.append(Solved(to_canonical(problem)[0], attempt))
-            if asked.plans is not None:
+            if request.plans is not None:
                 number = chunk.piece.first + len(rows) - 1
                 write_plan(
-                    _place(chunk, asked.plans, problem.id, number),
+                    _plan_path(chunk, request.plans, problem.id, number),
                     plan_record(assistant, problem, attempt, plan),
                 )
-            told()
+            on_problem()
             if len(rows) % COLLECT_EVERY == 0:
                 gc.collect()
-    if asked.learn is not None:
-        remember(asked.learn, solved, assistant.vehicle)
+    if request.learn is not None:
+        remember(request.learn, solved, assistant.vehicle)
     write_attempts(chunk.shard, rows, key=chunk.key)
-    return {"fault": None}
+    return PartSolved(None)
+
+
+SOLVE: Final = Job(
+    name="solve",
+    do=solve_part,
+    result=PartSolved,
+    output=lambda part: part.shard,
+    units=lambda part: part.piece.count,
+)
 
 
 @functools.lru_cache(maxsize=1)
 def _assistant(way: Way, _memory_digest: str) -> Assistant:
-    """A process keeps the memories that it has read."""
+    """The assistant of this process, with the memories that it has read."""
     return Assistant(*way)
 
 
-def _place(part: Part, folder: Path, identity: str, number: int) -> Path:
-    """The file of a problem's plan: named by its id if that can name one, else by its number."""
+def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:
+    """The file of a problem's plan, named by the problem's id if that can name a file, else by its number."""
     plain = all(letter.isalnum() or letter in "-_.~" for letter in identity) and not identity.startswith(".")
     name = identity if plain and 0 < len(identity) <= LONGEST_NAME else f"problem+{number}"
     return folder / (f"{part.index:06d}" if part.own_folder else "") / f"{name}.json"

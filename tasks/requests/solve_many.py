@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -21,12 +20,22 @@ from storage.tables.attempts import attempt_columns, join_attempts
 from tasks.fan_out.progress import progress
 from tasks.registry.model_uris import memory_digest, memory_folder
 from tasks.requests.assistant import Assistant, Way
-from tasks.requests.problem_parts import Asked, Part, is_solved, parts_of, solve_telling, unfinished
+from tasks.requests.problem_parts import (
+    SOLVE,
+    FilePart,
+    PartSolved,
+    SolveRequest,
+    parts_of,
+    solve_and_tell,
+    unfinished,
+)
 from tasks.servers.prefect_server import local_server
 from tasks.settings.run_settings import UsageError
 
 if TYPE_CHECKING:
     from tasks.champions.drift_watch import Watched
+
+SolveFlow = Callable[[SolveRequest], list[PartSolved]]
 
 FEW: Final = 2  # parts: starting a server and workers for so many takes longer than doing them here
 
@@ -46,13 +55,27 @@ def solve_many(
     plans: Path | None = None,
     learn: Path | None = None,
     workers: int = 1,
+    flow: SolveFlow | None = None,
 ) -> None:
-    """Solve every problem of a file; one attempt row each, and if asked its plan; print what came of it.
+    """Solve every problem of a file, write one attempt row each, and print a summary.
 
-    What a killed command has finished is not done again by the same one.
+    The same command does not do again what a killed one has finished.
 
-    StorageError: a problem is malformed or has another's id; all others are solved and kept, so that the
-    same command has little left to do once it is corrected.
+    Args:
+        way: how to solve them.
+        problems: a .json, .jsonl or .parquet file.
+        out: where to write the rows, .parquet.
+        plans: a folder for the plans, one file each.
+        learn: a data folder that is to remember what was newly solved.
+        workers: worker processes.
+        flow: solves the parts of a file in worker processes. It may import Prefect, whose environment is set
+            when it is called. Without it everything is solved in this process.
+
+    Raises:
+        UsageError: ``out`` has another ending, or ``way`` is not possible.
+        StorageError: a problem is malformed, or has the id of another one. All others are solved and kept, so
+            that the same command has little left to do once the problem is corrected.
+
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
@@ -63,11 +86,15 @@ def solve_many(
     began = time.monotonic()
     with memory_folder(way.memory) as memory:
         way = way._replace(memory=None if memory is None else str(memory))
-        asked = Asked(problems, out, way, memory_digest(memory), plans, learn)
-        parts = parts_of(asked)
-        with unfinished(asked):
-            left = [part for part in parts if not is_solved(part)]
-            faults = _here(left) if workers == 1 or len(left) <= FEW else _fanned_out(asked, workers)
+        request = SolveRequest(problems, out, way, memory_digest(memory), plans, learn)
+        parts = parts_of(request)
+        with unfinished(request):
+            left = [part for part in parts if not SOLVE.is_written(part)]
+            if flow is None or workers == 1 or len(left) <= FEW:
+                results = _in_this_process(left)
+            else:
+                results = _in_workers(request, workers, flow)
+            faults = [result.fault for result in results if result.fault]
             if faults:
                 raise _faulty(faults)
             seconds = time.monotonic() - began
@@ -75,33 +102,27 @@ def solve_many(
             if tally.repeated is not None:
                 raise StorageError(tally.repeated)
             join_attempts(out, [part.shard for part in parts])
-            remove_folder(asked.folder)
-    _tell(asked, tally, sum(part.piece.count for part in left), seconds)
+            remove_folder(request.folder)
+    _tell(request, tally, sum(part.piece.count for part in left), seconds)
     if known is not None:
-        _watch(known, asked, tally)
+        _watch(known, request, tally)
 
 
-def _here(parts: Sequence[Part]) -> list[str]:
-    """Solve parts in this process; what is wrong with problems of them."""
-    faults = []
-    ready = count(1)
+def _in_this_process(parts: Sequence[FilePart]) -> list[PartSolved]:
+    solved = count(1)
     with progress("solve", sum(part.piece.count for part in parts), ended=False) as show:
-        for part in parts:
-            result = solve_telling(part, lambda: show(next(ready)))
-            faults += [result["fault"]] if result["fault"] else []
-    return faults
+        return [solve_and_tell(part, lambda: show(next(solved))) for part in parts]
 
 
-def _fanned_out(asked: Asked, workers: int) -> list[str]:
-    """The same in worker processes, by the flow ``flows.solve``."""
-    with local_server(asked.folder.absolute()) as server:
+def _in_workers(request: SolveRequest, workers: int, flow: SolveFlow) -> list[PartSolved]:
+    """Solve the parts that are not solved yet in worker processes."""
+    with local_server(request.folder.absolute()) as server:
         from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
 
         with cluster(workers):
             if server is not None:
                 server.wait()
-            results = importlib.import_module("flows.solve").solve(asked)
-    return [result["fault"] for result in results if result["fault"]]
+            return flow(request)
 
 
 def _faulty(faults: Sequence[str]) -> StorageError:
@@ -111,7 +132,7 @@ def _faulty(faults: Sequence[str]) -> StorageError:
     )
 
 
-def _tally(parts: Sequence[Part]) -> Tally:
+def _tally(parts: Sequence[FilePart]) -> Tally:
     outcomes: Counter[str] = Counter()
     seconds, marks = [], []
     for part in parts:
@@ -130,7 +151,7 @@ def _watched(memory: str) -> Watched | None:
     return watched(memory)
 
 
-def _watch(known: Watched, asked: Asked, tally: Tally) -> None:
+def _watch(known: Watched, request: SolveRequest, tally: Tally) -> None:
     """Tell how useful the memory was beside its benchmark; all rows are of one planner and configuration."""
     import pandas as pd
 
@@ -138,16 +159,16 @@ def _watch(known: Watched, asked: Asked, tally: Tally) -> None:
     from storage.tables.configurations import configured
     from tasks.champions.drift_watch import watch
 
-    way = asked.way
-    columns = attempt_columns(asked.out, ["assist", "top_k", "recall"])
+    way = request.way
+    columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
     times = 1e3 * tally.seconds
     now = Usefulness(len(times), tally.outcomes["recalled"], float(times.mean()), float(np.median(times)))
-    for line in watch(known, {f"{way.planner} {label}": now}, asked.learn):
+    for line in watch(known, {f"{way.planner} {label}": now}, request.learn):
         print(f"watched  {line}")
 
 
-def _repeated(parts: Sequence[Part], marks: Floats) -> str | None:
+def _repeated(parts: Sequence[FilePart], marks: Floats) -> str | None:
     """The first id that occurs twice, found by the marks of all ids, and where it is."""
     order = np.argsort(marks, kind="stable")
     same = np.flatnonzero(marks[order][1:] == marks[order][:-1])
@@ -159,7 +180,7 @@ def _repeated(parts: Sequence[Part], marks: Floats) -> str | None:
     return None
 
 
-def _named(parts: Sequence[Part], ends: Floats, index: int) -> tuple[str, str]:
+def _named(parts: Sequence[FilePart], ends: Floats, index: int) -> tuple[str, str]:
     """Where problem ``index`` of all stands in the file, and its id."""
     i = int(np.searchsorted(ends, index, side="right"))
     part, within = parts[i], index - int(ends[i]) + parts[i].piece.count
@@ -169,19 +190,19 @@ def _named(parts: Sequence[Part], ends: Floats, index: int) -> tuple[str, str]:
     return f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}", identity
 
 
-def _tell(asked: Asked, tally: Tally, solved_now: int, seconds: float) -> None:
+def _tell(request: SolveRequest, tally: Tally, solved_now: int, seconds: float) -> None:
     """Print the summary."""
-    asked_for = len(tally.seconds)
+    count = len(tally.seconds)
     solved = sum(number for outcome, number in tally.outcomes.items() if not outcome.startswith("("))
     outcomes = ", ".join(f"{outcome} {number:,}" for outcome, number in tally.outcomes.most_common())
     mean, (median, ninth) = tally.seconds.mean(), np.quantile(tally.seconds, [0.5, 0.9])
     times = ", ".join(f"{what} {1000 * each:.2f} ms" for what, each in (("mean", mean), ("median", median)))
     lines = [
-        ("solved", f"{solved:,} of {asked_for:,} ({solved / asked_for:.2%}): {outcomes}"),
+        ("solved", f"{solved:,} of {count:,} ({solved / count:.2%}): {outcomes}"),
         ("planning", f"{times}, 90 % {1000 * ninth:.2f} ms"),
         ("speed", f"{solved_now / seconds:,.0f} problems/s: {solved_now:,} in {seconds:,.1f} s"),
-        ("rows", str(asked.out)),
-        ("plans", None if asked.plans is None else str(asked.plans)),
-        ("learned", None if asked.learn is None else str(asked.learn)),
+        ("rows", str(request.out)),
+        ("plans", None if request.plans is None else str(request.plans)),
+        ("learned", None if request.learn is None else str(request.learn)),
     ]
     print(*(f"{name:9}{text}" for name, text in lines if text is not None), sep="\n")

@@ -28,8 +28,9 @@ from storage.archives.encoders import load_encoder
 from storage.archives.hallucinators import load_hallucinator
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder, Table, open_data_folder
+from storage.places.data_folder import open_data_folder
 from storage.places.mirror import is_there
+from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
@@ -42,7 +43,6 @@ from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunError, RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
-from tasks.stages.train import memory_names
 
 LABELS_EVERY: Final = 50  # hallucinated problems whose grid and labels are drawn again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
@@ -87,7 +87,7 @@ def _do(job: Job) -> Findings:
 def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
     settings = recorded_settings(run)
     vehicle = vehicle_named(settings.vehicle)
-    for name in memory_names(settings):
+    for name in settings.memory_names:
         shards = [path for table in COLLECTED for path in run.shards(table, name)]
         for path in (run.experiences(name), *shards):
             if is_there(path):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder
 from storage.places.files import read_text
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import distinct_values
 from tasks.settings.run_settings import RunSettings
 

@@ -117,6 +117,19 @@ class RunSettings:
         return self.classes + tuple(world_class(folder) for folder in self.worlds)
 
     @property
+    def memory_names(self) -> tuple[str, ...]:
+        """Names of the memories of the run: its classes, then the combined one if it has one."""
+        return self.class_names + ((COMBINED,) if self.combined else ())
+
+    def classes_of(self, memory: str) -> tuple[str, ...]:
+        """The classes that a memory is made for."""
+        return self.class_names if memory == COMBINED else (memory,)
+
+    def memories_of(self, class_name: str) -> list[str]:
+        """The memories that are measured on a class: its own, and the combined one if there is one."""
+        return [class_name, COMBINED] if self.combined else [class_name]
+
+    @property
     def taught(self) -> int:
         """How many experiences of a class problems are hallucinated for: the first, that encoders learn."""
         return min(self.experiences, TAUGHT)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,99 +13,87 @@ from dashboards.figures.style import save
 from planners.memory.build_memory import build_memory
 from planners.memory.recall import Memory
 from planners.world.geometry.occupancy import GRID
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.encoders import load_encoder
 from storage.archives.memories import save_memory
-from tasks.fan_out.stage import Chunk, chunk_task, chunks_of, is_marked, mark_done
+from tasks.fan_out.chunk import Chunk, Cut
+from tasks.fan_out.stage import Stage, is_marked, mark_done
 from tasks.inputs.problem_sources import class_settings
 from tasks.inputs.taught_experiences import grown_memory, taught_experiences
-from tasks.settings.run_settings import COMBINED, RunSettings
-from tasks.stages.train import memory_names, problems_of_memory, train_chunks
+from tasks.stages.relabel import problems_of_memory
+from tasks.stages.train import TRAIN
 
 SHOWN_PROBLEMS: Final = 4_000  # on an embedding map
 
 
-def build_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Build one memory, of the encoder that is best on the validation problems; the first of equals.
+class Built(NamedTuple):
+    """What a memory was built from."""
+
+    training_seed: int  # number of the encoder that validated best
+
+
+def build_chunk(chunk: Chunk) -> Built:
+    """Build one memory with the encoder that is best on the validation problems, the first of equals.
 
     Plans that no encoder was taught join it then.
     """
-    run, name, settings = chunk.run, chunk.class_name, chunk.settings
-    vehicle = vehicle_named(settings.vehicle)
-    built = memories_by_seed(chunk)
-    scores = [load_encoder(run.model(name, seed), vehicle).score for seed in range(len(built))]
+    run, name = chunk.run, chunk.class_name
+    memories = memories_by_seed(chunk)
+    scores = [load_encoder(run.model(name, seed), chunk.vehicle).score for seed in range(len(memories))]
     best = scores.index(max(scores))
-    _draw(chunk, best, built[best])
-    memory = grown_memory(chunk, built[best]) if settings.grown else built[best]
+    _draw(chunk, best, memories[best])
+    memory = grown_memory(chunk, memories[best]) if chunk.settings.grown else memories[best]
     save_memory(run.memory(name), memory)
     mark_done(run.memory(name), chunk.key)
-    return {"plans": len(memory.plans), "training_seed": best}
+    return Built(best)
 
 
-build_one_memory = chunk_task(build_chunk)
-
-
-def is_built(chunk: Chunk) -> bool:
-    """Whether the memory is there."""
-    return is_marked(chunk.run.memory(chunk.class_name), chunk.key)
-
-
-def memory_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each memory."""
-    parts = train_chunks(data, settings)
+def memories_by_seed(chunk: Chunk) -> list[Memory]:
+    """The memory of a chunk's taught plans, once with the encoder of each training seed."""
+    name, run, settings = chunk.class_name, chunk.run, chunk.settings
+    experiences = taught_experiences(run, settings, name)
+    plans = [experience.plan for experience in experiences]
+    metadata = {
+        "run": settings.run_name,
+        "classes": {each: class_settings(settings, each) for each in settings.classes_of(name)},
+        "scales": sorted({experience.problem.scale for experience in experiences}),
+    }
     return [
-        chunk
-        for name in memory_names(settings)
-        for chunk in chunks_of(
-            data,
-            settings,
-            "build-memory",
+        build_memory(
+            load_encoder(run.model(name, seed), chunk.vehicle),
+            plans,
             name,
-            1,
-            1,
-            [part.key for part in parts if part.class_name == name],
+            chunk.vehicle,
+            metadata | {"training_seed": seed},
         )
+        for seed in range(settings.learning.seeds)
     ]
 
 
 def figure_names(class_name: str) -> tuple[str, str]:
-    """Names of what is drawn of a memory's training."""
+    """Names of the figures of a memory's training: its epochs, and its embeddings."""
     return f"training-{class_name}", f"embeddings-{class_name}"
 
 
 def _draw(chunk: Chunk, seed: int, memory: Memory) -> None:
-    """Draw the epochs of the training that was chosen, and where its encoder places held-out problems."""
+    """Draw the epochs of the chosen training, and where its encoder embeds held-out problems."""
     name, run = chunk.class_name, chunk.run
     trained = load_encoder(run.model(name, seed), memory.vehicle)
     problems = problems_of_memory(chunk.data, chunk.settings, name)
     shown = trained.held_out[:: -(-len(trained.held_out) // SHOWN_PROBLEMS)]  # they are sorted by plan
     grids = np.unpackbits(problems.grids[shown], axis=1).reshape(-1, GRID, GRID)
     epochs = pd.DataFrame(epoch._asdict() for epoch in trained.history)
-    curves, places = figure_names(name)
+    curves, embeddings = figure_names(name)
     save(training_curves(epochs), run.figures, curves)
     made_for = problems.plan_index[shown]
-    save(embedding_map(memory.encoder(grids), made_for, memory.centroids), run.figures, places)
+    save(embedding_map(memory.encoder(grids), made_for, memory.centroids), run.figures, embeddings)
 
 
-def memories_by_seed(chunk: Chunk) -> list[Memory]:
-    """The memory of a chunk's taught plans with the encoder of each training seed."""
-    name, run, settings = chunk.class_name, chunk.run, chunk.settings
-    vehicle = vehicle_named(settings.vehicle)
-    experiences = taught_experiences(run, settings, name)
-    plans = [experience.plan for experience in experiences]
-    classes = settings.class_names if name == COMBINED else (name,)
-    metadata = {
-        "run": settings.run_name,
-        "classes": {each: class_settings(settings, each) for each in classes},
-        "scales": sorted({experience.problem.scale for experience in experiences}),
-    }
-    return [
-        build_memory(
-            load_encoder(run.model(name, seed), vehicle),
-            plans,
-            name,
-            vehicle,
-            metadata | {"training_seed": seed},
-        )
-        for seed in range(settings.learning.seeds)
-    ]
+BUILD_MEMORY: Final = Stage(
+    name="build memories",
+    do=build_chunk,
+    result=Built,
+    classes=lambda settings: settings.memory_names,
+    cut=lambda data, settings, name: Cut(1, 1, TRAIN.keys(data, settings, name)),
+    output=lambda chunk: chunk.run.memory(chunk.class_name),
+    is_whole=is_marked,
+)

@@ -1,44 +1,48 @@
-"""Collect: draw problems of a class, solve them, check every plan: the candidates among which to choose."""
+"""Collect: draw problems of a class, solve them, check every plan: the candidates to choose from."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.solve import solve
-from planners.world.vehicles.vehicle import vehicle_named
 from planners.world.workspace import Workspace
 from storage.tables.experiences import copy_experiences, write_experiences
-from storage.tables.shards import metadata_of, shard_is_done
+from storage.tables.shards import shard_is_done
 from tasks.attempts.attempt_rows import check_attempt
-from tasks.fan_out.stage import Chunk, chunk_task, chunks_of, run_folder
+from tasks.fan_out.chunk import Chunk, Cut, chunks_of
+from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of
-from tasks.inputs.problem_sources import source_key, source_of
+from tasks.inputs.problem_sources import Source, source_key, source_of
 from tasks.settings.run_settings import RunError, RunSettings
 
 SMALLEST_CHUNK: Final = 25
 LARGEST_CHUNK: Final = 100  # a second of work
-PATIENCE: Final = 2  # problems asked a wanted candidate, once there are as many as must be kept
-GIVE_UP: Final = 20  # problems asked a wanted experience; a class this hard is no class to remember
-
-Results = Mapping[Chunk, Mapping[str, Any]]
+PATIENCE: Final = 2  # problems tried for each wanted candidate, once as many are solved as must be kept
+GIVE_UP: Final = 20  # problems tried for each wanted experience; a class this hard is no class to remember
 
 
-def collect_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Solve a range of a class's problems; write those solved, each plan checked by the authority.
+class Collected(NamedTuple):
+    """What came of a range of problems."""
 
-    What the run of a retraining's champion has from the same key is taken over.
+    solved: int
+    tried: int
+
+
+def collect_chunk(chunk: Chunk) -> Collected:
+    """Solve a range of a class's problems; write those that are solved, each plan checked by the authority.
+
+    In a retraining a shard that the champion's run has made from the same key is copied.
     """
-    place, asked = chunk.run.shard("candidates", chunk.class_name, chunk.index), chunk.last - chunk.first
-    before = champion_run_of(chunk)
-    if before is not None:
-        known = before.folder.shard("candidates", chunk.class_name, chunk.index)
-        if shard_is_done(known, chunk.key):
-            return {"solved": copy_experiences(known, place, chunk.key), "asked": asked}
+    shard, tried = chunk.shard("candidates"), chunk.last - chunk.first
+    champion = champion_run_of(chunk)
+    if champion is not None:
+        theirs = champion.folder.shard("candidates", chunk.class_name, chunk.index)
+        if shard_is_done(theirs, chunk.key):
+            return Collected(copy_experiences(theirs, shard, chunk.key), tried)
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
-    planner, seed = chunk.settings.collector, chunk.settings.seed
-    vehicle = vehicle_named(chunk.settings.vehicle)
+    planner, seed, vehicle = chunk.settings.collector, chunk.settings.seed, chunk.vehicle
     workspace = Workspace()
     experiences, seconds = [], []
     for index in range(chunk.first, chunk.last):
@@ -49,7 +53,7 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
             experiences.append(Experience(problem, attempt.plan, vehicle))
             seconds.append(attempt.planning_seconds)
     write_experiences(
-        place,
+        shard,
         experiences,
         planner=planner,
         seeds=[seed] * len(experiences),
@@ -57,49 +61,54 @@ def collect_chunk(chunk: Chunk) -> dict[str, Any]:
         key=chunk.key,
         vehicle=vehicle,
     )
-    return {"solved": len(experiences), "asked": asked}
+    return Collected(len(experiences), tried)
 
 
-collect_problems = chunk_task(collect_chunk)
+def _cut(data: str, settings: RunSettings, name: str) -> Cut:
+    """As many problems as are needed to solve enough of them, judging by the chunks that are done."""
+    source = source_of(data, settings, name)
+    size = max(SMALLEST_CHUNK, min(LARGEST_CHUNK, settings.wanted // 10))
+    inputs = [settings.seed, settings.collector, *source_key(settings, name)]
+    results: list[Collected] = []
+    while True:
+        cut = Cut(_problems_to_try(settings, name, source, size, results), size, inputs)
+        chunks = chunks_of(COLLECT.name, data, settings, name, cut)[len(results) :]
+        kept = [each for each in map(COLLECT.kept, chunks) if each is not None]
+        if not chunks or len(kept) < len(chunks):
+            return cut
+        results += [each.result for each in kept]
 
 
-def is_collected(chunk: Chunk) -> bool:
-    """Whether the chunk's shard is there."""
-    return shard_is_done(chunk.run.shard("candidates", chunk.class_name, chunk.index), chunk.key)
+def _problems_to_try(
+    settings: RunSettings, name: str, source: Source, size: int, results: Sequence[Collected]
+) -> int:
+    """How many problems to try in all, given what came of the first ones.
 
-
-def chunks_wanted(data: str, settings: RunSettings, done: Results) -> list[Chunk]:
-    """The chunks to do next so that each class gets its candidates; none when all have them.
-
-    A class with too few, or too few that are solved, makes do with them if they suffice for its experiences;
-    else a RunError.
+    A class without enough problems, or with too few that are solved, makes do with fewer candidates if they
+    suffice for its experiences. RunError if they do not.
     """
-    return [chunk for name in settings.class_names for chunk in _chunks_wanted(data, settings, name, done)]
-
-
-def _chunks_wanted(data: str, settings: RunSettings, class_name: str, done: Results) -> list[Chunk]:
-    results = [result for chunk, result in done.items() if chunk.class_name == class_name]
-    solved = sum(result["solved"] for result in results)
-    asked = sum(result["asked"] for result in results)
+    solved, tried = (sum(each[i] for each in results) for i in (0, 1))
     enough = solved >= settings.experiences
     missing = settings.wanted - solved
-    if missing <= 0 or (enough and asked >= PATIENCE * settings.wanted):
-        return []
-    size = max(SMALLEST_CHUNK, min(LARGEST_CHUNK, settings.wanted // 10))
-    expected = missing * max(asked, 1) // max(solved, 1) + 1 if asked else missing
+    if missing <= 0 or (enough and tried >= PATIENCE * settings.wanted):
+        return tried
+    expected = missing * max(tried, 1) // max(solved, 1) + 1 if tried else missing
     more = -(-min(expected, settings.wanted) // size) * size
-    until = source_of(data, settings, class_name).count("collect", asked + more)
-    if enough and until <= asked:
-        return []
-    if until <= asked or asked >= GIVE_UP * settings.experiences + size:
+    until = source.count("collect", tried + more)
+    if enough and until <= tried:
+        return tried
+    if until <= tried or tried >= GIVE_UP * settings.experiences + size:
         raise RunError(
-            f"Class {class_name}: {solved} of {asked} problems solved, {settings.experiences} are wanted; "
+            f"Class {name}: {solved} of {tried} problems solved, {settings.experiences} are wanted; "
             "ask for fewer, or take easier problems."
         )
-    inputs = [settings.seed, settings.collector, *source_key(settings, class_name)]
-    return chunks_of(data, settings, "collect", class_name, until, size, inputs)[len(results) :]
+    return until
 
 
-def experiences_key(data: str, settings: RunSettings, class_name: str) -> str:
-    """The key under which a class's experiences were written; a StorageError where there are none."""
-    return metadata_of(run_folder(data, settings).experiences(class_name))[b"key"].decode()
+COLLECT: Final = Stage(
+    name="collect",
+    do=collect_chunk,
+    result=Collected,
+    cut=_cut,
+    output=lambda chunk: chunk.shard("candidates"),
+)

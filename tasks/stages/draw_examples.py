@@ -1,22 +1,21 @@
-"""Draw: some problems of each class with what was recalled, repaired and found."""
+"""Draw examples: some problems of each class with the plans that were recalled, repaired and searched."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 from dashboards.figures.pictures import Example, gallery
 from dashboards.figures.style import save
 from planners.memory.recall import default_recall
 from planners.solve import solve
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.places.mirror import is_there
 from storage.tables.attempts import read_attempts
-from tasks.fan_out.stage import Chunk, chunk_task, chunks_of
+from tasks.fan_out.chunk import Chunk, Cut
+from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import source_of
-from tasks.settings.run_settings import RunSettings
-from tasks.stages.benchmark import benchmark_chunks
+from tasks.stages.benchmark import BENCHMARK
 
 SHOWN_PLANNER: Final = "gust"
 SHOWN_TOP_K: Final = 5
@@ -24,47 +23,39 @@ SHOWN: Final = {"recalled": "open", "repaired": "repair", "searched": "open"}  #
 SHOWN_EACH: Final = 2
 
 
-def draw_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Draw the figures of one class."""
-    drawn = save(gallery(list(_examples(chunk))), chunk.run.figures, f"problems-{chunk.class_name}")
-    return {"figures": [path.name for path in drawn]}
+def draw_chunk(chunk: Chunk) -> None:
+    """Draw the examples of one class."""
+    save(gallery(list(_examples(chunk))), chunk.run.figures, _name(chunk.class_name))
 
 
-draw_figures = chunk_task(draw_chunk)
-
-
-def is_drawn(chunk: Chunk) -> bool:
-    """Whether the figures of a class are there."""
-    return is_there(chunk.run.figures / f"problems-{chunk.class_name}.svg")
-
-
-def figure_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each class."""
-    rows = [chunk.key for chunk in benchmark_chunks(data, settings)]
-    return [
-        chunk
-        for name in settings.class_names
-        for chunk in chunks_of(data, settings, "draw", name, 1, 1, rows)
-    ]
+def _name(class_name: str) -> str:
+    return f"problems-{class_name}"
 
 
 def _examples(chunk: Chunk) -> Iterator[Example]:
     """Some problems, solved again, which gives the same plans."""
-    settings, name = chunk.settings, chunk.class_name
+    settings, name, vehicle = chunk.settings, chunk.class_name, chunk.vehicle
     planner = SHOWN_PLANNER if SHOWN_PLANNER in settings.planners else settings.planners[0]
-    rows = read_attempts(chunk.run.results / name)
-    vehicle = vehicle_named(settings.vehicle)
+    rows = read_attempts(chunk.run.table("results", name))
     memory = load_memory(chunk.run.memory(name), vehicle)
     rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
     rows = rows[(rows["recall"] == default_recall(memory)) & (rows["top_k"] == SHOWN_TOP_K)]
-    places = {identity: index for index, identity in enumerate(rows["problem_id"].unique())}
+    numbers = {identity: index for index, identity in enumerate(rows["problem_id"].unique())}
     source = source_of(chunk.data, settings, name)
     for kind, assist in SHOWN.items():
         shown = rows[(rows["source"] == kind) & (rows["assist"] == assist)].head(SHOWN_EACH)
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
-            problem = source.problem("test", places[identity])
+            problem = source.problem("test", numbers[identity])
             attempt = solve(problem, planner, assist, SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.2f} ms"
-            yield Example(
-                problem, [memory.plans[i] for i in attempt.recalled], attempt.plan, caption, vehicle
-            )
+            recalled = [memory.plans[i] for i in attempt.recalled]
+            yield Example(problem, recalled, attempt.plan, caption, vehicle)
+
+
+DRAW_EXAMPLES: Final = Stage(
+    name="draw",
+    do=draw_chunk,
+    cut=lambda data, settings, name: Cut(1, 1, BENCHMARK.keys(data, settings, name)),
+    output=lambda chunk: chunk.run.figure(_name(chunk.class_name), "svg"),
+    is_whole=lambda figure, _: is_there(figure),
+)

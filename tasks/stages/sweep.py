@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
@@ -13,10 +13,12 @@ import pandas as pd
 from planners.memory.encoder.training import train
 from storage.errors import StorageError
 from storage.places.files import read_json, write_json
-from tasks.fan_out.stage import Chunk, chunk_task, chunks_of
+from tasks.fan_out.chunk import Chunk, Cut
+from tasks.fan_out.stage import Stage
 from tasks.settings.encoder_training import Learning
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.train import memory_names, problems_of_memory, train_chunks
+from tasks.stages.relabel import problems_of_memory
+from tasks.stages.train import TRAIN
 
 RATES: Final = (1e-3, 3e-3, 1e-2)
 SIZES: Final = (  # channels of the convolution, width of the hidden layer
@@ -38,13 +40,13 @@ def variants(settings: RunSettings) -> list[Learning]:
     return list(dict.fromkeys([base, *sizes, *rates]))
 
 
-def sweep_chunk(chunk: Chunk) -> dict[str, Any]:
-    """Train one variant for one memory, and note how well it ranks the validation problems."""
+def sweep_chunk(chunk: Chunk) -> None:
+    """Train one variant for one memory, and write how well it ranks the validation problems."""
     settings = chunk.settings
     problems = problems_of_memory(chunk.data, settings, chunk.class_name)
     learning = variants(settings)[chunk.index]
-    asked = learning.settings(settings.objective, settings.epochs, settings.seed)
-    trained = train(problems.grids, problems.plan_index, problems.free, asked)
+    training = learning.settings(settings.objective, settings.epochs, settings.seed)
+    trained = train(problems.grids, problems.plan_index, problems.free, training)
     best = max(trained.history, key=lambda epoch: epoch.hit_1)
     row = {
         "class": chunk.class_name,
@@ -57,50 +59,44 @@ def sweep_chunk(chunk: Chunk) -> dict[str, Any]:
         "seconds": trained.history[-1].seconds,
     }
     history = [epoch._asdict() for epoch in trained.history]
-    write_json(_place(chunk), {"key": chunk.key, "row": row, "epochs": history})
-    return {}
+    write_json(_path(chunk), {"key": chunk.key, "row": row, "epochs": history})
 
 
-sweep_variant = chunk_task(sweep_chunk)
+def swept(chunk: Chunk) -> tuple[dict[str, Any], list[dict[str, float]]]:
+    """The row of a variant, and the figures of its epochs."""
+    written = read_json(_path(chunk))
+    return written["row"], written["epochs"]
 
 
-def is_swept(chunk: Chunk) -> bool:
-    """Whether a variant was trained."""
+def sweep_rows(chunks: Iterable[Chunk]) -> pd.DataFrame:
+    """A row for each memory and variant; hit@k is a share of what the stored plans can solve."""
+    return pd.DataFrame([swept(chunk)[0] for chunk in chunks])
+
+
+def _path(chunk: Chunk) -> Path:
+    return chunk.run.sweep(chunk.class_name, chunk.index)
+
+
+def _is_whole(path: Path, key: str) -> bool:
     try:
-        return bool(read_json(_place(chunk))["key"] == chunk.key)
+        return bool(read_json(path)["key"] == key)
     except (StorageError, KeyError, TypeError):
         return False
 
 
-def sweep_chunks(data: str, settings: RunSettings) -> list[Chunk]:
-    """One chunk for each memory and variant; its units are epochs."""
-    keys = {chunk.class_name: chunk.key for chunk in train_chunks(data, settings)}
+def _cut(data: str, settings: RunSettings, name: str) -> Cut:
+    """A chunk for each variant; its items are epochs."""
     tried = variants(settings)
-    return [
-        chunk
-        for name in memory_names(settings)
-        for chunk in chunks_of(
-            data,
-            settings,
-            "sweep",
-            name,
-            len(tried) * settings.epochs,
-            settings.epochs,
-            [keys[name], *(asdict(each) for each in tried)],
-        )
-    ]
+    inputs = [*TRAIN.keys(data, settings, name), *map(asdict, tried)]
+    return Cut(len(tried) * settings.epochs, settings.epochs, inputs)
 
 
-def swept(chunk: Chunk) -> tuple[dict[str, Any], list[dict[str, float]]]:
-    """What a variant came to, and its epochs."""
-    found = read_json(_place(chunk))
-    return found["row"], found["epochs"]
-
-
-def sweep_rows(chunks: Sequence[Chunk]) -> pd.DataFrame:
-    """A row a memory and variant; hit@k as a share of what the stored plans can solve."""
-    return pd.DataFrame([swept(chunk)[0] for chunk in chunks])
-
-
-def _place(chunk: Chunk) -> Path:
-    return chunk.run.path / "sweep" / chunk.class_name / f"{chunk.index:02d}.json"
+SWEEP: Final = Stage(
+    name="sweep",
+    do=sweep_chunk,
+    classes=lambda settings: settings.memory_names,
+    cut=_cut,
+    output=_path,
+    is_whole=_is_whole,
+    unit="epochs",
+)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from dashboards.verdicts.claim_rules import Claim
-from storage.places.data_folder import RunFolder
 from storage.places.files import read_text
 from storage.places.mirror import fetch, files_in, uri_of
+from storage.places.run_folder import RunFolder
 from tasks.fan_out.progress_artifact import artifact_key
 
 MAX_IMAGE_BYTES: Final = 700_000  # an artifact is one row in the server's database

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -16,15 +16,16 @@ from dashboards.verdicts.promotion import Judgement
 from storage.places.data_folder import open_data_folder
 from storage.places.scratch import scratch_folder
 from tasks.attempts.attempt_rows import commit
+from tasks.fan_out.chunk import Chunk, run_folder
 from tasks.fan_out.keys import key_of
-from tasks.fan_out.stage import Chunk, run_folder
 from tasks.reports.report import Report
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.benchmark import benchmark_chunks
-from tasks.stages.build_memory import figure_names
-from tasks.stages.collect import experiences_key
+from tasks.stages.benchmark import BENCHMARK
+from tasks.stages.build_memory import Built, figure_names
 from tasks.stages.judge import judged_key
+from tasks.stages.keep_experiences import experiences_key
 from tasks.stages.sweep import swept
+from tasks.stages.train import Trained
 from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, Tracker
 from tasks.tracking.parameters import parameters_of
 
@@ -56,41 +57,35 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
         yield run_id
 
 
-def log_training(
-    data: str, settings: RunSettings, chunks: Sequence[Chunk], results: Sequence[dict[str, Any]]
-) -> None:
+def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Trained]) -> None:
     """One child run for each encoder: parameters, metrics of every epoch, the data it learned from."""
     log, run = tracker(data), run_folder(data, settings)
-    for chunk, result in zip(chunks, results, strict=True):
+    for chunk, result in trained.items():
         with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
-            asked: dict[str, Any] = parameters_of(settings) | {"class": chunk.class_name}
-            asked |= {"training_seed": settings.seed + chunk.index}
-            log.parameters(run_id, asked | {name: result[name] for name in ("problems", "plans")})
-            log.metrics(run_id, result["epochs"], step="epoch")
-            place = run.path / "hallucinated" / chunk.class_name
-            log.dataset(run_id, f"hallucinated-{chunk.class_name}", place, chunk.key, "training")
+            parameters: dict[str, Any] = parameters_of(settings) | {"class": chunk.class_name}
+            parameters |= {"training_seed": settings.seed + chunk.index}
+            log.parameters(run_id, parameters | {"problems": result.problems, "plans": result.plans})
+            log.metrics(run_id, result.epochs, step="epoch")
+            rows = run.table("hallucinated", chunk.class_name)
+            log.dataset(run_id, f"hallucinated-{chunk.class_name}", rows, chunk.key, "training")
             log.mark_logged(run_id, chunk.key)
 
 
 def log_memories(
-    data: str,
-    settings: RunSettings,
-    chunks: Sequence[Chunk],
-    results: Sequence[dict[str, Any]],
-    retrieval: pd.DataFrame,
+    data: str, settings: RunSettings, built: Mapping[Chunk, Built], retrieval: pd.DataFrame
 ) -> None:
     """Each memory as a model that its training brought forth, what it recalls as metrics, and all curves."""
     log, run = tracker(data), run_folder(data, settings)
-    for chunk, result in zip(chunks, results, strict=True):
+    for chunk, result in built.items():
         name = chunk.class_name
-        with _child(data, settings, _stage(settings, name, result["training_seed"])) as run_id:
+        with _child(data, settings, _stage(settings, name, result.training_seed)) as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
                 model_id = log.memory(run_id, "memory", run.memory(name), settings.vehicle)
                 log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
                 for figure in ("retrieval", *figure_names(name)):
-                    log.artifacts(run_id, run.figures / f"{figure}.png", "figures")
+                    log.artifacts(run_id, run.figure(figure, "png"), "figures")
                 log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
                 log.mark_logged(run_id, chunk.key, "memory")
     _log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
@@ -99,7 +94,7 @@ def log_memories(
 def log_report(data: str, settings: RunSettings, report: Report) -> None:
     """The benchmark's child run: every figure of the summary as a metric, figures and tables as artifacts."""
     log, run = tracker(data), run_folder(data, settings)
-    key = key_of([chunk.key for chunk in benchmark_chunks(data, settings)])
+    key = key_of([chunk.key for chunk in BENCHMARK.chunks(data, settings)])
     _log_headline(data, settings, headline(report.summary, report.retrieval), COMPARED)
     with _child(data, settings, "benchmark") as run_id:
         log.parameters(run_id, parameters_of(settings))
@@ -128,7 +123,7 @@ def _log_headline(
         return
     log.metrics(parent, [figures])
     for picture in pictures:
-        log.artifacts(parent, run.figures / f"{picture}.png", "figures")
+        log.artifacts(parent, run.figure(picture, "png"), "figures")
     for name in settings.class_names:
         key = experiences_key(data, settings, name)
         if not log.is_logged(parent, key, f"experiences.{name}"):
@@ -191,7 +186,7 @@ def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
     return f"train {class_name}" + (f" seed {seed}" if settings.learning.seeds > 1 else "")
 
 
-def log_sweep(data: str, settings: RunSettings, chunks: Sequence[Chunk]) -> None:
+def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None:
     """One run for the sweep, and in it a child for each variant: parameters, metrics of every epoch."""
     log = tracker(data)
     with _child(data, settings, "sweep") as parent:

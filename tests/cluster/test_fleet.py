@@ -14,8 +14,9 @@ import distributed
 import psycopg2
 import pytest
 
-from storage.places.data_folder import DataFolder, RunFolder, open_data_folder
+from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import fetch, files_in
+from storage.places.run_folder import RunFolder
 from tests.cluster.machines import ROOT, Fleet, fleet, wait_for
 from tests.flows.same_rows import assert_same_rows
 

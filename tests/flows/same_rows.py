@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 
 
 def rows_of(path: Path) -> pd.DataFrame:

@@ -12,7 +12,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from storage.places.data_folder import DataFolder, RunFolder
+from storage.places.data_folder import DataFolder
+from storage.places.run_folder import RunFolder
 from tests.flows.same_rows import assert_same_rows
 
 ROOT = Path(__file__).parents[2]

@@ -17,7 +17,8 @@ import pandas as pd
 import pytest
 
 from storage.archives.memories import load_memory
-from storage.places.data_folder import DataFolder, RunFolder
+from storage.places.data_folder import DataFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.recalls import read_recalls
 from tasks.reports.stage_times import stages_of
 from tasks.settings.run_settings import ABLATION, ASSISTS

@@ -37,14 +37,11 @@ from planners.world.randomness import generator
 from storage.archives.hallucinators import load_hallucinator
 from storage.places.files import whole_file
 from storage.tables.experiences import read_experiences
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.settings.run_settings import RunSettings, for_preset
-from tasks.stages.hallucinate import (
-    hallucinate_chunk,
-    hallucination_chunks,
-)
-from tasks.stages.learn_hallucination import learn_chunk, learning_chunks
-from tests.tasks.collected import collect
+from tasks.stages.hallucinate import HALLUCINATE, hallucinate_chunk
+from tasks.stages.learn_hallucination import LEARN_HALLUCINATION
+from tests.tasks.in_process import collect, run_stage
 
 SEED = 81
 PROBLEMS = 200  # a plan, for the table of methods
@@ -54,8 +51,7 @@ PICTURED = "random", 5  # class, and number of the experience
 def prepare(settings: RunSettings, data: str) -> None:
     """The experiences of a run, and what learned hallucination needs."""
     collect(data, settings)
-    for chunk in learning_chunks(data, settings):
-        learn_chunk(chunk)
+    run_stage(LEARN_HALLUCINATION, data, settings)
 
 
 def methods_table(data: str) -> Table:
@@ -80,10 +76,10 @@ def methods_table(data: str) -> Table:
                     for _ in islice(made, PROBLEMS):
                         pass
                 obstacles = (thread_time() - began) / PROBLEMS / len(part)
-            chunk = hallucination_chunks(data, settings)[0]
+            chunk = HALLUCINATE.chunks(data, settings)[0]
             hallucinate_chunk(replace(chunk, last=chunk.first + 1))  # compiles
             began = thread_time()
-            problems = hallucinate_chunk(chunk)["problems"]
+            problems = hallucinate_chunk(chunk).problems
             whole = (thread_time() - began) / problems
             table.add_row(name, method, f"{1e6 * obstacles:.0f}", f"{1e6 * whole:.0f}", f"{1 / whole:.0f}")
     return table
@@ -97,14 +93,14 @@ def whole_stage(data: str) -> Table:
     for mixture in (["rearrange"], [f"{method}=0.25" for method in METHODS]):
         settings = for_preset("paper", seed=SEED, candidates=100, hallucination=mixture)
         prepare(settings, data)
-        chunks = hallucination_chunks(data, settings)
+        chunks = HALLUCINATE.chunks(data, settings)
         with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
             list(pool.map(_load, range(2)))
             began = perf_counter()
-            problems = sum(done["problems"] for done in pool.map(hallucinate_chunk, chunks))
+            problems = sum(done.problems for done in pool.map(hallucinate_chunk, chunks))
             seconds = perf_counter() - began
             memory = max(pool.map(_peak_megabytes, range(4)))
-        shards = [chunk.run.shard("hallucinated", chunk.class_name, chunk.index) for chunk in chunks]
+        shards = [chunk.shard("hallucinated") for chunk in chunks]
         size = sum(shard.stat().st_size for shard in shards) / 1e6
         made = len(CLASSES) * settings.experiences * settings.problems_per_experience
         table.add_row(

@@ -25,7 +25,7 @@ from rich.table import Table
 from storage.archives.memories import save_memory
 from storage.exchange.problems import write_problems
 from storage.tables.attempts import read_attempts
-from tasks.fan_out.stage import Chunk
+from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import source_of
 from tasks.settings.run_settings import for_preset
 from tasks.stages.benchmark import benchmark_chunk

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import pyarrow.parquet as pq
 
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from tasks.reports.stage_times import stages_of
 
 SIZES: Final = (10**6, 10**8, 10**10)

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from tests.speed.scale import BASE_BYTES, TASK_BYTES, Cost, costs_of, markdown, projected
 
 

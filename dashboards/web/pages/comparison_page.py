@@ -16,7 +16,7 @@ from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
 from dashboards.web.pages.overview_page import reduction_ends, reduction_of
 from dashboards.web.parameters import Parameters
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 
 RESAMPLES: Final = 1000
 RESAMPLES_OF_MANY: Final = 200

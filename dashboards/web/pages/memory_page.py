@@ -29,7 +29,7 @@ from planners.world.arrays import Floats32
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import GRID, occupancy_of
 from planners.world.problem import Problem
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
 from storage.tables.shards import metadata_of
@@ -95,7 +95,7 @@ def _embedded(data: DataReader, run: RunFolder, name: str, loaded: Memory) -> Em
             of_shards.append((loaded.encoder(grids), labelled.plan_index[rows], source))
         return EmbeddedProblems(*(np.concatenate(column) for column in zip(*of_shards, strict=True)))
 
-    key = ("embedded", stamp_of(run.rows("hallucinated", name)), stamp_of(run.memory(name)))
+    key = ("embedded", stamp_of(run.table("hallucinated", name)), stamp_of(run.memory(name)))
     return data.kept(key, made)
 
 

@@ -19,7 +19,7 @@ from dashboards.web.data_reader import DataReader, stamp_of
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters, link
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.configurations import BASELINE, Configuration, configurations_in
 

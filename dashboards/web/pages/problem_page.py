@@ -27,7 +27,7 @@ from dashboards.web.parameters import Parameters, link
 from dashboards.web.replay import Replay, replay
 from planners.search.query import Limits
 from planners.world.problem import Problem
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.configurations import Configuration
 
 SECONDS: Final = 5.0  # that it may take to make an attempt again

@@ -25,7 +25,7 @@ from dashboards.web.pages.retraining_charts import (
 )
 from dashboards.web.parameters import Parameters, link
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.configurations import BASELINE
 from storage.tables.learned_experiences import learned_shards
 from storage.tables.recalls import read_recalls

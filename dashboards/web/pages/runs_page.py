@@ -9,7 +9,7 @@ from dashboards.web.data_reader import DataReader
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 
 
 def runs(data: DataReader, params: Parameters) -> Page:

@@ -24,7 +24,8 @@ from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of, pack
 from planners.world.problem import Problem
 from storage.archives.memories import save_memory
-from storage.places.data_folder import DataFolder, RunFolder, open_data_folder
+from storage.places.data_folder import DataFolder, open_data_folder
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import write_attempts
 from storage.tables.hallucinated import write_hallucinated
 from storage.tables.recalls import write_recalls

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from storage.errors import StorageError
-from storage.places.data_folder import MARK, checked_name, open_data_folder
+from storage.places.data_folder import MARK, open_data_folder
+from storage.places.run_folder import checked_name
 
 
 def one_line(error: pytest.ExceptionInfo[StorageError]) -> str:

@@ -15,13 +15,13 @@ from tasks.inputs.learned_on_the_job import Solved, remember
 from tasks.registry.champion_registry import Registry
 from tasks.reports.report import report_retrieval
 from tasks.settings.run_settings import Assist, RunSettings, for_preset
-from tasks.stages import judge
-from tasks.stages.build_memory import build_chunk, memory_chunks
-from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
-from tasks.stages.measure_recall import recall_chunk, recall_chunks
-from tasks.stages.train import train_chunk, train_chunks
+from tasks.stages.build_memory import BUILD_MEMORY
+from tasks.stages.hallucinate import HALLUCINATE
+from tasks.stages.judge import CHECK_PLANS, JUDGE
+from tasks.stages.measure_recall import MEASURE_RECALL
+from tasks.stages.train import TRAIN
 from tasks.tracking.logbook import log_memories, log_training, run_logged
-from tests.tasks.collected import collect
+from tests.tasks.in_process import collect, run_stage
 
 CLASS: Final = "curves"
 SETTINGS: Final = replace(
@@ -39,20 +39,15 @@ SETTINGS: Final = replace(
 def make(data: str, settings: RunSettings) -> None:
     """Every stage of a run up to what a judgement needs."""
     collect(data, settings)
-    for chunk in hallucination_chunks(data, settings):
-        hallucinate_chunk(chunk)
-    training = train_chunks(data, settings)
-    log_training(data, settings, training, [train_chunk(chunk) for chunk in training])
-    built = memory_chunks(data, settings)
-    results = [build_chunk(chunk) for chunk in built]
-    for chunk in recall_chunks(data, settings):
-        recall_chunk(chunk)
-    log_memories(data, settings, built, results, report_retrieval(data, settings))
-    for chunk in judge.plan_chunks(data, settings):
-        judge.check_plans_chunk(chunk)
-    for chunk in judge.judge_chunks(data, settings):
-        if not judge.is_judged(chunk):
-            judge.judge_chunk(chunk)
+    run_stage(HALLUCINATE, data, settings)
+    log_training(data, settings, run_stage(TRAIN, data, settings))
+    memories = run_stage(BUILD_MEMORY, data, settings)
+    run_stage(MEASURE_RECALL, data, settings)
+    log_memories(data, settings, memories, report_retrieval(data, settings))
+    run_stage(CHECK_PLANS, data, settings)
+    for chunk in JUDGE.chunks(data, settings):
+        if not JUDGE.is_written(chunk):
+            JUDGE.run(chunk)
 
 
 def retrain(data: str, settings: RunSettings = SETTINGS, approve: bool = False) -> list[RunSettings]:

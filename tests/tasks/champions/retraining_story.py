@@ -16,14 +16,15 @@ from storage.places.files import remove_folder
 from tasks.champions import conclude as task
 from tasks.champions.dry_run import dry_run
 from tasks.champions.promote import promote_awaiting, roll_back
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.registry.champion_registry import CHALLENGER, Registry, Version, registered_name
 from tasks.registry.model_uris import load_from
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.run_settings import RunError, RunSettings
 from tasks.stages import hallucinate, train
-from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
+from tasks.stages.hallucinate import HALLUCINATE
 from tests.tasks.champions.retrained import CLASS, SETTINGS, learn, retrain
+from tests.tasks.in_process import run_stage
 
 NAME = registered_name(CLASS, "car")
 
@@ -70,12 +71,14 @@ class Story:
         run = run_folder(self.data, third)
 
         def again() -> tuple[int, list[bytes]]:
-            taken = sum(hallucinate_chunk(chunk)["taken"] for chunk in hallucination_chunks(self.data, third))
-            return taken, [path.read_bytes() for path in run.shards("hallucinated", CLASS)]
+            results = run_stage(HALLUCINATE, self.data, third).values()
+            return sum(result.taken for result in results), [
+                path.read_bytes() for path in run.shards("hallucinated", CLASS)
+            ]
 
         taken, shards = again()
         with patch.context() as without:
-            without.setattr(hallucinate, "known_problems", lambda *_: {})
+            without.setattr(hallucinate, "problems_of_champion", lambda *_: {})
             anew, same = again()
         self.seen |= {"taken": taken, "taken anew": anew, "anew is the same": shards == same}
 

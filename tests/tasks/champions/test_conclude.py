@@ -14,7 +14,7 @@ from storage.places.data_folder import open_data_folder
 from storage.tables.experiences import read_experiences
 from tasks.champions import conclude as task
 from tasks.champions.dry_run import dry_run
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, REFUSED, ROLLED_BACK
 from tasks.reports import report

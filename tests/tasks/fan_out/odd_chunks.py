@@ -8,8 +8,10 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from tasks.fan_out.chunk import Cut
+from tasks.fan_out.stage import Stage
 from tasks.servers.prefect_server import local_server
 from tasks.settings.run_settings import ASSISTS, RunSettings
 from tests.tasks.fan_out.strangers import given_to_strangers
@@ -19,7 +21,13 @@ SETTINGS = RunSettings(
 )
 
 
-def odd_chunk(chunk: Any) -> dict[str, Any]:
+class Told(NamedTuple):
+    """What a chunk that behaves says of itself."""
+
+    index: Any
+
+
+def odd_chunk(chunk: Any) -> Told:
     """Do as the class name says; count how often each chunk was done."""
     folder = Path(chunk.data)
     if chunk.class_name == "failing" and chunk.index == 2:
@@ -30,13 +38,11 @@ def odd_chunk(chunk: Any) -> dict[str, Any]:
         (folder / "once").touch()
         os.kill(os.getpid(), signal.SIGKILL)
     if chunk.class_name == "environment":
-        return {
-            "index": {name: value for name, value in os.environ.items() if name.startswith(("MALLOC", "OMP"))}
-        }
+        return Told({name: value for name, value in os.environ.items() if name.startswith(("MALLOC", "OMP"))})
     time.sleep(0.05 * (4 - chunk.index % 4))  # later ones are ready earlier
     with (folder / f"{chunk.class_name}-{chunk.index}").open("a") as done:
         done.write("x")
-    return {"index": chunk.index}
+    return Told(chunk.index)
 
 
 def main(data: Path) -> None:
@@ -45,31 +51,33 @@ def main(data: Path) -> None:
         from prefect import flow
 
         from tasks.fan_out import fan_out as engine
-        from tasks.fan_out.stage import Chunk, chunk_task, chunks_of
-
-        work = chunk_task(odd_chunk)
 
         @flow(task_runner=engine.task_runner())
         def go(name: str, is_done: Any) -> list[Any]:
-            chunks = chunks_of(str(data), SETTINGS, "odd", name, 8, 1, [])
-            return [result["index"] for result in engine.fan_out(work, chunks, f"{name} test", is_done)]
-
-        def is_there(chunk: Chunk) -> bool:
-            return (data / f"{chunk.class_name}-{chunk.index}").exists()
+            stage = Stage(
+                name=f"{name} test",
+                do=odd_chunk,
+                result=Told,
+                classes=lambda _: [name],
+                cut=lambda *_: Cut(8, 1, []),
+                output=lambda chunk: data / f"{chunk.class_name}-{chunk.index}",
+                is_whole=lambda path, _: is_done(path),
+            )
+            return [told.index for told in engine.run_stage(stage, str(data), SETTINGS).values()]
 
         found: dict[str, Any] = {}
         with engine.cluster(2):
             if server is not None:
                 server.wait()
-            found["plain"] = go("plain", is_there)
-            found["again"] = go("plain", is_there)
+            found["plain"] = go("plain", Path.exists)
+            found["again"] = go("plain", Path.exists)
             (data / "plain-5").write_text("")
-            found["one lost"] = go("plain", lambda chunk: chunk.index != 5)
-            found["killed"] = go("killed", is_there)
-            found["environment"] = go("environment", is_there)
+            found["one lost"] = go("plain", lambda path: not path.name.endswith("5"))
+            found["killed"] = go("killed", Path.exists)
+            found["environment"] = go("environment", Path.exists)
             for name in ("failing", "deadly"):
                 try:
-                    go(name, is_there)
+                    go(name, Path.exists)
                 except engine.ChunkError as error:
                     found[name] = str(error)
             found["strangers"] = given_to_strangers()

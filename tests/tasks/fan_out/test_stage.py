@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pkgutil
+from importlib import import_module
 from pathlib import Path
+from typing import Any, NamedTuple, get_type_hints
 
 import pytest
 from hypothesis import given
@@ -10,18 +13,26 @@ from hypothesis import strategies as st
 from prefect.client.schemas.objects import State, StateType
 
 from storage.errors import StorageError, UnreachableError
-from storage.places.files import read_json, write_json
+from tasks import stages
 from tasks.fan_out import keys
+from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.keys import key_of
-from tasks.fan_out.stage import _may_pass, chunk_task, chunks_of, is_marked, kept_result, mark_done
+from tasks.fan_out.piece_task import _may_pass, piece_task
+from tasks.fan_out.stage import Stage, is_marked, mark_done
 from tasks.settings.run_settings import for_preset
 
 SETTINGS = for_preset("smoke")
+STAGES = [
+    value
+    for module in pkgutil.iter_modules(stages.__path__, "tasks.stages.")
+    for value in vars(import_module(module.name)).values()
+    if isinstance(value, Stage) and value.do.__module__ == module.name
+]
 
 
 @given(st.integers(0, 500), st.integers(1, 60))
 def test_chunks_cover_every_problem_once_and_in_order(count: int, size: int) -> None:
-    chunks = chunks_of("data", SETTINGS, "stage", "trap", count, size, [])
+    chunks = chunks_of("stage", "data", SETTINGS, "trap", Cut(count, size, []))
     assert [i for chunk in chunks for i in range(chunk.first, chunk.last)] == list(range(count))
     assert [chunk.index for chunk in chunks] == list(range(len(chunks)))
     assert len({chunk.key for chunk in chunks}) == len(chunks)
@@ -29,8 +40,8 @@ def test_chunks_cover_every_problem_once_and_in_order(count: int, size: int) -> 
 
 @given(st.integers(1, 500), st.integers(1, 60), st.integers(0, 500))
 def test_asking_for_more_keeps_the_full_chunks(count: int, size: int, more: int) -> None:
-    few = chunks_of("data", SETTINGS, "stage", "trap", count, size, [])
-    many = chunks_of("data", SETTINGS, "stage", "trap", count + more, size, [])
+    few = chunks_of("stage", "data", SETTINGS, "trap", Cut(count, size, []))
+    many = chunks_of("stage", "data", SETTINGS, "trap", Cut(count + more, size, []))
     full = count // size
     assert few[:full] == many[:full]
 
@@ -40,8 +51,8 @@ def test_asking_for_more_keeps_the_full_chunks(count: int, size: int, more: int)
 )
 def test_a_key_depends_on_stage_class_and_inputs(other: tuple[str, str, list[int]]) -> None:
     stage, name, inputs = other
-    (one,) = chunks_of("data", SETTINGS, "stage", "trap", 1, 1, [1])
-    (changed,) = chunks_of("data", SETTINGS, stage, name, 1, 1, inputs)
+    (one,) = chunks_of("stage", "data", SETTINGS, "trap", Cut(1, 1, [1]))
+    (changed,) = chunks_of(stage, "data", SETTINGS, name, Cut(1, 1, inputs))
     assert one.key != changed.key
 
 
@@ -71,15 +82,52 @@ def test_a_folder_is_done_only_with_its_own_key(tmp_path: Path) -> None:
     assert not is_marked(place, "another")
 
 
-def test_what_a_chunk_told_is_kept_under_its_key(tmp_path: Path) -> None:
-    one, other = chunks_of(str(tmp_path / "data"), SETTINGS, "stage", "trap", 2, 1, [])
-    told = chunk_task(lambda chunk: {"solved": chunk.first}).fn(one)
-    assert told["solved"] == 0
-    assert kept_result(one) == told
-    assert kept_result(other) is None
-    write_json(one.result.with_name(other.result.name), {"solved": 5})
-    assert kept_result(other) == {"solved": 5}
-    assert read_json(one.result) == told
+class Solved(NamedTuple):
+    solved: int
+
+
+def solve_chunk(chunk: Chunk) -> Solved:
+    chunk.shard("results").parent.mkdir(parents=True, exist_ok=True)
+    chunk.shard("results").touch()
+    return Solved(chunk.first)
+
+
+STAGE = Stage(
+    name="stage",
+    do=solve_chunk,
+    result=Solved,
+    cut=lambda *_: Cut(2, 1, []),
+    output=lambda chunk: chunk.shard("results"),
+    is_whole=lambda path, _: path.exists(),
+)
+
+
+def test_the_result_of_a_chunk_is_kept_under_its_key_and_counts_only_with_its_output(tmp_path: Path) -> None:
+    one, other, *_ = STAGE.chunks(str(tmp_path / "data"), SETTINGS)
+    assert STAGE.kept(one) is None
+    told = piece_task(STAGE).fn(one)
+    assert told.result == Solved(0)
+    assert STAGE.kept(one) == (told.result, None)
+    assert STAGE.kept(other) is None
+    assert one.result.parent == other.result.parent != one.run.path
+    one.shard("results").unlink()
+    assert STAGE.kept(one) is None
+
+
+def test_a_damaged_result_has_its_chunk_done_again(tmp_path: Path) -> None:
+    (chunk, *_) = STAGE.chunks(str(tmp_path / "data"), SETTINGS)
+    STAGE.run(chunk)
+    chunk.result.write_text("{")
+    assert STAGE.kept(chunk) is None
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_a_kept_result_is_read_as_what_the_stage_returns(stage: Stage[Any]) -> None:
+    assert get_type_hints(stage.do)["return"] is stage.result
+
+
+def test_no_two_stages_have_the_same_name() -> None:
+    assert len({stage.name for stage in STAGES}) == len(STAGES)
 
 
 def _caused_by(error: OSError) -> StorageError:

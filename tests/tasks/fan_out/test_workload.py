@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tasks.fan_out.workload import WORK, Work, load_of, loads, measured, note, whole
+from tasks.fan_out.workload import Work, load_of, record_load, recorded_loads, total_load, work_since
 
 gaps = st.lists(
     st.tuples(st.sampled_from("ab"), st.floats(0.01, 10.0), st.floats(0.0, 10.0)), min_size=1, max_size=30
@@ -37,37 +37,33 @@ def test_the_time_between_chunks_is_what_is_left_of_each_workers_span(
 
 
 def test_a_chunk_says_who_did_it_and_when() -> None:
-    result = measured(lambda chunk: {"rows": chunk})(7)
-    work = Work(**result[WORK])
-    assert result["rows"] == 7
-    assert work.began <= work.ended
+    work = work_since(-7.0)
+    assert work.began == -7.0 < work.ended
     assert work.worker.endswith(f"-{os.getpid()}")
     assert work.memory_bytes > 1_000_000
 
 
-def test_what_says_nothing_of_its_work_is_not_counted() -> None:
-    results = [{WORK: Work("a", 1.0, 2.0, 5)._asdict()}, {WORK: Work("a", 10.0, 12.0, 6)._asdict()}, {}]
-    with loads() as found:
-        note("all", results)
-        note("none", [{}])
-    ((what, chunks, _, busy, *_),) = found
-    assert (what, chunks, busy) == ("all", 2, 3.0)
-    assert found[0].orchestration == pytest.approx(1.0 - 3.0 / 11.0)
+def test_a_fan_out_that_does_nothing_is_not_recorded() -> None:
+    works = [Work("a", 1.0, 2.0, 5), Work("a", 10.0, 12.0, 6)]
+    with recorded_loads() as loads:
+        record_load("all", works)
+        record_load("none", [])
+    (load,) = loads
+    assert (load.what, load.chunks, load.busy_seconds) == ("all", 2, 3.0)
+    assert load.orchestration == pytest.approx(1.0 - 3.0 / 11.0)
 
 
 def test_a_clock_that_is_set_back_meanwhile_changes_no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     now = iter(range(10**9, 0, -3600))
     monkeypatch.setattr(time, "time", lambda: float(next(now)))
-    with loads() as found:
-        note("work", [measured(lambda chunk: {"rows": chunk})(i) for i in range(3)])
-    (load,) = found
+    load = load_of("work", [work_since(time.monotonic()) for _ in range(3)])
     assert load.chunks == 3
     assert 0.0 <= load.busy_seconds <= load.span_seconds
 
 
 def test_several_fan_outs_add_up() -> None:
     parts = [load_of("a", [Work("w", 0.0, 1.0, 3)]), load_of("b", [Work("w", 5.0, 7.0, 9)])]
-    both = whole(parts)
+    both = total_load(parts)
     assert both is not None
     assert both[1:] == (2, 1, 3.0, 3.0, 3, 9)
-    assert whole([]) is None
+    assert total_load([]) is None

@@ -15,10 +15,10 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.tables.experiences import read_experiences
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.inputs.learned_on_the_job import Solved, remember, with_learned
 from tasks.settings.run_settings import RunSettings, for_preset
-from tests.tasks.collected import collect
+from tests.tasks.in_process import collect
 
 SETTINGS = replace(
     for_preset("smoke", classes=["curves"], difficulty="easy", seed=5),

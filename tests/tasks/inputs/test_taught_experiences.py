@@ -9,21 +9,21 @@ import pytest
 
 from planners.memory.curation import curate
 from storage.archives.memories import load_memory
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences
 from storage.tables.hallucinated import read_labelled
 from storage.tables.recalls import read_recalls
-from tasks.fan_out.stage import keep_settings, run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.inputs import taught_experiences as growth
 from tasks.settings import run_settings as settings
 from tasks.settings.run_settings import COMBINED, for_preset
-from tasks.stages.benchmark import benchmark_chunk, benchmark_chunks
-from tasks.stages.build_memory import build_chunk, memory_chunks
-from tasks.stages.collect import chunks_wanted, collect_chunk
-from tasks.stages.curate import curate_chunk, curation_chunks, keep_experiences
-from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks, relabel_chunk, relabel_chunks
-from tasks.stages.measure_recall import recall_chunk, recall_chunks
-from tasks.stages.train import train_chunk, train_chunks
+from tasks.stages.benchmark import BENCHMARK
+from tasks.stages.build_memory import BUILD_MEMORY
+from tasks.stages.hallucinate import HALLUCINATE
+from tasks.stages.measure_recall import MEASURE_RECALL
+from tasks.stages.relabel import RELABEL
+from tasks.stages.train import TRAIN
+from tests.tasks.in_process import collect, run_stage
 
 EXPERIENCES, TAUGHT = 6, 4
 CLASSES = ("curves", "trap")
@@ -43,24 +43,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(settings, "TAUGHT", TAUGHT)
         patch.setattr(growth, "READ_OUT_PROBLEMS", 20)
-        keep_settings(data, SETTINGS)
-        done = {}
-        while chunks := chunks_wanted(data, SETTINGS, done):
-            done |= {chunk: collect_chunk(chunk) for chunk in chunks}
-        curated = curation_chunks(data, SETTINGS, done)
-        for chunk in curated:
-            curate_chunk(chunk)
-        keep_experiences(data, SETTINGS, curated, [])
-        for chunks_of_stage, do in (
-            (hallucination_chunks, hallucinate_chunk),
-            (relabel_chunks, relabel_chunk),
-            (train_chunks, train_chunk),
-            (memory_chunks, build_chunk),
-            (recall_chunks, recall_chunk),
-            (benchmark_chunks, benchmark_chunk),
-        ):
-            for chunk in chunks_of_stage(data, SETTINGS):
-                do(chunk)
+        collect(data, SETTINGS)
+        for stage in (HALLUCINATE, RELABEL, TRAIN, BUILD_MEMORY, MEASURE_RECALL, BENCHMARK):
+            run_stage(stage, data, SETTINGS)
     return run_folder(data, SETTINGS)
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder
 from storage.places.files import write_json
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import write_attempts
 from tasks.reports.export import export_run
 from tasks.settings.run_settings import UsageError

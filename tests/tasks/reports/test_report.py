@@ -11,7 +11,7 @@ import pytest
 from storage.places.data_folder import open_data_folder
 from storage.places.files import write_json
 from storage.tables.attempts import read_attempts, write_attempts
-from tasks.fan_out.stage import keep_settings
+from tasks.fan_out.chunk import keep_settings
 from tasks.reports.report import continual_rows
 from tasks.settings.run_settings import COMBINED, RunSettings, for_preset
 from tasks.stages.fewer_experiences import runs_of_continual

@@ -10,8 +10,9 @@ import pytest
 from flows.cli.main import call
 from storage.exchange.problems import read_problems, write_problems
 from storage.tables.imported_problems import read_imported
-from tasks.inputs.problem_sources import read_worlds_chunk, source_key, source_of, world_chunks
+from tasks.inputs.problem_sources import source_key, source_of
 from tasks.settings.run_settings import for_preset
+from tasks.stages.read_worlds import READ_WORLDS, WorldsRead
 from tests.storage.samples import box, problem_with
 from tests.storage.worlds.samples import town_cells, write_map, write_ros, write_scene
 
@@ -167,8 +168,8 @@ def test_a_run_collects_and_tests_on_a_map_or_on_what_was_cut_from_it(
     settings = for_preset("smoke", worlds=[str(worlds)], experiences=3, candidates=6, test_problems=12)
     assert settings.class_names == ("town",)
     data = str(tmp_path / "data")
-    (chunk,) = world_chunks(data, settings)
-    assert read_worlds_chunk(chunk) == {"skipped": []}
+    (chunk,) = READ_WORLDS.chunks(data, settings)
+    assert READ_WORLDS.do(chunk) == WorldsRead([])
     source = source_of(data, settings, "town")
     assert (source.count("collect", 99), source.count("test", 99)) == (12, 12)
     ids = {purpose: [source.problem(purpose, i).id for i in range(12)] for purpose in ("collect", "test")}  # type: ignore[arg-type]

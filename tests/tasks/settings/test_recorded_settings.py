@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 
 from storage.errors import StorageError
-from storage.places.data_folder import RunFolder, open_data_folder
+from storage.places.data_folder import open_data_folder
 from storage.places.files import read_json, write_json
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import write_attempts
-from tasks.fan_out.stage import keep_settings, run_folder
+from tasks.fan_out.chunk import keep_settings, run_folder
 from tasks.inputs.champion_run import champion_run
 from tasks.reports.compare import compare
 from tasks.requests.verify_folder import verify_folder

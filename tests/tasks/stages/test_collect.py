@@ -10,16 +10,9 @@ from planners.world.authority.authority import faults
 from storage.exchange.problems import write_problems
 from storage.tables.experiences import read_experiences
 from storage.tables.imported_problems import write_imported
-from tasks.fan_out.stage import Chunk, keep_settings, run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.settings.run_settings import RunError, RunSettings, for_preset
-from tasks.stages.collect import chunks_wanted, collect_chunk
-from tasks.stages.curate import (
-    curate_chunk,
-    curation_chunks,
-    improve_chunk,
-    improvement_chunks,
-    keep_experiences,
-)
+from tests.tasks.in_process import collect
 
 PLAIN = replace(
     for_preset("smoke", classes=["random"], difficulty="easy"), experiences=4, candidates=30, combined=True
@@ -28,16 +21,7 @@ PLAIN = replace(
 
 def collected(data: Path, settings: RunSettings, backwards: bool = False) -> list:
     """What is kept when chunks are done in their order, or in the other."""
-    keep_settings(str(data), settings)
-    done: dict[Chunk, dict[str, int]] = {}
-    while chunks := chunks_wanted(str(data), settings, done):
-        done |= {chunk: collect_chunk(chunk) for chunk in (reversed(chunks) if backwards else chunks)}
-    curated = curation_chunks(str(data), settings, done)
-    improved = improvement_chunks(str(data), settings, curated)
-    for do, of_stage in ((curate_chunk, curated), (improve_chunk, improved)):
-        for chunk in of_stage:
-            do(chunk)
-    keep_experiences(str(data), settings, curated, improved)
+    collect(str(data), settings, backwards)
     run = run_folder(str(data), settings)
     assert len(read_experiences(run.experiences("combined"))) == settings.experiences
     return read_experiences(run.experiences(settings.class_names[0]))

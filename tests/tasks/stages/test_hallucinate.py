@@ -14,12 +14,12 @@ import pytest
 from planners.memory.hallucination.mixture import METHODS
 from storage.errors import StorageError
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, read_methods
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.settings.run_settings import for_preset
 from tasks.stages import hallucinate
-from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
-from tasks.stages.learn_hallucination import is_learned, learn_chunk, learning_chunks
-from tests.tasks.collected import collect
+from tasks.stages.hallucinate import HALLUCINATE, hallucinate_chunk
+from tasks.stages.learn_hallucination import LEARN_HALLUCINATION, learn_chunk
+from tests.tasks.in_process import collect, run_stage
 
 SETTINGS = replace(
     for_preset("smoke", classes=["trap"], difficulty="easy", hallucination=METHODS),
@@ -38,10 +38,10 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with everything that hallucinating needs."""
     data = tmp_path_factory.mktemp("data")
     collect(str(data), SETTINGS)
-    for chunk in learning_chunks(str(data), SETTINGS):
-        assert not is_learned(chunk)
-        learn_chunk(chunk)
-        assert is_learned(chunk)
+    chunks = LEARN_HALLUCINATION.chunks(str(data), SETTINGS)
+    assert not any(map(LEARN_HALLUCINATION.is_written, chunks))
+    run_stage(LEARN_HALLUCINATION, str(data), SETTINGS)
+    assert all(map(LEARN_HALLUCINATION.is_written, chunks))
     return data
 
 
@@ -51,7 +51,7 @@ def _shards(data: Path) -> list[Path]:
 
 @pytest.mark.slow  # a small run with one worker and with two says the same of every table
 def test_one_process_and_two_write_the_same_bytes(data: Path) -> None:
-    chunks = hallucination_chunks(str(data), SETTINGS)
+    chunks = HALLUCINATE.chunks(str(data), SETTINGS)
     assert len(chunks) == 3
     for chunk in chunks:
         hallucinate_chunk(chunk)
@@ -66,15 +66,14 @@ def test_one_process_and_two_write_the_same_bytes(data: Path) -> None:
 def test_training_again_gives_the_same_bytes(data: Path) -> None:
     place = run_folder(str(data), SETTINGS).hallucinator("trap")
     before = {path.name: path.read_bytes() for path in place.iterdir()}
-    (chunk,) = learning_chunks(str(data), SETTINGS)
+    (chunk,) = LEARN_HALLUCINATION.chunks(str(data), SETTINGS)
     learn_chunk(chunk)
     assert {path.name: path.read_bytes() for path in place.iterdir()} == before
     assert {"hallucinator.json", "weights.safetensors"} == set(before)
 
 
 def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> None:
-    for chunk in hallucination_chunks(str(data), SETTINGS):
-        hallucinate_chunk(chunk)
+    run_stage(HALLUCINATE, str(data), SETTINGS)
     shards = _shards(data)
     labelled = read_labelled(shards)
     methods = Counter(method for path in shards for method in read_methods(path))
@@ -93,10 +92,11 @@ def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> Non
 
 
 def test_a_network_is_trained_only_for_who_asks(data: Path) -> None:
-    assert learning_chunks(str(data), replace(SETTINGS, hallucination=(("rearrange", 1.0),))) == []
+    settings = replace(SETTINGS, hallucination=(("rearrange", 1.0),))
+    assert LEARN_HALLUCINATION.chunks(str(data), settings) == []
 
 
 def test_without_its_network_learned_hallucination_says_what_to_do(tmp_path: Path) -> None:
     collect(str(tmp_path), SETTINGS)
     with pytest.raises(StorageError, match="holds no hallucinator"):
-        hallucinate_chunk(hallucination_chunks(str(tmp_path), SETTINGS)[0])
+        run_stage(HALLUCINATE, str(tmp_path), SETTINGS)

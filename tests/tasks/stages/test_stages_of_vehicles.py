@@ -14,19 +14,19 @@ from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.plans import read_plan
 from storage.exchange.problems import write_problems
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from storage.tables.attempts import read_attempts
-from tasks.fan_out.stage import run_folder
+from tasks.fan_out.chunk import run_folder
 from tasks.requests.assistant import Assistant, Way, plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.run_settings import ASSISTS, for_preset
-from tasks.stages.benchmark import benchmark_chunk, benchmark_chunks
-from tasks.stages.build_memory import build_chunk, memory_chunks
-from tasks.stages.draw_examples import draw_chunk, figure_chunks
-from tasks.stages.hallucinate import hallucinate_chunk, hallucination_chunks
-from tasks.stages.train import train_chunk, train_chunks
-from tests.tasks.collected import collect
+from tasks.stages.benchmark import BENCHMARK
+from tasks.stages.build_memory import BUILD_MEMORY
+from tasks.stages.draw_examples import DRAW_EXAMPLES
+from tasks.stages.hallucinate import HALLUCINATE
+from tasks.stages.train import TRAIN
+from tests.tasks.in_process import collect, run_stage
 
 PLANNER = "follow"
 SETTINGS = replace(
@@ -43,15 +43,8 @@ SETTINGS = replace(
 def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     data = str(tmp_path_factory.mktemp("data"))
     collect(data, SETTINGS)
-    for chunks_of_stage, do in (
-        (hallucination_chunks, hallucinate_chunk),
-        (train_chunks, train_chunk),
-        (memory_chunks, build_chunk),
-        (benchmark_chunks, benchmark_chunk),
-        (figure_chunks, draw_chunk),
-    ):
-        for chunk in chunks_of_stage(data, SETTINGS):
-            do(chunk)
+    for stage in (HALLUCINATE, TRAIN, BUILD_MEMORY, BENCHMARK, DRAW_EXAMPLES):
+        run_stage(stage, data, SETTINGS)
     return run_folder(data, SETTINGS)
 
 

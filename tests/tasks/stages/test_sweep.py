@@ -7,7 +7,7 @@ import pytest
 
 from dashboards.report.tables import sweep_table
 from storage.tables.hallucinated import Labelled
-from tasks.fan_out.stage import Chunk
+from tasks.fan_out.chunk import Chunk
 from tasks.reports.experience_curve import runs_of_curve
 from tasks.settings.run_settings import UsageError, for_preset
 from tasks.stages import sweep
@@ -35,9 +35,9 @@ def test_a_variant_is_trained_once_and_its_figures_are_kept(
     monkeypatch.setattr(sweep, "problems_of_memory", problems)
     chunks = [Chunk(str(tmp_path), SETTINGS, "trap", i, i, i + 1, f"key {i}") for i in (0, 1)]
     for chunk in chunks:
-        assert not sweep.is_swept(chunk)
+        assert not sweep.SWEEP.is_written(chunk)
         sweep.sweep_chunk(chunk)
-        assert sweep.is_swept(chunk)
+        assert sweep.SWEEP.is_written(chunk)
     rows = sweep.sweep_rows(chunks)
     assert rows["channels"].tolist() == ["16", "8"]
     assert rows["parameters"].is_monotonic_decreasing

@@ -11,7 +11,7 @@ import pytest
 from planners.memory.encoder.training import Checkpoint
 from storage.archives.encoders import load_encoder
 from storage.tables.hallucinated import Labelled
-from tasks.fan_out.stage import Chunk
+from tasks.fan_out.chunk import Chunk
 from tasks.settings.run_settings import for_preset
 from tasks.stages import train
 
@@ -53,12 +53,12 @@ def test_a_training_killed_after_any_epoch_ends_with_the_same_encoder(
         patched.setattr(train, "save_checkpoint", save_and_die)
         with pytest.raises(KeyboardInterrupt):
             train.train_chunk(chunk)
-    assert train.class_epochs_done([chunk]) == epochs
-    assert not train.is_trained(chunk)
+    assert train.TRAIN.units_done(chunk) == epochs
+    assert not train.TRAIN.is_written(chunk)
     result = train.train_chunk(chunk)
-    assert [epoch["epoch"] for epoch in result["epochs"]] == [1, 2, 3]
-    assert train.is_trained(chunk)
-    assert train.class_epochs_done([chunk]) == 3
+    assert [epoch["epoch"] for epoch in result.epochs] == [1, 2, 3]
+    assert train.TRAIN.is_written(chunk)
+    assert train.TRAIN.units_done(chunk) == 3
     whole, resumed = (
         load_encoder(chunk_in(tmp_path / name).run.model("trap")) for name in ("whole", "killed")
     )
@@ -70,8 +70,8 @@ def test_a_training_killed_after_any_epoch_ends_with_the_same_encoder(
 def test_a_checkpoint_of_other_problems_is_not_gone_on_from(tmp_path: Path) -> None:
     train.train_chunk(chunk_in(tmp_path))
     other = replace(chunk_in(tmp_path), key="another")
-    assert train.class_epochs_done([other]) == 0
-    assert not train.is_trained(other)
+    assert train.TRAIN.units_done(other) == 0
+    assert not train.TRAIN.is_written(other)
 
 
 def test_each_seed_has_an_encoder_of_its_own(tmp_path: Path) -> None:

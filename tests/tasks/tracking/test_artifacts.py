@@ -7,7 +7,7 @@ from pathlib import Path
 
 SCRIPT = """
 from pathlib import Path
-from storage.places.data_folder import RunFolder
+from storage.places.run_folder import RunFolder
 from tasks.tracking.artifacts import publish
 run = RunFolder(Path.cwd() / "laptop-1")
 run.figures.mkdir(parents=True)

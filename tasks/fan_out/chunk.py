@@ -1,0 +1,102 @@
+"""A chunk: a piece of a stage that can be sent anywhere, with all that it takes to do it there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from storage.places.data_folder import open_data_folder
+from storage.places.files import write_json
+from storage.places.run_folder import RunFolder, Table
+from tasks.fan_out.keys import key_of
+from tasks.settings.run_settings import RunSettings
+
+
+class Piece(Protocol):
+    """What a worker does at once."""
+
+    @property
+    def class_name(self) -> str:
+        """What it is a piece of, such as a problem class."""
+
+    @property
+    def index(self) -> int:
+        """Its position among the pieces of the same class."""
+
+    @property
+    def key(self) -> str:
+        """A digest of everything that its rows depend on."""
+
+    @property
+    def result(self) -> Path:
+        """The file that keeps its result; the name contains the key."""
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """A piece of a stage of a run."""
+
+    data: str  # the data folder: a path, or s3://bucket/folder
+    settings: RunSettings
+    class_name: str  # a problem class, or the name of a memory
+    index: int  # position among the stage's chunks of this class, and number of its shard
+    first: int  # first problem, plan or epoch of the chunk
+    last: int  # one past its last
+    key: str  # digest of everything that its rows depend on
+
+    @property
+    def run(self) -> RunFolder:
+        """The folder of the run that it belongs to."""
+        return run_folder(self.data, self.settings)
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle of the run."""
+        return vehicle_named(self.settings.vehicle)
+
+    @property
+    def result(self) -> Path:
+        """The file that keeps its result."""
+        return self.run.result(self.class_name, self.key)
+
+    def shard(self, table: Table) -> Path:
+        """Its own file of a table."""
+        return self.run.shard(table, self.class_name, self.index)
+
+
+class Cut(NamedTuple):
+    """How the work on one class is cut into chunks. The cut must not depend on the number of workers."""
+
+    total: int  # problems, plans or epochs
+    size: int  # of them in a chunk; the last chunk may have fewer
+    inputs: Sequence[Any]  # JSON values that the rows depend on, besides stage, class and code
+
+
+def chunks_of(stage: str, data: str, settings: RunSettings, class_name: str, cut: Cut) -> list[Chunk]:
+    """The chunks of one class, in order.
+
+    Args:
+        stage: name of the stage.
+        data: the data folder.
+        settings: those of the run.
+        class_name: a problem class, or the name of a memory.
+        cut: how many items there are, and how many of them make a chunk.
+
+    """
+    bounds = [(first, min(first + cut.size, cut.total)) for first in range(0, cut.total, cut.size)]
+    keys = [key_of(stage, class_name, *each, *cut.inputs) for each in bounds]
+    return [Chunk(data, settings, class_name, index, *bounds[index], key) for index, key in enumerate(keys)]
+
+
+def run_folder(data: str, settings: RunSettings) -> RunFolder:
+    """The folder of a run in a data folder."""
+    return open_data_folder(data).run(settings.run_name)
+
+
+def keep_settings(data: str, settings: RunSettings) -> None:
+    """Write the settings of a run into its folder."""
+    write_json(run_folder(data, settings).settings, json.loads(settings.to_json()))

@@ -1,0 +1,48 @@
+"""A piece of work as a Prefect task, which is tried again if it failed for a reason that may pass."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, Final
+
+from prefect import task
+from prefect.cache_policies import NO_CACHE
+from prefect.client.schemas.objects import State
+from prefect.tasks import Task, exponential_backoff
+
+from storage.errors import StorageError, UnreachableError
+from tasks.fan_out.stage import AnyPiece, Done, Job, Result
+
+RETRIES: Final = 3  # of a piece that failed because of a disk, a network or a storage
+FIRST_WAIT_SECONDS: Final = 2.0  # each further wait is twice as long
+
+
+def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
+    """The task that does a piece of a job, and keeps its result.
+
+    It tries again after growing waits when storage does not answer; a fault of the piece itself would only
+    happen again.
+    """
+    name = job.do.__name__.replace("_", "-")
+
+    @functools.wraps(job.do)
+    def run(chunk: AnyPiece) -> Done[Result]:
+        return job.run(chunk)
+
+    return task(
+        name=name,
+        task_run_name=f"{name} {{chunk.class_name}} {{chunk.index}}",
+        cache_policy=NO_CACHE,
+        persist_result=False,  # a worker's own disk would keep it, where no other worker looks
+        retries=RETRIES,
+        retry_delay_seconds=exponential_backoff(FIRST_WAIT_SECONDS),
+        retry_jitter_factor=0.5,
+        retry_condition_fn=_may_pass,
+    )(run)
+
+
+def _may_pass(_task: object, _run: object, state: State[Any]) -> bool:
+    """Whether the reason for which a piece failed may be gone the next time."""
+    error = state.data
+    lost = (UnreachableError, OSError)
+    return isinstance(error, lost) or (isinstance(error, StorageError) and isinstance(error.__cause__, lost))

@@ -1,0 +1,65 @@
+"""Read worlds: the folders of worlds and the maps of a run, brought to the canonical frame once."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from planners.world.alignment import to_canonical
+from storage.tables.imported_problems import write_imported
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import source_at
+from tasks.fan_out.chunk import Chunk, Cut
+from tasks.fan_out.stage import Stage, is_marked, mark_done
+from tasks.inputs.problem_sources import PARTS, source_key
+from tasks.settings.run_settings import RunError, world_class
+
+CUT_FROM_MAP: Final = 2  # problems to collect from, for each solved one that is wanted: some are not solved
+
+
+class WorldsRead(NamedTuple):
+    """What came of a folder of worlds or a map."""
+
+    skipped: list[str]  # worlds that were left out, and why
+
+
+def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
+    """Read the worlds of a class, or cut its map into problems; RunError if none of them can be used."""
+    settings, run = chunk.settings, chunk.run
+    source = source_at(next(Path(path) for path in settings.worlds if world_class(path) == chunk.class_name))
+    counts = {"collect": CUT_FROM_MAP * settings.wanted, "test": settings.test_problems}
+    skipped: list[str] = []
+    for purpose, part in PARTS.items():
+        count = counts[purpose] if source.is_map else None
+        imported = import_part(
+            source, part, ImportSettings(chunk.vehicle, settings.strict, count, settings.seed)
+        )
+        if not imported.problems:
+            raise RunError(f"{source.path} holds no usable problem of part {part} ({imported.explained()}).")
+        problems = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
+        write_imported(run.worlds(chunk.class_name, part), problems)
+        skipped += [f"{path}: {reason}" for path, reason in imported.skipped]
+    mark_done(run.worlds_folder(chunk.class_name), chunk.key)
+    return WorldsRead(skipped)
+
+
+READ_WORLDS: Final = Stage(
+    name="read worlds",
+    do=read_worlds_chunk,
+    result=WorldsRead,
+    classes=lambda settings: [world_class(path) for path in settings.worlds],
+    cut=lambda _, settings, name: Cut(1, 1, source_key(settings, name)),
+    output=lambda chunk: chunk.run.worlds_folder(chunk.class_name),
+    is_whole=is_marked,
+)
+
+
+def tell_skipped(results: Iterable[WorldsRead]) -> None:
+    """List on the error stream the worlds that were left out, each with the reason."""
+    skipped = [line for result in results for line in result.skipped]
+    if skipped:
+        heading = f"{len(skipped)} worlds skipped (use --strict to stop instead):"
+        print(heading, *skipped, sep="\n  ", file=sys.stderr)

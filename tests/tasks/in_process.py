@@ -1,0 +1,31 @@
+"""Stages done in this process, without Prefect and Dask."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from tasks.fan_out.chunk import Chunk, keep_settings
+from tasks.fan_out.stage import Stage, Values
+from tasks.settings.run_settings import RunSettings
+from tasks.stages.collect import COLLECT
+from tasks.stages.curate import CURATE
+from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
+
+Result = TypeVar("Result", bound=Values | None)
+
+
+def run_stage(
+    stage: Stage[Result], data: str, settings: RunSettings, backwards: bool = False
+) -> dict[Chunk, Result]:
+    """Do every chunk of a stage, in its order or in the other; the results."""
+    results: dict[Chunk, Result] = {}
+    while left := [chunk for chunk in stage.chunks(data, settings) if chunk not in results]:
+        results |= {chunk: stage.run(chunk).result for chunk in (left[::-1] if backwards else left)}
+    return results
+
+
+def collect(data: str, settings: RunSettings, backwards: bool = False) -> None:
+    """Leave the experiences of a run in a data folder."""
+    keep_settings(data, settings)
+    for stage in (COLLECT, CURATE, IMPROVE, KEEP, COMBINE):
+        run_stage(stage, data, settings, backwards)
