@@ -12,6 +12,8 @@ from flows.cli.run_options import Options, worker_count
 from flows.cli.stage_commands import settings_of
 
 if TYPE_CHECKING:
+    from prefect import Flow
+
     from tasks.settings.run_settings import RunSettings
 
 NO_OPTIONS: Final = Options()
@@ -37,17 +39,13 @@ def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = 
 
         task(options.folder, settings)
         return
-    from tasks.session.command_session import run_stage
+    from tasks.session.command_session import command_session
 
-    run_stage(
-        "flows.retrain",
-        "retrain",
-        settings,
-        options.folder,
-        worker_count(options.workers),
-        options.scheduler,
-        approve=approve,
-    )
+    workers = worker_count(options.workers)
+    with command_session("retrain", settings, options.folder, workers, options.scheduler) as data:
+        from flows.retrain import retrain as flow
+
+        flow(settings, data, approve=approve)
 
 
 def serve(
@@ -75,7 +73,14 @@ def serve(
 
     settings = _settings(options)
     workers = worker_count(options.workers)
-    task(settings, options.folder, every, cron, approve, workers, options.scheduler)
+    task(retrain_flow, settings, options.folder, every, cron, approve, workers, options.scheduler)
+
+
+def retrain_flow() -> Flow[..., None]:
+    """The flow that retrains; Prefect reads its environment when it is imported."""
+    from flows.retrain import retrain
+
+    return retrain
 
 
 def promote(*, memory: str | None = None, data: Path | None = None) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from flows.cli.run_options import Options, worker_count
@@ -14,47 +16,74 @@ NO_OPTIONS: Final = Options()
 
 def run(options: Options = NO_OPTIONS) -> None:
     """The main job: every stage, figures, MLflow runs, and the table of how much faster planning became."""
-    _do("run", options)
+    with _session("run", options) as (settings, data):
+        from flows.run import run as flow
+
+        flow(settings, data)
 
 
 def collect(options: Options = NO_OPTIONS) -> None:
     """Draw problems, solve them, and keep the N of each class whose plans are of most use."""
-    _do("collect", options)
+    with _session("collect", options) as (settings, data):
+        from flows.collect import collect as flow
+
+        flow(settings, data)
 
 
 def hallucinate(options: Options = NO_OPTIONS) -> None:
     """Make many problems that each collected plan solves."""
-    _do("hallucinate", options)
+    with _session("hallucinate", options) as (settings, data):
+        from flows.hallucinate import hallucinate as flow
+
+        flow(settings, data)
 
 
 def train(options: Options = NO_OPTIONS) -> None:
     """Train an encoder for each memory on the hallucinated problems."""
-    _do("train", options)
+    with _session("train", options) as (settings, data):
+        from flows.train import train as flow
+
+        flow(settings, data)
 
 
 def build_memory(options: Options = NO_OPTIONS) -> None:
     """Join encoder, centroids and plans into one archive a memory."""
-    _do("build_memory", options)
+    with _session("build_memory", options) as (settings, data):
+        from flows.build_memory import build_memory as flow
+
+        flow(settings, data)
 
 
 def sweep(options: Options = NO_OPTIONS) -> None:
     """Compare sizes of the encoder and learning rates on the hallucinated problems."""
-    _do("sweep", options)
+    with _session("sweep", options) as (settings, data):
+        from flows.sweep import sweep as flow
+
+        flow(settings, data)
 
 
 def experience_curve(options: Options = NO_OPTIONS) -> None:
     """Make memories of 20, 40 ... 100 % of the experiences, and compare what they recall."""
-    _do("experience_curve", options)
+    with _session("experience_curve", options) as (settings, data):
+        from flows.experience_curve import experience_curve as flow
+
+        flow(settings, data)
 
 
 def benchmark(options: Options = NO_OPTIONS) -> None:
     """Solve unseen problems with and without memory: one row an attempt."""
-    _do("benchmark", options)
+    with _session("benchmark", options) as (settings, data):
+        from flows.benchmark import benchmark as flow
+
+        flow(settings, data)
 
 
 def report(options: Options = NO_OPTIONS) -> None:
     """Tables and figures from the rows of the benchmark."""
-    _do("report", options)
+    with _session("report", options) as (settings, data):
+        from flows.report import report as flow
+
+        flow(settings, data)
 
 
 def settings_of(options: Options) -> RunSettings:
@@ -82,19 +111,16 @@ def settings_of(options: Options) -> RunSettings:
     )
 
 
-def _do(stage: str, options: Options) -> None:
-    from tasks.session.command_session import run_stage
+@contextmanager
+def _session(name: str, options: Options) -> Iterator[tuple[RunSettings, str]]:
+    """What the flow of that name is called with, once it may be imported."""
+    from tasks.session.command_session import command_session
 
     settings = settings_of(options)
     if options.learned is not None:
         from tasks.inputs.learned_on_the_job import with_learned
 
         settings = with_learned(settings, options.folder, options.learned)
-    run_stage(
-        f"flows.{stage}",
-        stage,
-        settings,
-        options.folder,
-        worker_count(options.workers),
-        options.scheduler,
-    )
+    workers = worker_count(options.workers)
+    with command_session(name, settings, options.folder, workers, options.scheduler) as data:
+        yield settings, data

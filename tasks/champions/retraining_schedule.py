@@ -6,10 +6,10 @@ Prefect's own runner asks the data folder's server for what is due and starts ea
 from __future__ import annotations
 
 import asyncio
-import importlib
 import json
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -22,6 +22,7 @@ from tasks.session.hold import hold
 from tasks.settings.run_settings import RunSettings, UsageError
 
 if TYPE_CHECKING:
+    from prefect import Flow
     from prefect.deployments.runner import RunnerDeployment
 
 DAY: Final = 86_400.0
@@ -32,6 +33,7 @@ END_SECONDS: Final = 5.0  # for a retraining to end after Ctrl-C, before it is k
 
 
 def serve(
+    flow: Callable[[], Flow[..., Any]],
     settings: RunSettings,
     data: Path,
     every: float | None,
@@ -40,9 +42,21 @@ def serve(
     workers: int,
     scheduler: str | None = None,
 ) -> None:
-    """Retrain ``every`` so many seconds, or by ``cron``, until Ctrl-C; one retraining at a time.
+    """Retrain on a schedule until Ctrl-C, one retraining at a time.
 
-    UsageError with one line: both are given, or no schedule can be made of them.
+    Args:
+        flow: imports the flow that retrains; called once Prefect's environment is set.
+        settings: what a run is asked to do.
+        data: the data folder.
+        every: seconds between two retrainings; by default a day, if there is no ``cron`` either.
+        cron: when to retrain, as a cron expression.
+        approve: whether a challenger that is better waits for approval.
+        workers: worker processes of a retraining.
+        scheduler: address of a Dask scheduler to use instead.
+
+    Raises:
+        UsageError: both ``every`` and ``cron`` are given, or one of them is no schedule.
+
     """
     schedule = _schedule(every, cron)
     with hold(data) as folder:  # is it ours, and free?
@@ -55,7 +69,7 @@ def serve(
         "scheduler": scheduler,
     }
     with local_server(place) as server:
-        deployment = _deployment(schedule, parameters)
+        deployment = _deployment(flow(), schedule, parameters)
         if server is not None:
             server.wait()
             print(server, file=sys.stderr)
@@ -89,14 +103,17 @@ def _no_cron(text: str) -> UsageError:
     return UsageError(f'{text!r} is no cron expression; give one like "0 3 * * *".')
 
 
-def _deployment(schedule: dict[str, Any], parameters: dict[str, Any]) -> RunnerDeployment:
+def _deployment(
+    flow: Flow[..., Any], schedule: dict[str, Any], parameters: dict[str, Any]
+) -> RunnerDeployment:
     """The retraining as Prefect knows it; a drift event starts one, too."""
+    from prefect.deployments.runner import RunnerDeployment
     from prefect.events import DeploymentEventTrigger
     from prefect.types.entrypoint import EntrypointType
 
-    flow = importlib.import_module("flows.retrain").retrain
     try:
-        made: RunnerDeployment = flow.to_deployment(
+        return RunnerDeployment.from_flow(
+            flow,
             NAME,
             **schedule,
             parameters=parameters,
@@ -108,7 +125,6 @@ def _deployment(schedule: dict[str, Any], parameters: dict[str, Any]) -> RunnerD
         if "cron" not in schedule:
             raise
         raise _no_cron(schedule["cron"]) from error
-    return made
 
 
 def _run(deployment: RunnerDeployment) -> None:

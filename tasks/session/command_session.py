@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
 from storage.places.data_folder import DataFolder
@@ -20,16 +18,25 @@ from tasks.settings.run_settings import RunSettings, UsageError, default_schedul
 from tasks.tracking.mlflow_runs import tracking_uri
 
 
-def run_stage(
-    module: str,
-    name: str,
-    settings: RunSettings,
-    data: Path,
-    workers: int,
-    scheduler: str | None,
-    **more: Any,
-) -> None:
-    """Run the flow ``module.name``, with ``more`` parameters; afterwards say where everything lies."""
+@contextmanager
+def command_session(
+    name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
+) -> Iterator[str]:
+    """Everything that the flow of a command needs; at the end say where its results lie.
+
+    Prefect reads its environment when it is imported, so the flow may only be imported inside.
+
+    Args:
+        name: name of the flow.
+        settings: what the run is asked to do.
+        data: the data folder.
+        workers: worker processes of a cluster that is started.
+        scheduler: address of a Dask scheduler to use instead.
+
+    Yields:
+        the data folder, as flows take it.
+
+    """
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)
     tracking_uri(DataFolder(local_place(data)))  # which refuses a place that cannot be tracked
@@ -38,8 +45,7 @@ def run_stage(
         local_server(folder.path) as server,
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
-        flow = getattr(importlib.import_module(module), name)
-        flow(settings, folder.place, **more)
+        yield folder.place
     _tell(folder, settings)
 
 
