@@ -10,8 +10,8 @@ from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.train import train
 from tasks.session.hold import holding
+from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.fewer_experiences import runs_of_continual
 from tasks.tracking.logbook import run_logged
 
 

@@ -19,6 +19,6 @@ def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = Tru
 
     """
     from tasks.serving.serve_dashboard import serve_dashboard
-    from tasks.settings.run_settings import default_data
+    from tasks.settings.environment import default_data
 
     serve_dashboard(data or default_data(), port, browser)

@@ -68,7 +68,7 @@ def call(arguments: Sequence[str] | None = None) -> int:
 
 
 def _is_wrong_use(error: Exception) -> bool:
-    from tasks.settings.run_settings import UsageError
+    from tasks.settings.errors import UsageError
 
     return isinstance(error, CycloptsError | UsageError)
 

@@ -95,7 +95,7 @@ def promote(*, memory: str | None = None, data: Path | None = None) -> None:
 
     """
     from tasks.champions.promote import promote_awaiting
-    from tasks.settings.run_settings import default_data
+    from tasks.settings.environment import default_data
 
     promote_awaiting(data or default_data(), memory)
 
@@ -112,13 +112,13 @@ def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
 
     """
     from tasks.champions.promote import roll_back
-    from tasks.settings.run_settings import default_data
+    from tasks.settings.environment import default_data
 
     roll_back(data or default_data(), memory)
 
 
 def _settings(options: Options) -> RunSettings:
-    from tasks.settings.run_settings import UsageError
+    from tasks.settings.errors import UsageError
 
     if options.learned is not None:
         raise UsageError("--learned is not for retraining, which itself freezes what was learned.")

@@ -117,7 +117,7 @@ class Options:
     @property
     def folder(self) -> Path:
         """The data folder, given or by default."""
-        from tasks.settings.run_settings import default_data
+        from tasks.settings.environment import default_data
 
         return self.data or default_data()
 
@@ -132,8 +132,8 @@ def worker_count(asked: int | None) -> int:
     """How many worker processes; UsageError for fewer than one."""
     from dask.system import CPU_COUNT  # of this process: with its affinity and its control group
 
-    from tasks.settings.run_settings import UsageError
+    from tasks.settings.checks import check_count
 
-    if asked is not None and asked < 1:
-        raise UsageError(f"{asked} workers: give 1 or more.")
-    return asked or int(CPU_COUNT)
+    workers = int(CPU_COUNT) if asked is None else asked
+    check_count("workers", workers)
+    return workers

@@ -61,6 +61,6 @@ def servers(
 
     """
     from tasks.serving.shared_servers import servers as task
-    from tasks.settings.run_settings import default_data
+    from tasks.settings.environment import default_data
 
     task(data or default_data(), host, prefect_port, mlflow_port)

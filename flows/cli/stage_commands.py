@@ -88,7 +88,7 @@ def report(options: Options = NO_OPTIONS) -> None:
 
 def settings_of(options: Options) -> RunSettings:
     """The settings that options ask for, but for what was learned; UsageError where there are none."""
-    from tasks.settings.run_settings import for_preset
+    from tasks.settings.presets import for_preset
 
     return for_preset(
         options.preset,

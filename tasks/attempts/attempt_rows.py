@@ -15,7 +15,7 @@ from planners.world.authority.authority import faults
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.tables.schemas import ATTEMPTS
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 
 _FIELDS: Final = [field.name for field in fields(Attempt) if field.name in ATTEMPTS.names]
 _UNKNOWN_WHEN_UNSOLVED: Final = ("source", "length_m", "duration_s")

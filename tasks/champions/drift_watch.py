@@ -23,7 +23,8 @@ from storage.tables.watched import add_watched
 from tasks.registry.champion_registry import CHAMPION, Registry
 from tasks.servers.access import auth_environment
 from tasks.servers.prefect_server import CLIENT, running_server, set_environment
-from tasks.settings.run_settings import RunError, default_data
+from tasks.settings.environment import default_data
+from tasks.settings.errors import RunError
 
 SOLVED: Final = "motion-memory.solved"
 DRIFT: Final = "motion-memory.drift"

@@ -16,7 +16,7 @@ from tasks.registry.champion_registry import (
     Registry,
     Version,
 )
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 
 
 def promote(registry: Registry, challenger: Version) -> None:

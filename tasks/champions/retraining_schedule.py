@@ -19,7 +19,8 @@ import psutil
 from tasks.champions.drift_watch import DRIFT
 from tasks.servers.prefect_server import local_server
 from tasks.session.hold import hold
-from tasks.settings.run_settings import RunSettings, UsageError
+from tasks.settings.errors import UsageError
+from tasks.settings.run_settings import RunSettings
 
 if TYPE_CHECKING:
     from prefect import Flow

@@ -24,8 +24,10 @@ from tasks.fan_out.progress import progress
 from tasks.fan_out.progress_artifact import progress_artifact
 from tasks.fan_out.stage import AnyPiece, Done, Job, Result, Stage
 from tasks.fan_out.workload import record_load
+from tasks.settings.environment import default_scheduler
+from tasks.settings.errors import RunError, UsageError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import RunError, RunSettings, UsageError, default_scheduler
+from tasks.settings.run_settings import RunSettings
 
 SETTINGS: Final = Path(__file__).with_name("dask.yaml")
 CONNECT_SECONDS: Final = 5

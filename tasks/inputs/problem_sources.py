@@ -18,8 +18,9 @@ from storage.places.run_folder import RunFolder
 from storage.tables.imported_problems import read_imported
 from storage.worlds.sources import Part, source_at
 from tasks.fan_out.chunk import run_folder
+from tasks.settings.errors import RunError
 from tasks.settings.retraining_settings import held_back_seed, number_of
-from tasks.settings.run_settings import RunError, RunSettings, world_class
+from tasks.settings.run_settings import RunSettings, world_class
 
 Purpose = Literal["collect", "test"]
 PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}

@@ -16,8 +16,9 @@ from storage.errors import InUseError
 from storage.places.data_folder import DataFolder
 from tasks.registry.model_uris import download, set_mlflow_environment
 from tasks.settings.environment import environment
+from tasks.settings.errors import RunError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import DEFAULT_VEHICLE, RunError
+from tasks.settings.run_settings import DEFAULT_VEHICLE
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import tracking_uri
 

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tasks.registry.model_uris import memory_folder
-from tasks.settings.run_settings import COMBINED, RunError
+from tasks.settings.errors import RunError
+from tasks.settings.run_settings import COMBINED
 
 
 @contextmanager

@@ -22,9 +22,9 @@ from storage.places.mirror import folders_here
 from storage.places.scratch import scratch_folder
 from tasks.servers.access import auth_environment
 from tasks.servers.prefect_server import ENVIRONMENT
-from tasks.settings.environment import environment
+from tasks.settings.environment import default_data, environment
+from tasks.settings.errors import RunError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import RunError, default_data
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import tracking_uri
 

@@ -17,8 +17,9 @@ from storage.places.data_folder import open_run
 from storage.places.files import whole_file
 from storage.tables.attempts import read_attempts
 from tasks.reports.report import NOT_NEEDED, console
+from tasks.settings.errors import UsageError
 from tasks.settings.recorded_settings import recorded_settings
-from tasks.settings.run_settings import RunSettings, UsageError
+from tasks.settings.run_settings import RunSettings
 
 ENDINGS: Final = (".md", ".json", ".csv")
 

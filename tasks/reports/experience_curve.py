@@ -14,8 +14,8 @@ from dashboards.statistics.experience_recall import experience_rows
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import run_folder
 from tasks.reports.report import console
+from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import COMBINED, RunSettings
-from tasks.stages.fewer_experiences import runs_of_continual
 from tasks.stages.measure_recall import MEASURE_RECALL
 
 

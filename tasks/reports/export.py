@@ -15,7 +15,8 @@ from storage.places.mirror import fetch
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import attempt_frames, tables_below
 from tasks.reports.stage_times import stages_of
-from tasks.settings.run_settings import UsageError, check_known
+from tasks.settings.checks import check_known
+from tasks.settings.errors import UsageError
 
 ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv"}
 

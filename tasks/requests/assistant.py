@@ -25,15 +25,9 @@ from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.learned_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.run_settings import (
-    COMBINED,
-    DEFAULT_VEHICLE,
-    UNASSISTED,
-    RunError,
-    UsageError,
-    check_known,
-    check_picture,
-)
+from tasks.settings.checks import check_known, check_picture, check_seed
+from tasks.settings.errors import RunError, UsageError
+from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, a hundred that search, none of a second
 
@@ -75,8 +69,7 @@ class Assistant:
         check_known("recall", [] if recall is None else [recall], RECALLS)
         if top_k < 1:
             raise UsageError(f"Top k is {top_k}: give 1 or more.")
-        if seed < 0:
-            raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+        check_seed(seed)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:

@@ -23,7 +23,8 @@ from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt
 from tasks.requests.assistant import Assistant
-from tasks.settings.run_settings import RunError, UsageError, check_known, check_picture
+from tasks.settings.checks import check_known, check_picture
+from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres: the cell look-up of collision checks grows with the area

@@ -21,7 +21,8 @@ from storage.places.files import whole_file, whole_folder
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.fan_out.progress import progress
-from tasks.settings.run_settings import RunError, UsageError, check_known, check_picture
+from tasks.settings.checks import check_count, check_known, check_picture, check_seed
+from tasks.settings.errors import RunError, UsageError
 
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
@@ -45,10 +46,9 @@ def import_settings(
     """The settings as asked; UsageError with one line where one is not possible."""
     check_known("vehicle", [vehicle], VEHICLES)
     check_known("way to take unknown cells", [unknown], get_args(Unknown))
-    if problems is not None and problems < 1:
-        raise UsageError(f"{problems} problems: give 1 or more.")
-    if seed < 0:
-        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+    if problems is not None:
+        check_count("problems", problems)
+    check_seed(seed)
     if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
         raise UsageError(
             f"Scale is {scale:g}: give {SMALLEST_SCALE:g} to {LARGEST_SCALE:g} metres a canonical metre."

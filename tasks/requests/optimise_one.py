@@ -18,7 +18,8 @@ from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problems import read_problems
 from storage.places.files import whole_file
-from tasks.settings.run_settings import RunError, UsageError, check_known, check_picture
+from tasks.settings.checks import check_known, check_picture, check_seed
+from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # what a plan file calls its planner then
 
@@ -69,8 +70,7 @@ def beginning(stored: Path | None, planner: str | None, straight: bool, vehicle:
         raise UsageError(f"{' and '.join(ways)} are given: an optimisation begins in one way.")
     check_known("planner", [planner] if planner else [], tuple(PLANNERS))
     check_known("vehicle", [vehicle], VEHICLES)
-    if seed < 0:
-        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+    check_seed(seed)
     return Beginning(stored, planner or (None if ways else "follow"), vehicle_named(vehicle), seed)
 
 

@@ -28,7 +28,8 @@ from storage.fields import parse_json
 from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.compile_assists import EMPTY, compile_assists
 from tasks.registry.memory_at import memory_at
-from tasks.settings.run_settings import UsageError, check_known
+from tasks.settings.checks import check_known
+from tasks.settings.errors import UsageError
 
 
 @dataclass(frozen=True, eq=False)

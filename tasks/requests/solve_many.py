@@ -30,7 +30,7 @@ from tasks.requests.problem_parts import (
     unfinished,
 )
 from tasks.servers.prefect_server import local_server
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 
 if TYPE_CHECKING:
     from tasks.champions.drift_watch import Watched

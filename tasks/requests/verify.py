@@ -7,7 +7,7 @@ from pathlib import Path
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, local_place
 from tasks.servers.prefect_server import set_environment
-from tasks.settings.run_settings import RunError, UsageError
+from tasks.settings.errors import RunError, UsageError
 
 
 def verify(folder: Path, sample: float, workers: int) -> None:

@@ -39,8 +39,9 @@ from storage.tables.recalls import read_recalls
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt, same_outcome
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
+from tasks.settings.errors import RunError
 from tasks.settings.recorded_settings import recorded_settings
-from tasks.settings.run_settings import RunError, RunSettings
+from tasks.settings.run_settings import RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
 

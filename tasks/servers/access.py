@@ -14,7 +14,7 @@ import socket
 from pathlib import Path
 from typing import Final
 
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 
 AUTH: Final = "MOTION_MEMORY_AUTH"
 HOSTS: Final = "MOTION_MEMORY_HOSTS"

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
-from tasks.settings.run_settings import RunError, UsageError
+from tasks.settings.errors import RunError, UsageError
 
 if TYPE_CHECKING:
     from uvicorn import Config

@@ -19,7 +19,7 @@ from storage.places.data_folder import MARK, DataFolder, open_data_folder
 from tasks.registry.champion_registry import Registry, Version
 from tasks.servers.access import auth, hosts
 from tasks.servers.listening import config_of
-from tasks.settings.run_settings import RunError, UsageError
+from tasks.settings.errors import RunError, UsageError
 
 if TYPE_CHECKING:
     from tasks.servers.guard import Guard

@@ -16,7 +16,7 @@ from tasks.servers.access import access, auth, auth_environment, check_address, 
 from tasks.servers.guard import Guard
 from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
 from tasks.servers.prefect_server import ENVIRONMENT
-from tasks.settings.run_settings import check_known
+from tasks.settings.checks import check_known
 
 
 def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) -> None:

@@ -27,7 +27,7 @@ from tasks.servers.listening import STOP_SECONDS, address_of, bound, config_of, 
 from tasks.servers.prefect_app import prefect_app
 from tasks.servers.prefect_server import START_SECONDS, is_healthy, set_environment
 from tasks.settings.environment import environment
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 from tasks.tracking.mlflow_database import ready_database
 
 POLL_SECONDS: Final = 0.2  # between two checks that the processes are alive

@@ -13,8 +13,10 @@ from storage.places.data_folder import DataFolder
 from storage.places.mirror import is_there, local_place, shown
 from tasks.servers.prefect_server import LocalServer, local_server
 from tasks.session.hold import hold
+from tasks.settings.environment import default_scheduler
+from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import RunSettings, UsageError, default_scheduler
+from tasks.settings.run_settings import RunSettings
 from tasks.tracking.mlflow_runs import tracking_uri
 
 

@@ -1,20 +1,29 @@
-"""Environment variables that are set for a while."""
+"""Environment variables: what commands take from them, and variables that are set for a while."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+
+
+def default_data() -> Path:
+    """The data folder of a command that is given none: $MOTION_MEMORY_DATA or ./data."""
+    return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
+
+
+def default_scheduler() -> str | None:
+    """The Dask scheduler that $MOTION_MEMORY_SCHEDULER names; without one a command has its own workers."""
+    return os.environ.get("MOTION_MEMORY_SCHEDULER") or None
 
 
 @contextmanager
 def environment(**variables: str) -> Iterator[None]:
     """Set variables of this process and its later children, and put back what they were at the end.
 
-    Parameters
-    ----------
-    variables
-        Values by name.
+    Args:
+        variables: values by name.
 
     """
     before = {name: os.environ.get(name) for name in variables}

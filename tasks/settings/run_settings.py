@@ -1,17 +1,13 @@
-"""What a run is asked to do: one frozen value, its presets, and the name that follows from it."""
+"""The settings of a run: one frozen value, and the name that follows from it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
-import os
-from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple, get_args
+from typing import Any, Final, Literal, NamedTuple
 
-from planners.world.vehicles.vehicle import VEHICLES
 from tasks.settings.encoder_training import Learning
 from tasks.settings.retraining_settings import Retraining
 
@@ -49,20 +45,9 @@ CONTINUAL_PLANNER: Final = "gust"
 CONTINUAL_CLASS: Final = "curves"
 DEFAULT_VEHICLE: Final = "car"
 TAUGHT: Final = 1_000  # plans a class that the encoder is trained on; a larger memory grows beyond them
-PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
 COMBINED: Final = "combined"  # the memory that does not distinguish the classes
 
-
-class UsageError(ValueError):
-    """What was asked cannot be done as asked; the message says what to ask instead (exit code 2)."""
-
-
-class RunError(RuntimeError):
-    """A stage cannot go on; the message is one line that says why and what to do (exit code 1)."""
-
-
 Mixture = tuple[tuple[str, float], ...]  # methods of hallucination with their shares, which sum to 1
-LARGEST_WEIGHT: Final = 1e9  # so that their sum is a number
 DEFAULT_MIXTURE: Final[Mixture] = (("rearrange", 1.0),)
 
 _LATER: Final[dict[str, Any]] = {  # fields that were added
@@ -182,173 +167,7 @@ class RunSettings:
         return cls(**values)
 
 
-def default_data() -> Path:
-    """The data folder of a command that was given none: $MOTION_MEMORY_DATA or ./data."""
-    return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
-
-
-def default_scheduler() -> str | None:
-    """The Dask scheduler that $MOTION_MEMORY_SCHEDULER names; None: a command has workers of its own."""
-    return os.environ.get("MOTION_MEMORY_SCHEDULER") or None
-
-
 def world_class(path: str | Path) -> str:
     """The class name of worlds or of a map: the folder's name, or the file's without its ending."""
     place = Path(path).resolve()
     return place.name if place.is_dir() else place.stem
-
-
-class _Preset(NamedTuple):
-    experiences: int
-    candidates: int
-    problems_per_experience: int
-    test_problems: int
-    epochs: int
-    combined: bool
-    continual: str
-
-
-PRESETS: Final = {
-    "smoke": _Preset(6, 20, 20, 20, 2, False, "none"),
-    "laptop": _Preset(100, 1_000, 200, 1_000, 10, False, "none"),
-    "paper": _Preset(100, 1_000, 1_000, 10_000, 10, True, "paper"),
-}
-
-
-def for_preset(
-    preset: str = "laptop",
-    *,
-    classes: Sequence[str] | None = None,
-    worlds: Sequence[str] = (),
-    difficulty: str = "standard",
-    seed: int = 1,
-    objective: str = "labels",
-    planners: Sequence[str] | None = None,
-    experiences: int | None = None,
-    candidates: int | None = None,
-    problems_per_experience: int | None = None,
-    test_problems: int | None = None,
-    epochs: int | None = None,
-    strict: bool = False,
-    vehicle: str = DEFAULT_VEHICLE,
-    optimised: bool = False,
-    continual: str | None = None,
-    learning: Mapping[str, Any] | None = None,
-    hallucination: Sequence[str] | None = None,
-) -> RunSettings:
-    """Settings of a preset with some values replaced; UsageError with one line when one is not possible.
-
-    Without ``classes`` a run takes every generated class, or, with ``worlds``, these alone.
-    """
-    from planners.search.registry import PLANNERS  # imported late: Numba costs half a second
-    from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
-
-    check_known("preset", [preset], PRESETS)
-    base = PRESETS[preset]
-    asked = tuple(CLASSES) if classes is None and not worlds else tuple(dict.fromkeys(classes or ()))
-    named = tuple(PLANNERS) if planners is None else tuple(dict.fromkeys(planners))
-    check_known("class", asked, CLASSES)
-    check_known("planner", named, PLANNERS)
-    check_known("difficulty", [difficulty], DIFFICULTIES)
-    check_known("objective", [objective], get_args(Objective))
-    check_known("vehicle", [vehicle], VEHICLES)
-    check_known("continual improvement", [continual or base.continual], CONTINUAL)
-    if not asked and not worlds:
-        raise UsageError(f"No class to work on. Name some of: {', '.join(CLASSES)}.")
-    if not named:
-        raise UsageError(f"No planner to measure. Name some of: {', '.join(PLANNERS)}.")
-    for folder in worlds:
-        if not Path(folder).exists():
-            raise UsageError(f"{folder} is no folder of worlds and no map: there is nothing of that name.")
-        parts = {part: (Path(folder) / part).is_dir() for part in ("train", "test")}
-        if any(parts.values()) and not all(parts.values()):
-            raise UsageError(f"{folder} has only one of the parts {' and '.join(parts)}; both are needed.")
-    if seed < 0:
-        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
-    kept = _count("experiences", experiences, base.experiences)
-    if candidates is not None and candidates < kept:
-        raise UsageError(f"{candidates} candidates for {kept} experiences: give as many or more.")
-    settings = RunSettings(
-        preset=preset,
-        classes=asked,
-        worlds=tuple(str(Path(folder).resolve()) for folder in worlds),
-        difficulty=difficulty,
-        seed=seed,
-        objective="triplet" if objective == "triplet" else "labels",
-        experiences=kept,
-        problems_per_experience=_count(
-            "problems a plan", problems_per_experience, base.problems_per_experience
-        ),
-        test_problems=_count("test problems", test_problems, base.test_problems),
-        collector=COLLECTOR,
-        planners=named,
-        assists=ASSISTS,
-        epochs=_count("epochs", epochs, base.epochs),
-        combined=base.combined,
-        strict=strict,
-        vehicle=vehicle,
-        optimised=optimised,
-        learning=_learning(learning or {}),
-        hallucination=DEFAULT_MIXTURE if hallucination is None else mixture_of(hallucination),
-        candidates=max(base.candidates, kept) if candidates is None else candidates,
-        continual=continual or base.continual,
-    )
-    names = settings.class_names
-    twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))
-    if twice:
-        raise UsageError(f"Two classes would be called {', '.join(twice)}. Rename the folder of worlds.")
-    return settings
-
-
-def mixture_of(asked: Sequence[str]) -> Mixture:
-    """The shares of hallucination methods asked for like ``rearrange=0.7``; a name alone weighs 1.
-
-    UsageError with one line for an unknown or repeated name, or a weight that is no number above 0.
-    """
-    from planners.memory.hallucination.mixture import METHODS  # imported late: Numba costs half a second
-
-    weights: dict[str, float] = {}
-    for each in asked:
-        name, equals, weight = each.partition("=")
-        check_known("hallucination method", [name], METHODS)
-        try:
-            value = float(weight) if equals else 1.0
-        except ValueError:
-            value = math.nan
-        if not 0.0 < value <= LARGEST_WEIGHT:
-            raise UsageError(f"Hallucination {each!r}: give a weight above 0, like {name}=0.5.")
-        if name in weights:
-            raise UsageError(f"Hallucination method {name} is given twice. Give each once.")
-        weights[name] = value
-    if not weights:
-        raise UsageError(f"No hallucination method. Name some of: {', '.join(METHODS)}.")
-    whole = math.fsum(weights.values())
-    return tuple((name, weights[name] / whole) for name in METHODS if name in weights)
-
-
-def check_known(kind: str, asked: Sequence[str], known: Sequence[str] | Mapping[str, Any]) -> None:
-    """UsageError with the known names where one that was asked for is not among them."""
-    for name in asked:
-        if name not in known:
-            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
-
-
-def _learning(asked: Mapping[str, Any]) -> Learning:
-    try:
-        return Learning(**asked)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-
-
-def check_picture(path: Path | None) -> None:
-    """UsageError where a path that was asked for does not end as a picture does."""
-    if path is not None and path.suffix not in PICTURES:
-        raise UsageError(f"{path} is no picture's name. Known: {', '.join(PICTURES)}.")
-
-
-def _count(what: str, asked: int | None, otherwise: int) -> int:
-    if asked is None:
-        return otherwise
-    if asked < 1:
-        raise UsageError(f"{asked} {what}: give 1 or more.")
-    return asked

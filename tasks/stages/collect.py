@@ -15,7 +15,8 @@ from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of
 from tasks.inputs.problem_sources import Source, source_key, source_of
-from tasks.settings.run_settings import RunError, RunSettings
+from tasks.settings.errors import RunError
+from tasks.settings.run_settings import RunSettings
 
 SMALLEST_CHUNK: Final = 25
 LARGEST_CHUNK: Final = 100  # a second of work

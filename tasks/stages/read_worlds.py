@@ -15,7 +15,8 @@ from storage.worlds.sources import source_at
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage, is_marked, mark_done
 from tasks.inputs.problem_sources import PARTS, source_key
-from tasks.settings.run_settings import RunError, world_class
+from tasks.settings.errors import RunError
+from tasks.settings.run_settings import world_class
 
 CUT_FROM_MAP: Final = 2  # problems to collect from, for each solved one that is wanted: some are not solved
 

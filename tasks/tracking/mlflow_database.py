@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked, whole_file
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 
 OWNER_ONLY: Final = 0o600
 

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, Final
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
 from storage.places.scratch import scratch_folder
+from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import UsageError
 from tasks.tracking.mlflow_database import ready_database
 
 if TYPE_CHECKING:

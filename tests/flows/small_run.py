@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tasks.servers.prefect_server import local_server
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 
 SETTINGS = replace(
     for_preset("smoke", classes=["random", "trap"], seed=3, learning={"seeds": 2}),

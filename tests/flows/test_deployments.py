@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 from tasks.champions.drift_watch import DRIFT
-from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 
 ROOT = Path(__file__).parents[2]
 NOT_DEPLOYED = {"solve"}  # takes what the command has made of a file

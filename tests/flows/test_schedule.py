@@ -23,7 +23,7 @@ from storage.places.data_folder import DataFolder
 from tasks.champions.drift_watch import DRIFT, Watched, watch
 from tasks.registry.champion_registry import FIRST, PROMOTED, Registry, registered_name
 from tasks.servers.prefect_server import running_server
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 from tests.tasks.champions.retrained import CLASS, SETTINGS, learn
 
 ROOT = Path(__file__).parents[2]

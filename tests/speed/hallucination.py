@@ -38,7 +38,8 @@ from storage.archives.hallucinators import load_hallucinator
 from storage.places.files import whole_file
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
-from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 from tasks.stages.hallucinate import HALLUCINATE, hallucinate_chunk
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION
 from tests.tasks.in_process import collect, run_stage

@@ -27,7 +27,7 @@ from storage.exchange.problems import write_problems
 from storage.tables.attempts import read_attempts
 from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import source_of
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 from tasks.stages.benchmark import benchmark_chunk
 from tests.speed.assists import memory_of
 

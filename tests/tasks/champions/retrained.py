@@ -14,7 +14,8 @@ from tasks.champions.new_experience import rounds
 from tasks.inputs.learned_on_the_job import Solved, remember
 from tasks.registry.champion_registry import Registry
 from tasks.reports.report import report_retrieval
-from tasks.settings.run_settings import Assist, RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import Assist, RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.hallucinate import HALLUCINATE
 from tasks.stages.judge import CHECK_PLANS, JUDGE

@@ -20,7 +20,8 @@ from tasks.fan_out.chunk import run_folder
 from tasks.registry.champion_registry import CHALLENGER, Registry, Version, registered_name
 from tasks.registry.model_uris import load_from
 from tasks.requests.verify_folder import verify_folder
-from tasks.settings.run_settings import RunError, RunSettings
+from tasks.settings.errors import RunError
+from tasks.settings.run_settings import RunSettings
 from tasks.stages import hallucinate, train
 from tasks.stages.hallucinate import HALLUCINATE
 from tests.tasks.champions.retrained import CLASS, SETTINGS, learn, retrain

@@ -21,7 +21,8 @@ from tasks.registry.champion_registry import (
     Registry,
     Version,
 )
-from tasks.settings.run_settings import RunError, for_preset
+from tasks.settings.errors import RunError
+from tasks.settings.presets import for_preset
 from tests.storage.samples import a_memory
 
 NAME = "motion-memory-trap"

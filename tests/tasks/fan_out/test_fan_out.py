@@ -14,7 +14,7 @@ import dask
 import pytest
 
 from tasks.fan_out import fan_out
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 
 ROOT = Path(__file__).parents[3]
 

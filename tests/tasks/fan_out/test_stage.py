@@ -19,7 +19,7 @@ from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.piece_task import _may_pass, piece_task
 from tasks.fan_out.stage import Stage, is_marked, mark_done
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 
 SETTINGS = for_preset("smoke")
 STAGES = [

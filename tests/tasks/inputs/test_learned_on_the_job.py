@@ -17,7 +17,8 @@ from storage.errors import StorageError
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs.learned_on_the_job import Solved, remember, with_learned
-from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 from tests.tasks.in_process import collect
 
 SETTINGS = replace(

@@ -16,7 +16,8 @@ from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs import taught_experiences as growth
 from tasks.settings import run_settings as settings
-from tasks.settings.run_settings import COMBINED, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import COMBINED
 from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.hallucinate import HALLUCINATE

@@ -14,7 +14,9 @@ from storage.places.files import write_json
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import write_attempts
 from tasks.reports.compare import compare
-from tasks.settings.run_settings import RunSettings, UsageError, for_preset
+from tasks.settings.errors import UsageError
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 from tests.storage.tables.test_tables import ATTEMPT
 
 

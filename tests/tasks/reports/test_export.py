@@ -13,7 +13,7 @@ from storage.places.files import write_json
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import write_attempts
 from tasks.reports.export import export_run
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 from tests.storage.tables.test_tables import ATTEMPT, FAILED
 
 

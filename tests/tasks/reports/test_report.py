@@ -13,8 +13,9 @@ from storage.places.files import write_json
 from storage.tables.attempts import read_attempts, write_attempts
 from tasks.fan_out.chunk import keep_settings
 from tasks.reports.report import continual_rows
-from tasks.settings.run_settings import COMBINED, RunSettings, for_preset
-from tasks.stages.fewer_experiences import runs_of_continual
+from tasks.settings.fewer_experiences import runs_of_continual
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import COMBINED, RunSettings
 from tests.storage.tables.test_tables import ATTEMPT
 
 SETTINGS: Final = for_preset("laptop", continual="paper")

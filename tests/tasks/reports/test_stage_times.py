@@ -8,7 +8,8 @@ import pytest
 
 from storage.places.data_folder import open_data_folder
 from tasks.reports.stage_times import machine, stage_cells, stage_seconds, stages_of, timed
-from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 
 
 @timed

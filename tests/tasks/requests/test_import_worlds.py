@@ -11,7 +11,7 @@ from flows.cli.main import call
 from storage.exchange.problems import read_problems, write_problems
 from storage.tables.imported_problems import read_imported
 from tasks.inputs.problem_sources import source_key, source_of
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 from tasks.stages.read_worlds import READ_WORLDS, WorldsRead
 from tests.storage.samples import box, problem_with
 from tests.storage.worlds.samples import town_cells, write_map, write_ros, write_scene

@@ -21,7 +21,7 @@ from storage.errors import StorageError
 from storage.exchange.problems import fields_of
 from tasks.requests.assistant import Assistant
 from tasks.requests.robot import Answer, RobotPlanner, load_planner
-from tasks.settings.run_settings import RunError, UsageError
+from tasks.settings.errors import RunError, UsageError
 from tests.storage.samples import box
 from tests.tasks.served import problem, write_memory
 

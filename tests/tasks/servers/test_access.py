@@ -14,7 +14,7 @@ from storage.places.data_folder import open_data_folder
 from tasks.servers.access import AUTH, auth, auth_environment, check_address, new_secret
 from tasks.servers.prefect_server import set_environment
 from tasks.serving.shared_servers import password_set
-from tasks.settings.run_settings import UsageError
+from tasks.settings.errors import UsageError
 
 SECRET = "robot:s3cret-of-the-fleet"
 

@@ -12,7 +12,8 @@ import pytest
 from storage.errors import InUseError
 from storage.places.data_folder import open_data_folder
 from tasks.session.hold import hold, holding
-from tasks.settings.run_settings import RunSettings, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 
 SETTINGS = for_preset("smoke")
 HOLD = "import sys; from tasks.session.hold import hold\nwith hold(sys.argv[1]): pass"

@@ -17,8 +17,8 @@ from tasks.fan_out.chunk import keep_settings, run_folder
 from tasks.inputs.champion_run import champion_run
 from tasks.reports.compare import compare
 from tasks.requests.verify_folder import verify_folder
+from tasks.settings.presets import for_preset
 from tasks.settings.recorded_settings import recorded_settings
-from tasks.settings.run_settings import for_preset
 from tests.storage.tables.test_tables import ATTEMPT
 
 SETTINGS = for_preset("smoke", classes=["trap"])

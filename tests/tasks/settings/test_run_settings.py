@@ -12,8 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tasks.settings.encoder_training import Learning
+from tasks.settings.errors import UsageError
+from tasks.settings.presets import PRESETS, for_preset
 from tasks.settings.retraining_settings import Champion, Retraining
-from tasks.settings.run_settings import PRESETS, Assist, RunSettings, UsageError, for_preset
+from tasks.settings.run_settings import Assist, RunSettings
 
 SETTINGS = st.builds(
     RunSettings,

@@ -11,7 +11,9 @@ from storage.exchange.problems import write_problems
 from storage.tables.experiences import read_experiences
 from storage.tables.imported_problems import write_imported
 from tasks.fan_out.chunk import run_folder
-from tasks.settings.run_settings import RunError, RunSettings, for_preset
+from tasks.settings.errors import RunError
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import RunSettings
 from tests.tasks.in_process import collect
 
 PLAIN = replace(

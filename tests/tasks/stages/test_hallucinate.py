@@ -15,7 +15,7 @@ from planners.memory.hallucination.mixture import METHODS
 from storage.errors import StorageError
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, read_methods
 from tasks.fan_out.chunk import run_folder
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 from tasks.stages import hallucinate
 from tasks.stages.hallucinate import HALLUCINATE, hallucinate_chunk
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION, learn_chunk

@@ -20,7 +20,8 @@ from tasks.fan_out.chunk import run_folder
 from tasks.requests.assistant import Assistant, Way, plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
-from tasks.settings.run_settings import ASSISTS, for_preset
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import ASSISTS
 from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.draw_examples import DRAW_EXAMPLES

@@ -9,7 +9,8 @@ from dashboards.report.tables import sweep_table
 from storage.tables.hallucinated import Labelled
 from tasks.fan_out.chunk import Chunk
 from tasks.reports.experience_curve import runs_of_curve
-from tasks.settings.run_settings import UsageError, for_preset
+from tasks.settings.errors import UsageError
+from tasks.settings.presets import for_preset
 from tasks.stages import sweep
 
 SETTINGS = for_preset("smoke", classes=["trap"], epochs=1, learning={"learning_rate": 1e-3})

@@ -12,7 +12,7 @@ from planners.memory.encoder.training import Checkpoint
 from storage.archives.encoders import load_encoder
 from storage.tables.hallucinated import Labelled
 from tasks.fan_out.chunk import Chunk
-from tasks.settings.run_settings import for_preset
+from tasks.settings.presets import for_preset
 from tasks.stages import train
 
 SETTINGS = for_preset("smoke", classes=["trap"], epochs=3, learning={"seeds": 2, "hidden": [8]})

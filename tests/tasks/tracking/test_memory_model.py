@@ -26,7 +26,7 @@ from storage.exchange.plans import read_plan
 from storage.exchange.problems import fields_of, problem_of
 from storage.places.data_folder import open_data_folder
 from tasks.registry.model_uris import load_from
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 from tests.storage.samples import a_memory
 
 ROOT = Path(__file__).parents[3]

@@ -14,7 +14,7 @@ from storage.errors import InUseError
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.files import locked
 from tasks.registry.champion_registry import Registry
-from tasks.settings.run_settings import RunError
+from tasks.settings.errors import RunError
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import Tracker
 

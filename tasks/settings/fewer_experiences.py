@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from tasks.settings.run_settings import CONTINUAL_CLASS, CONTINUAL_PLANNER, RunSettings, UsageError
+from tasks.settings.errors import UsageError
+from tasks.settings.run_settings import CONTINUAL_CLASS, CONTINUAL_PLANNER, RunSettings
 
 STEPS: Final = 5  # memories, the largest being the run's own
 

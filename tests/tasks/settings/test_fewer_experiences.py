@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from tasks.settings.run_settings import UsageError, for_preset
-from tasks.stages.fewer_experiences import runs_of_continual
+from tasks.settings.errors import UsageError
+from tasks.settings.fewer_experiences import runs_of_continual
+from tasks.settings.presets import for_preset
 
 
 def test_the_paper_measures_gust_on_curves_with_20_40_60_and_80_experiences() -> None:

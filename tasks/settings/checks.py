@@ -1,0 +1,46 @@
+"""Checks of the values that a command is given; each raises a UsageError that names what is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from tasks.settings.errors import UsageError
+
+PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
+
+
+def check_known(kind: str, names: Iterable[str], known: Sequence[str] | Mapping[str, Any]) -> None:
+    """Refuse a name that is not known.
+
+    Args:
+        kind: what the names stand for, such as "planner".
+        names: those that were given.
+        known: those that there are.
+
+    Raises:
+        UsageError: one of the names is not known.
+
+    """
+    for name in names:
+        if name not in known:
+            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+
+
+def check_count(what: str, count: int) -> None:
+    """Refuse a number of something that is less than one."""
+    if count < 1:
+        raise UsageError(f"{count} {what}: give 1 or more.")
+
+
+def check_seed(seed: int) -> None:
+    """Refuse a negative seed."""
+    if seed < 0:
+        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse a path that does not end as a picture does."""
+    if path is not None and path.suffix not in PICTURES:
+        raise UsageError(f"{path} is no picture's name. Known: {', '.join(PICTURES)}.")
