@@ -51,7 +51,7 @@ def plan(
     """
     from tasks.requests.assistant import Assistant, plan_one
 
-    plan_one(Assistant(*options.way(assist, improve_seconds)), problem, out, picture, explain, learn)
+    plan_one(Assistant(*options.settings(assist, improve_seconds)), problem, out, picture, explain, learn)
 
 
 def optimise(
@@ -131,8 +131,8 @@ def solve(
     """
     from tasks.requests.solve_many import solve_many
 
-    way = options.way(assist, improve_seconds)
-    solve_many(way, problems, out, plans, learn, worker_count(workers), _solve_parts)
+    settings = options.settings(assist, improve_seconds)
+    solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
 
 
 def _solve_parts(request: SolveRequest) -> list[PartSolved]:

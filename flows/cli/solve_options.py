@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
-    from tasks.requests.assistant import Way
+    from tasks.requests.assistant import AssistantSettings
 
 
 @Parameter(name="*")
@@ -40,11 +40,11 @@ class SolveOptions:
     vehicle: str = "car"
     seed: int = 1
 
-    def way(self, assist: str, improve_seconds: float = 0.0) -> Way:
-        """The same with an assist."""
-        from tasks.requests.assistant import Way
+    def settings(self, assist: str, improve_seconds: float = 0.0) -> AssistantSettings:
+        """These options as the settings of an assistant, with an assist."""
+        from tasks.requests.assistant import AssistantSettings
 
-        return Way(
+        return AssistantSettings(
             self.planner,
             assist,
             self.top_k,

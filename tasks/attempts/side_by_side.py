@@ -1,52 +1,85 @@
-"""Side by side: each problem of a range attempted in every way, one after another, and the plans checked."""
+"""Side by side: all attempts at a problem one after another, and their plans checked."""
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
-from typing import Any, Final, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
-from planners.solve import Attempt
+from planners.memory.recall import Memory
+from planners.solve import Attempt, solve
 from planners.world.problem import Problem
 from planners.world.randomness import generator
-from planners.world.vehicles.vehicle import vehicle_named
+from planners.world.workspace import Workspace
 from tasks.attempts.attempt_rows import attempt_row, check_attempt
 from tasks.attempts.compile_assists import compile_assists
 from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.chunk import Chunk
-from tasks.inputs.problem_sources import Generated, Worlds
+from tasks.inputs.problem_sources import Source
+from tasks.settings.run_settings import Assist
 
 COLLECTED_EVERY: Final = 10  # problems; collecting garbage takes as long as some ten attempts
 
-Way = TypeVar("Way")
+MemoryOfRun = tuple[str, str]  # name of a memory, and the run that made it
+
+
+class Contestant(NamedTuple):
+    """A planner with what it may use."""
+
+    planner: str
+    assist: Assist
+    memory: str | None  # its name
+    run: str  # that made the memory
 
 
 def side_by_side(
     chunk: Chunk,
-    source: Generated | Worlds,
-    ways: Sequence[Way],
-    attempt: Callable[[Problem, Way], Attempt],
-    made_by: Callable[[Way], tuple[str | None, str]],
+    source: Source,
+    contestants: Sequence[Contestant],
+    memories: Mapping[MemoryOfRun, Memory],
 ) -> list[dict[str, Any]]:
-    """Rows of a chunk's problems to test with: a problem after another, in the order of the ways.
+    """Have every contestant attempt each problem of a chunk.
 
-    In which order a problem is attempted is drawn by its id, so that no way always comes first.
-    ``made_by``: a way's memory and its run. PlanFaultError: the authority finds fault with a plan.
+    In which order they attempt a problem is drawn by its id, so that none of them always comes first.
+
+    Args:
+        chunk: the range of test problems.
+        source: where the problems come from.
+        contestants: who attempts them.
+        memories: what the contestants recall from.
+
+    Returns:
+        the attempt rows, problem by problem, in the order of the contestants.
+
+    Raises:
+        PlanFaultError: the authority finds fault with a plan.
+
     """
-    vehicle, seed = vehicle_named(chunk.settings.vehicle), chunk.settings.seed
+    vehicle, seed, workspace = chunk.vehicle, chunk.settings.seed, Workspace()
+
+    def attempt(problem: Problem, by: Contestant) -> Attempt:
+        memory = memories[by.memory, by.run] if by.memory else None
+        assist, top_k, recall = by.assist
+        return solve(
+            *(problem, by.planner, assist, top_k, memory, seed),
+            vehicle=vehicle,
+            strategy=recall,
+            workspace=workspace,
+        )
+
     rows: list[dict[str, Any]] = []
     compile_assists(vehicle)
-    for way in ways:  # code and caches are warm before the first time counts
-        attempt(source.problem("test", chunk.first), way)
+    for contestant in contestants:  # code and caches are warm before the first time counts
+        attempt(source.problem("test", chunk.first), contestant)
     with no_garbage_collection():
         for index in range(chunk.first, chunk.last):
             problem = source.problem("test", index)
-            order = generator(seed, "order", problem.id).permutation(len(ways))
-            attempts = {int(i): attempt(problem, ways[i]) for i in order}
+            order = generator(seed, "order", problem.id).permutation(len(contestants))
+            attempts = {int(i): attempt(problem, contestants[i]) for i in order}
             checked: set[bytes] = set()
-            for i, way in enumerate(ways):
+            for i, contestant in enumerate(contestants):
                 check_attempt(problem, attempts[i], checked, vehicle)
-                rows.append(attempt_row(attempts[i], *made_by(way), vehicle))
+                rows.append(attempt_row(attempts[i], contestant.memory, contestant.run, vehicle))
             if index % COLLECTED_EVERY == 0:
                 gc.collect()
     return rows

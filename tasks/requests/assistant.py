@@ -32,8 +32,8 @@ from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, a hundred that search, none of a second
 
 
-class Way(NamedTuple):
-    """How problems are to be solved: what an ``Assistant`` is made of."""
+class AssistantSettings(NamedTuple):
+    """How problems are to be solved: the arguments of an ``Assistant``."""
 
     planner: str
     assist: str
@@ -46,7 +46,7 @@ class Way(NamedTuple):
 
 
 class Assistant:
-    """A way to solve: vehicle, planner, assist, seed, and the memory of each class that turns up."""
+    """Solves a user's own problems, with the memory of each class that turns up."""
 
     def __init__(
         self,

@@ -22,7 +22,7 @@ from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.inputs.learned_on_the_job import Solved, remember
-from tasks.requests.assistant import Assistant, Way, plan_record
+from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 
 PART_PROBLEMS: Final = 500  # seconds of work: what a killed worker does again
 PART_SECONDS: Final = 10.0  # at most of improving plans
@@ -37,7 +37,7 @@ class SolveRequest:
 
     problems: Path
     out: Path  # for the rows
-    way: Way  # its memory is a folder
+    settings: AssistantSettings  # the memory is a folder
     memory_digest: str  # of the files in that folder
     plans: Path | None = None  # a folder for the plans
     learn: Path | None = None  # a data folder that remembers what was newly solved
@@ -91,14 +91,14 @@ def parts_of(request: SolveRequest) -> list[FilePart]:
 
 @functools.lru_cache(maxsize=1)
 def _parts_of(request: SolveRequest, _changed: tuple[int, int] | None) -> list[FilePart]:
-    way = request.way
-    longest = PART_SECONDS / way.improve_seconds if way.improve_seconds else PART_PROBLEMS
+    settings = request.settings
+    longest = PART_SECONDS / settings.improve_seconds if settings.improve_seconds else PART_PROBLEMS
     pieces = slices_of(request.problems, max(1, int(min(PART_PROBLEMS, longest))))
     if not pieces:
         raise StorageError(f"{request.problems} holds no problems; nothing to solve.")
     many = sum(piece.count for piece in pieces) > FLAT
     folders = [str(folder.absolute()) if folder else None for folder in (request.plans, request.learn)]
-    how = [*way._replace(memory=None), request.memory_digest, *folders, many, request.problems.stem]
+    how = [*settings._replace(memory=None), request.memory_digest, *folders, many, request.problems.stem]
     return [
         FilePart(request, piece, index, many, key_of("solve", how, *_described(piece)))
         for index, piece in enumerate(pieces)
@@ -135,7 +135,7 @@ def solve_part(chunk: FilePart) -> PartSolved:
 def solve_and_tell(chunk: FilePart, on_problem: Callable[[], object]) -> PartSolved:
     """Like ``solve_part``; ``on_problem`` is called after each problem."""
     request = chunk.request
-    assistant = _assistant(request.way, request.memory_digest)
+    assistant = _assistant(request.settings, request.memory_digest)
     rows: list[dict[str, Any]] = []
     solved: list[Solved] = []
     with no_garbage_collection():
@@ -174,9 +174,9 @@ SOLVE: Final = Job(
 
 
 @functools.lru_cache(maxsize=1)
-def _assistant(way: Way, _memory_digest: str) -> Assistant:
+def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
     """The assistant of this process, with the memories that it has read."""
-    return Assistant(*way)
+    return Assistant(*settings)
 
 
 def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:

@@ -19,7 +19,7 @@ from storage.places.files import remove_folder
 from storage.tables.attempts import attempt_columns, join_attempts
 from tasks.fan_out.progress import progress
 from tasks.registry.model_uris import memory_digest, memory_folder
-from tasks.requests.assistant import Assistant, Way
+from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.problem_parts import (
     SOLVE,
     FilePart,
@@ -49,7 +49,7 @@ class Tally(NamedTuple):
 
 
 def solve_many(
-    way: Way,
+    settings: AssistantSettings,
     problems: Path,
     out: Path,
     plans: Path | None = None,
@@ -62,7 +62,7 @@ def solve_many(
     The same command does not do again what a killed one has finished.
 
     Args:
-        way: how to solve them.
+        settings: how to solve them.
         problems: a .json, .jsonl or .parquet file.
         out: where to write the rows, .parquet.
         plans: a folder for the plans, one file each.
@@ -72,21 +72,21 @@ def solve_many(
             when it is called. Without it everything is solved in this process.
 
     Raises:
-        UsageError: ``out`` has another ending, or ``way`` is not possible.
+        UsageError: ``out`` has another ending, or the settings are not possible.
         StorageError: a problem is malformed, or has the id of another one. All others are solved and kept, so
             that the same command has little left to do once the problem is corrected.
 
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    Assistant(*way)  # which refuses what cannot be asked
+    Assistant(*settings)  # which refuses what cannot be asked
     if learn is not None:
         open_data_folder(learn)
-    known = None if way.memory is None or way.improve_seconds else _watched(way.memory)
+    known = None if settings.memory is None or settings.improve_seconds else _watched(settings.memory)
     began = time.monotonic()
-    with memory_folder(way.memory) as memory:
-        way = way._replace(memory=None if memory is None else str(memory))
-        request = SolveRequest(problems, out, way, memory_digest(memory), plans, learn)
+    with memory_folder(settings.memory) as memory:
+        settings = settings._replace(memory=None if memory is None else str(memory))
+        request = SolveRequest(problems, out, settings, memory_digest(memory), plans, learn)
         parts = parts_of(request)
         with unfinished(request):
             left = [part for part in parts if not SOLVE.is_written(part)]
@@ -159,12 +159,11 @@ def _watch(known: Watched, request: SolveRequest, tally: Tally) -> None:
     from storage.tables.configurations import configured
     from tasks.champions.drift_watch import watch
 
-    way = request.way
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
     times = 1e3 * tally.seconds
     now = Usefulness(len(times), tally.outcomes["recalled"], float(times.mean()), float(np.median(times)))
-    for line in watch(known, {f"{way.planner} {label}": now}, request.learn):
+    for line in watch(known, {f"{request.settings.planner} {label}": now}, request.learn):
         print(f"watched  {line}")
 
 

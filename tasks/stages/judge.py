@@ -10,20 +10,18 @@ from typing import Final, NamedTuple
 import pandas as pd
 
 from planners.memory.recall import Memory, default_recall
-from planners.solve import WITHOUT_MEMORY, Attempt, solve
+from planners.solve import WITHOUT_MEMORY
 from planners.world.authority.authority import faults
-from planners.world.problem import Problem
-from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.experiences import read_experiences
 from tasks.attempts.attempt_rows import PlanFaultError
-from tasks.attempts.side_by_side import side_by_side
+from tasks.attempts.side_by_side import Contestant, MemoryOfRun, side_by_side
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import held_back, source_key
 from tasks.settings.retraining_settings import champions_of, number_of
-from tasks.settings.run_settings import Assist, RunSettings
+from tasks.settings.run_settings import RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.keep_experiences import experiences_key
 
@@ -50,53 +48,38 @@ CHECK_PLANS: Final = Stage(
 )
 
 
-class Contestant(NamedTuple):
-    """A planner with a memory of one of the two sides."""
-
-    planner: str
-    assist: Assist
-    memory: str  # its name
-    run: str  # that made the memory: the champion's, or the challenger's
+def sides_of(settings: RunSettings, class_name: str) -> list[MemoryOfRun]:
+    """The memories that are judged on a class: the champions, then their challengers."""
+    memories = settings.memories_of(class_name)
+    champions = [(each.memory, each.run) for each in champions_of(memories, settings.retraining)]
+    return champions + [(memory, settings.run_name) for memory in memories]
 
 
 def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
     """Every planner with every memory of both sides, by every assist that uses one."""
-    memories = settings.memories_of(class_name)
-    champions = [(each.memory, each.run) for each in champions_of(memories, settings.retraining)]
-    sides = [*champions, *((memory, settings.run_name) for memory in memories)]
     return [
         Contestant(planner, assist, *side)
         for planner in settings.planners
         for assist in settings.assists
         if assist.name not in WITHOUT_MEMORY
-        for side in sides
+        for side in sides_of(settings, class_name)
     ]
 
 
 def judge_chunk(chunk: Chunk) -> None:
     """Have every contestant attempt a range of held-back problems, check the plans, write the attempts."""
     settings, name = chunk.settings, chunk.class_name
-    vehicle, challenger = chunk.vehicle, settings.run_name
-    everyone = contestants(settings, name)
-    memories: dict[tuple[str, str], Memory] = {}
-    for memory, run in {(each.memory, each.run): None for each in everyone}:
-        folder = chunk.run.memory if run == challenger else chunk.run.champion
-        memories[memory, run] = load_memory(folder(memory), vehicle)
-    workspace = Workspace()
-
-    def attempt(problem: Problem, by: Contestant) -> Attempt:
-        assist, top_k, strategy = by.assist
-        strategy = strategy or default_recall(memories[by.memory, challenger])  # the same for both sides
-        memory = memories[by.memory, by.run]
-        return solve(
-            *(problem, by.planner, assist, top_k, memory, settings.seed),
-            vehicle=vehicle,
-            strategy=strategy,
-            workspace=workspace,
-        )
-
-    held = held_back(chunk.data, settings, name)
-    rows = side_by_side(chunk, held, everyone, attempt, lambda by: (by.memory, by.run))
+    memories: dict[MemoryOfRun, Memory] = {}
+    recalls: dict[str | None, str] = {}
+    for memory, run in sides_of(settings, name):  # challengers last, so that both sides recall as they do
+        folder = chunk.run.memory if run == settings.run_name else chunk.run.champion
+        memories[memory, run] = load_memory(folder(memory), chunk.vehicle)
+        recalls[memory] = default_recall(memories[memory, run])
+    everyone = [
+        each._replace(assist=each.assist._replace(recall=each.assist.recall or recalls[each.memory]))
+        for each in contestants(settings, name)
+    ]
+    rows = side_by_side(chunk, held_back(chunk.data, settings, name), everyone, memories)
     write_attempts(chunk.shard("judged"), rows, key=chunk.key)
 
 

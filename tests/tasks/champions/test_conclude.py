@@ -12,6 +12,7 @@ import pytest
 
 from storage.places.data_folder import open_data_folder
 from storage.tables.experiences import read_experiences
+from tasks.attempts import side_by_side
 from tasks.champions import conclude as task
 from tasks.champions.dry_run import dry_run
 from tasks.fan_out.chunk import run_folder
@@ -19,7 +20,7 @@ from tasks.inputs.problem_sources import held_back, source_of
 from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, REFUSED, ROLLED_BACK
 from tasks.reports import report
 from tasks.settings.run_settings import RunSettings
-from tasks.stages import build_memory, hallucinate, judge
+from tasks.stages import build_memory, hallucinate
 from tasks.stages.judge import judged
 from tasks.tracking import logbook
 from tests.tasks.champions.retrained import CLASS, SETTINGS, timed_by_work
@@ -51,7 +52,7 @@ def story(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Iterator[
         if not seen.exists():
             patch.setattr(task, "publish_judgements", lambda *_: None)  # no Prefect to tell
             patch.setattr(hallucinate, "CHUNK_PROBLEMS", 80)  # two plans a chunk
-            patch.setattr(judge, "solve", timed_by_work)
+            patch.setattr(side_by_side, "solve", timed_by_work)
             patch.setattr(build_memory, "_draw", lambda *_: None)  # seconds of pictures
             patch.setattr(report, "save", lambda *_: None)
             told.tell(patch)

@@ -23,12 +23,12 @@ from storage.places.files import locked
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.learned_experiences import learned_shards
 from tasks.requests import problem_parts as parts
-from tasks.requests.assistant import Way
+from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows.same_rows import equal_but_for_seconds
 
 ROOT = Path(__file__).parents[3]
-WAY = Way("gust", "none", 5, None, 1)
+ASSISTANT = AssistantSettings("gust", "none", 5, None, 1)
 COUNT = 11
 SIZE = 3  # problems a part
 
@@ -50,7 +50,7 @@ def problems(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def undisturbed(problems: Path) -> pd.DataFrame:
     out = problems.with_name("undisturbed.parquet")
-    solve_many(WAY, problems, out)
+    solve_many(ASSISTANT, problems, out)
     return read_attempts(out)
 
 
@@ -89,7 +89,7 @@ def test_rows_come_in_the_order_of_the_problems(undisturbed: pd.DataFrame, probl
 
 
 def test_both_formats_give_the_same_rows(undisturbed: pd.DataFrame, problems: Path, tmp_path: Path) -> None:
-    solve_many(WAY, problems.with_suffix(".parquet"), tmp_path / "rows.parquet")
+    solve_many(ASSISTANT, problems.with_suffix(".parquet"), tmp_path / "rows.parquet")
     assert equal_but_for_seconds(read_attempts(tmp_path / "rows.parquet"), undisturbed)
 
 
@@ -99,11 +99,11 @@ def test_what_was_finished_before_an_interruption_is_not_done_again(
     out = tmp_path / "rows.parquet"
     monkeypatch.setattr(parts, "write_attempts", Counting(most=2))
     with pytest.raises(StoppedError):
-        solve_many(WAY, problems, out)
+        solve_many(ASSISTANT, problems, out)
     assert not out.exists()
     counting = Counting()
     monkeypatch.setattr(parts, "write_attempts", counting)
-    solve_many(WAY, problems, out)
+    solve_many(ASSISTANT, problems, out)
     assert counting.written == -(-COUNT // SIZE) - 2
     assert equal_but_for_seconds(read_attempts(out), undisturbed)
     assert list(tmp_path.iterdir()) == [out]
@@ -115,9 +115,9 @@ def test_another_question_never_takes_the_parts_of_this_one(
     out = tmp_path / "rows.parquet"
     monkeypatch.setattr(parts, "write_attempts", Counting(most=2))
     with pytest.raises(StoppedError):
-        solve_many(WAY, problems, out)
+        solve_many(ASSISTANT, problems, out)
     monkeypatch.setattr(parts, "write_attempts", Counting())
-    solve_many(WAY._replace(seed=2), problems, out)
+    solve_many(ASSISTANT._replace(seed=2), problems, out)
     assert set(read_attempts(out)["seed"]) == {2}
 
 
@@ -128,12 +128,12 @@ def test_a_malformed_line_is_named_and_only_its_part_is_left_to_do(
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), *lines[5:]]))
     with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All else is"):
-        solve_many(WAY, path, out)
+        solve_many(ASSISTANT, path, out)
     assert not out.exists()
     path.write_text("".join(lines))
     counting = Counting()
     monkeypatch.setattr(parts, "write_attempts", counting)
-    solve_many(WAY, path, out)
+    solve_many(ASSISTANT, path, out)
     assert counting.written == 1
     assert equal_but_for_seconds(read_attempts(out), undisturbed)
 
@@ -143,17 +143,17 @@ def test_an_id_that_occurs_twice_is_named_with_both_lines(problems: Path, tmp_pa
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join(["\n", *lines[:9], lines[1]]))
     with pytest.raises(StorageError, match=r'line 11: id ".*-1" is that of .*problems.jsonl line 3 too'):
-        solve_many(WAY, path, out)
+        solve_many(ASSISTANT, path, out)
     assert not out.exists()
 
 
 def test_a_file_without_problems_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "p.jsonl").write_text("\n\n")
     with pytest.raises(StorageError, match=r"p.jsonl holds no problems"):
-        solve_many(WAY, tmp_path / "p.jsonl", tmp_path / "rows.parquet")
+        solve_many(ASSISTANT, tmp_path / "p.jsonl", tmp_path / "rows.parquet")
     (tmp_path / "q.jsonl").write_text("{}\n")
     with pytest.raises(StorageError, match=r"line 1: field start is missing"):
-        solve_many(WAY, tmp_path / "q.jsonl", tmp_path / "rows.parquet")
+        solve_many(ASSISTANT, tmp_path / "q.jsonl", tmp_path / "rows.parquet")
     assert {each.name for each in tmp_path.iterdir()} == {"p.jsonl", "q.jsonl"}
 
 
@@ -163,25 +163,25 @@ def test_one_output_is_written_by_one_command(problems: Path, tmp_path: Path) ->
         locked(tmp_path / "rows.parquet.parts" / ".lock", "other"),
         pytest.raises(StorageError, match=f"in use by another command .process {os.getpid()}."),
     ):
-        solve_many(WAY, problems, tmp_path / "rows.parquet")
+        solve_many(ASSISTANT, problems, tmp_path / "rows.parquet")
 
 
 def test_plans_lie_in_one_folder_and_very_many_in_one_a_part(
     problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    solve_many(WAY, problems, tmp_path / "rows.parquet", tmp_path / "few")
+    solve_many(ASSISTANT, problems, tmp_path / "rows.parquet", tmp_path / "few")
     files = sorted((tmp_path / "few").iterdir())
     assert len(files) == COUNT
     assert all(read_plan(file).problem_id == file.stem for file in files)
     monkeypatch.setattr(parts, "FLAT", COUNT - 1)
-    solve_many(WAY, problems, tmp_path / "rows.parquet", tmp_path / "many")
+    solve_many(ASSISTANT, problems, tmp_path / "rows.parquet", tmp_path / "many")
     assert sorted(each.name for each in (tmp_path / "many").rglob("*.json")) == [each.name for each in files]
     assert len(list((tmp_path / "many").iterdir())) == -(-COUNT // SIZE)
 
 
 def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) -> None:
     for out in ("one.parquet", "other.parquet"):
-        solve_many(WAY, problems, tmp_path / out, learn=tmp_path / "data")
+        solve_many(ASSISTANT, problems, tmp_path / out, learn=tmp_path / "data")
     shards = learned_shards(DataFolder(tmp_path / "data").learned("car"))
     assert len(shards) == -(-COUNT // SIZE)
 

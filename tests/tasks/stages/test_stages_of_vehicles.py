@@ -17,7 +17,7 @@ from storage.exchange.problems import write_problems
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import read_attempts
 from tasks.fan_out.chunk import run_folder
-from tasks.requests.assistant import Assistant, Way, plan_one
+from tasks.requests.assistant import Assistant, AssistantSettings, plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.presets import for_preset
@@ -83,8 +83,8 @@ def test_verify_makes_the_same_attempts_again(run: RunFolder, capsys: pytest.Cap
 
 
 def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, tmp_path: Path) -> None:
-    way = Way(PLANNER, "open", 3, str(run.path), 1, "car-1-trailer")
-    solve_many(way, problems, tmp_path / "rows.parquet", tmp_path / "plans")
+    settings = AssistantSettings(PLANNER, "open", 3, str(run.path), 1, "car-1-trailer")
+    solve_many(settings, problems, tmp_path / "rows.parquet", tmp_path / "plans")
     assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
     for path in (tmp_path / "plans").iterdir():
         plan = read_plan(path, CAR_1_TRAILER).plan
@@ -95,11 +95,11 @@ def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, 
 
 
 def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
-    way = Way(PLANNER, "open", 3, str(run.path), 1, "car")
+    settings = AssistantSettings(PLANNER, "open", 3, str(run.path), 1, "car")
     with pytest.raises(
         StorageError, match="made for vehicle car-1-trailer, wanted was car; ask for --vehicle"
     ):
-        solve_many(way, problems, tmp_path / "rows.parquet", None)
+        solve_many(settings, problems, tmp_path / "rows.parquet", None)
 
 
 def test_a_picture_and_a_plan_are_written(run: RunFolder, problems: Path, tmp_path: Path) -> None:

@@ -208,7 +208,7 @@ def test_a_bad_problem_gets_one_clear_line(at_home: dict[str, str], text: str, r
 
 def test_plan_takes_a_memory_from_mlflow(at_home: dict[str, str], tmp_path: Path) -> None:
     from storage.tables.attempts import read_attempts
-    from tasks.requests.assistant import Assistant, Way, plan_one
+    from tasks.requests.assistant import Assistant, AssistantSettings, plan_one
     from tasks.requests.solve_many import solve_many
 
     place = tmp_path / "p.json"
@@ -219,5 +219,6 @@ def test_plan_takes_a_memory_from_mlflow(at_home: dict[str, str], tmp_path: Path
     assert record.source == "recalled"
     assert record.plan is not None
     assert faults(to_canonical(EASY.draw(901, 3))[0], record.plan, CAR) == []
-    solve_many(Way("gust", "closed", 12, at_home["alias"], 1), place, tmp_path / "rows.parquet")
+    assistant = AssistantSettings("gust", "closed", 12, at_home["alias"], 1)
+    solve_many(assistant, place, tmp_path / "rows.parquet")
     assert list(read_attempts(tmp_path / "rows.parquet")["source"]) == ["recalled"]
