@@ -1,1 +1,1 @@
-"""When things happen: one verb, one file, one paragraph."""
+"""When things happen: one flow in a file, as short as a paragraph."""

@@ -20,7 +20,7 @@ from tasks.tracking.logbook import run_logged
 @flow(name="run")
 @holding
 def run(settings: RunSettings, data: str) -> None:
-    """Collect, hallucinate, train, build memories, benchmark; again with less experience if asked; report."""
+    """Do every stage, then the same with fewer experiences if the settings ask for it, and report."""
     with cluster(), run_logged(data, settings):
         collect(settings, data)
         hallucinate(settings, data)

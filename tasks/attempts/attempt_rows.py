@@ -22,11 +22,22 @@ _UNKNOWN_WHEN_UNSOLVED: Final = ("source", "length_m", "duration_s")
 
 
 class PlanFaultError(RunError):
-    """A plan that was called solved is not: a bug, never data."""
+    """A plan of a solved problem is faulty: a bug, never data."""
 
 
 def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes], vehicle: Vehicle) -> None:
-    """Have the authority check an attempt's plan, once however many attempts gave the same (``checked``)."""
+    """Have the authority check the plan of an attempt, if it has one.
+
+    Args:
+        problem: what was attempted.
+        attempt: the attempt.
+        checked: plans that need no check; this one is added.
+        vehicle: who drives.
+
+    Raises:
+        PlanFaultError: the plan does not solve the problem.
+
+    """
     if attempt.plan is None:
         return
     plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
@@ -34,13 +45,21 @@ def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes], vehic
         return
     wrong = faults(problem, attempt.plan, vehicle)
     if wrong:
-        asked = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
-        raise PlanFaultError(f"{problem.id} solved by {asked}: {wrong[0]}")
+        planner = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
+        raise PlanFaultError(f"{problem.id} solved by {planner}: {wrong[0]}")
     checked.add(plan)
 
 
 def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
-    """The row of a checked attempt (``storage.tables.schemas.ATTEMPTS``)."""
+    """The row of a checked attempt (``storage.tables.schemas.ATTEMPTS``).
+
+    Args:
+        attempt: the attempt.
+        memory: name of the memory that it used, if any.
+        run_id: the run that made the memory, if any.
+        vehicle: who drives.
+
+    """
     row = {name: getattr(attempt, name) for name in _FIELDS}
     if not attempt.solved:
         row |= dict.fromkeys(_UNKNOWN_WHEN_UNSOLVED)
@@ -49,7 +68,7 @@ def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicl
 
 
 def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> bool:
-    """Whether an attempt made again came out as its row says, timings aside."""
+    """Whether an attempt that was made again agrees with its row, but for times."""
     again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
     counted = ("status", "solved", "collision_checks", "expansions", "nodes")
     lengths = (again["length_m"] or math.nan, row["length_m"])
@@ -62,9 +81,9 @@ def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> boo
 
 @functools.cache
 def commit() -> str:
-    """The commit of the sources, or nothing where they are no checkout."""
-    asked = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
+    """The commit of the sources; empty if they are not a checkout."""
+    command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
     try:
-        return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+        return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return ""

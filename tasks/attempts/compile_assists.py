@@ -1,4 +1,4 @@
-"""Compile what planning with a memory needs; Numba keeps it, so that later processes only load it."""
+"""Compile the kernels of planning with a memory; Numba keeps them, so later processes only load them."""
 
 from __future__ import annotations
 
@@ -32,7 +32,14 @@ EMPTY: Final = Problem(
 
 
 def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequence[str] = RECALLS) -> None:
-    """What a memory needs, by each strategy of recall: of copies of one plan, with a box put on it."""
+    """Plan with a small memory by each strategy of recall: copies of one plan, with a box put in its way.
+
+    Args:
+        vehicle: whose kernels are compiled.
+        planner: the planner that is assisted.
+        strategies: strategies of recall.
+
+    """
     workspace = Workspace()
     plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan
     if plan is None:

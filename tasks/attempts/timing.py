@@ -1,4 +1,4 @@
-"""What makes measured times comparable, wherever an attempt is made."""
+"""Times that can be compared, whatever makes the attempt."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Nothing is collected meanwhile but by ``gc.collect``, and then only what came since."""
+    """Only ``gc.collect`` collects garbage inside, and only of what was made inside."""
     gc.collect()
     gc.freeze()
     gc.disable()

@@ -1,1 +1,1 @@
-"""Stages, their chunks and keys, sent to Dask workers, with progress."""
+"""What a stage is, and how its chunks are given to Dask workers."""

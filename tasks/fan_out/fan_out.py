@@ -80,7 +80,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
 
 
 def task_runner() -> Any:
-    """What a flow gives its tasks to: the shared cluster, found when the first task is submitted."""
+    """The task runner of a flow: it looks for the shared cluster when the first task is submitted."""
     shared: Any = cluster  # entered by the runner, which is all that it wants of a cluster
     return DaskTaskRunner(cluster_class=shared, client_kwargs={"timeout": RECONNECT_SECONDS})
 
@@ -230,7 +230,7 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
 
 
 def _wait_for_scheduler(client: Any, losses: int) -> None:
-    """Return when the client has the scheduler again; RunError when it gave up, or this is too often."""
+    """Wait until the client has the scheduler again; RunError if it gave up, or lost it too often."""
     while client.status == "connecting":
         time.sleep(POLL_SECONDS)
     if client.status != "running" or losses > LOSSES_ALLOWED:

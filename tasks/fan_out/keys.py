@@ -1,4 +1,4 @@
-"""Keys: digests of everything that rows depend on, the code that makes them included."""
+"""Keys: digests of everything that rows depend on, including the code that makes them."""
 
 from __future__ import annotations
 

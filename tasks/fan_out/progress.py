@@ -1,4 +1,4 @@
-"""How far work has come, on the error stream."""
+"""How far work has come, shown on the error stream."""
 
 from __future__ import annotations
 
@@ -16,10 +16,16 @@ LINE_SECONDS: Final = 5.0  # between lines of progress where there is no termina
 
 @contextmanager
 def progress(description: str, total: int = 0, ended: bool = True) -> Iterator[Callable[..., None]]:
-    """A bar with the time left on a terminal, a line now and then elsewhere; both on the error stream.
+    """Show a bar with the time left on a terminal, and a line now and then elsewhere.
 
-    Yields what is to be told how many are done and, where it was not known at first, of how many. Without
-    ``ended`` no line tells of the end of work that was done before the first line was due.
+    Args:
+        description: what is being done.
+        total: how many items there are, if that is known.
+        ended: whether to print a line at the end even of work that took less time than is between two lines.
+
+    Yields:
+        what to call with the number of items that are done, and of how many if that was not known before.
+
     """
     console = Console(file=sys.stderr)
     began = time.monotonic()

@@ -1,4 +1,4 @@
-"""How far long work has come, as an artifact of the Prefect flow that does it."""
+"""How far long work has come, as an artifact of its Prefect flow."""
 
 from __future__ import annotations
 
@@ -8,14 +8,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-EVERY_SECONDS: Final = 10.0  # what is over sooner has none; an update costs a request
+EVERY_SECONDS: Final = 10.0  # shorter work gets no artifact; each update is a request
 
 Show = Callable[[int], Any]
 
 
 @contextmanager
 def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show]:
-    """Yields what is told how many are done, and tells ``show``; where Prefect does not answer, only that."""
+    """Report progress to Prefect, and to something else besides.
+
+    Args:
+        description: what is being done.
+        total: how many items there are.
+        show: called with the number of items that are done, also if Prefect does not answer.
+
+    Yields:
+        what to call with the number of items that are done.
+
+    """
     from prefect import artifacts
 
     made: Any = None
@@ -42,5 +52,5 @@ def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show
 
 
 def artifact_key(name: str) -> str:
-    """A name as the key of an artifact."""
+    """The key of an artifact, made of a name."""
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

@@ -1,1 +1,1 @@
-"""Where problems and experiences of a stage come from."""
+"""Where the problems and experiences of a stage come from."""

@@ -1,4 +1,4 @@
-"""The run that a champion came from, if it is still here: what it made need not be made again."""
+"""The run that made a champion, if it is still there: a retraining need not make again what it made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tasks.settings.run_settings import RunSettings
 
 
 class ChampionRun(NamedTuple):
-    """A run that is there."""
+    """A run of this data folder."""
 
     folder: RunFolder
     settings: RunSettings
@@ -31,7 +31,7 @@ def champion_run(data: str, name: str) -> ChampionRun | None:
 
 
 def champion_run_of(chunk: Chunk) -> ChampionRun | None:
-    """The run of the champion of a chunk's class; None also where it is no retraining's."""
+    """The run of the champion of a chunk's class; None as above, and if the chunk is not of a retraining."""
     retraining = chunk.settings.retraining
     champion = retraining.champion(chunk.class_name) if retraining else None
     return champion_run(chunk.data, champion.run) if champion else None

@@ -1,4 +1,4 @@
-"""Learning on the job: what `solve` and `plan` found anew, kept for the next run that asks for it."""
+"""Learning on the job: new plans of `solve` and `plan`, kept for runs that ask for them."""
 
 from __future__ import annotations
 
@@ -26,11 +26,21 @@ class Solved(NamedTuple):
     attempt: Attempt
 
 
-def remember(data: Path, found: Sequence[Solved], vehicle: Vehicle) -> int:
-    """Add what is new among checked attempts of one planner to a data folder; how many those are."""
+def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
+    """Add the plans that no memory had to a data folder.
+
+    Args:
+        data: the data folder.
+        attempts: checked attempts of one planner.
+        vehicle: who drives.
+
+    Returns:
+        how many plans were added.
+
+    """
     new = [
         (Experience(problem, attempt.plan, vehicle), attempt)
-        for problem, attempt in found
+        for problem, attempt in attempts
         if attempt.plan is not None and attempt.source in NEW
     ]
     if new:
@@ -46,10 +56,17 @@ def remember(data: Path, found: Sequence[Solved], vehicle: Vehicle) -> int:
 
 
 def with_learned(settings: RunSettings, data: Path, name: str) -> RunSettings:
-    """Settings with what the data folder has learned as further candidates: its snapshot ``name``.
+    """The settings with a snapshot of what was learned on the job, as more candidates to choose from.
 
-    The snapshot is taken when its name is first used. StorageError: nothing was learned for the vehicle.
+    Args:
+        settings: those of the run.
+        data: the data folder.
+        name: name of the snapshot, which is taken when the name is first used.
+
+    Raises:
+        StorageError: nothing was learned for the vehicle.
+
     """
     folder = open_data_folder(data).learned(settings.vehicle)
-    called = take_snapshot(folder, checked_name(name), vehicle_named(settings.vehicle))
-    return replace(settings, learned=called)
+    snapshot = take_snapshot(folder, checked_name(name), vehicle_named(settings.vehicle))
+    return replace(settings, learned=snapshot)

@@ -1,4 +1,4 @@
-"""Where a class's problems come from: a generator with a seed, or worlds or a map read once a run."""
+"""Where the problems of a class come from: a generator with a seed, or worlds or a map, read once a run."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}
 
 @dataclass(frozen=True)
 class Generated:
-    """A generated class: as many problems as one asks for, those to test with never collected from."""
+    """A generated class: any number of problems; those to test with are never collected from."""
 
     problems: ProblemClass
     seed: int
 
     def count(self, purpose: Purpose, wanted: int) -> int:
-        """How many of the ``wanted`` problems there are: all."""
+        """How many of the ``wanted`` problems there are: all of them."""
         return wanted
 
     def problem(self, purpose: Purpose, index: int) -> Problem:
@@ -82,7 +82,7 @@ def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
 
 
 def source_of(data: str, settings: RunSettings, class_name: str) -> Source:
-    """The problems of a class of the run; worlds must have been read (``read_worlds``)."""
+    """The problems of a class of the run; its worlds must have been read (``tasks.stages.read_worlds``)."""
     if class_name in settings.classes:
         vehicle = vehicle_named(settings.vehicle)
         return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
@@ -90,9 +90,9 @@ def source_of(data: str, settings: RunSettings, class_name: str) -> Source:
 
 
 def held_back(data: str, settings: RunSettings, class_name: str) -> Source:
-    """Where the problems (``test``) come from that a retraining is judged by: no other run or retraining's.
+    """The source of the ``test`` problems by which a retraining is judged, and nothing else.
 
-    A folder of worlds, or a map, has but the one part to test with, whoever asks.
+    Only worlds and maps have no more than the one part to test with.
     """
     source = source_of(data, settings, class_name)
     if isinstance(source, Worlds):
@@ -101,14 +101,14 @@ def held_back(data: str, settings: RunSettings, class_name: str) -> Source:
 
 
 def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
-    """What a class's problems depend on, for the keys of chunks; the vehicle too: it needs room to start."""
+    """What the problems of a class depend on, for keys; also the vehicle, which needs room to start."""
     paths = [Path(path) for path in settings.worlds if world_class(path) == class_name]
     drawn = [_digest(paths[0])] if paths else [settings.difficulty]
     return [*drawn, settings.seed, settings.vehicle]
 
 
 def class_settings(settings: RunSettings, class_name: str) -> dict[str, Any]:
-    """What a memory says of the class it was made for: how problems are placed, or which worlds they are."""
+    """What a memory tells about its class: how obstacles are placed, or which worlds they come from."""
     if class_name not in settings.classes:
         return {"worlds": class_name, "digest": source_key(settings, class_name)[0]}
     drawn = problem_class(class_name, settings.difficulty)
@@ -116,13 +116,13 @@ def class_settings(settings: RunSettings, class_name: str) -> dict[str, Any]:
 
 
 def _named(value: Any) -> Any:
-    """Settings tuples as JSON objects."""
+    """Named tuples as JSON objects."""
     return {k: _named(v) for k, v in value._asdict().items()} if hasattr(value, "_asdict") else value
 
 
 @functools.cache
 def _digest(path: Path) -> str:
-    """A digest of worlds' or a map's files."""
+    """A digest of the files of worlds or of a map."""
     digest = hashlib.sha256()
     for file in source_at(path).contents():
         digest.update(f"{file.relative_to(path.parent)}\0".encode())

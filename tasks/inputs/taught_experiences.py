@@ -1,4 +1,4 @@
-"""Memories of more plans than an encoder is taught: it learns the first of a class, the others join later."""
+"""Experiences that encoders are taught, and those that join a memory afterwards."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/st
 
 
 def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list[Experience]:
-    """Those of a memory that problems are hallucinated for, class by class; its labels say which are free."""
+    """The first experiences of each class of a memory: problems are hallucinated and labelled for these."""
     vehicle = vehicle_named(settings.vehicle)
     return [
         experience
@@ -28,7 +28,7 @@ def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list
 
 
 def grown_memory(chunk: Chunk, memory: Memory) -> Memory:
-    """The memory with all plans that were collected, read out from problems as the classes have them."""
+    """A memory with all plans that were collected, read out from plain problems of its classes."""
     settings, name = chunk.settings, chunk.class_name
     experiences = read_experiences(chunk.run.experiences(name), memory.vehicle)
     sources = [source_of(chunk.data, settings, each) for each in settings.classes_of(name)]

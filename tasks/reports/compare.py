@@ -1,4 +1,4 @@
-"""Compare: runs side by side with the first of them, paired by problem."""
+"""Compare: runs against the first of them, paired by problem."""
 
 from __future__ import annotations
 
@@ -25,11 +25,17 @@ ENDINGS: Final = (".md", ".json", ".csv")
 
 
 def compare(runs: Sequence[Path], out: Path | None) -> None:
-    """Print what differs in the settings of runs, and how much faster each is than the first.
+    """Print in which settings runs differ, and how much faster each is than the first.
 
-    UsageError for fewer than two runs or another ending of ``out``; StorageError where a folder is no run,
-    has edited settings, has no attempts, or has none at the first one's problems with the same planners and
-    configurations.
+    Args:
+        runs: folders of runs.
+        out: where to write the comparison too: .md, .json or .csv.
+
+    Raises:
+        UsageError: there are fewer than two runs, or ``out`` has another ending.
+        StorageError: a folder is not a run, its settings were edited, or it has no attempt that one of the
+            first run can be compared with.
+
     """
     if len(runs) < 2:
         raise UsageError(f"{len(runs)} run to compare: give two or more, folders in DATA/runs.")
@@ -65,8 +71,8 @@ def _written(
         return str(together.to_csv(index=False, lineterminator="\n"))
     if ending == ".json":
         settings = {row[0]: dict(zip(names, row[1:], strict=True)) for row in different}
-        found = {name: json.loads(rows.to_json(orient="records")) for name, rows in tables.items()}
-        return json.dumps({"first": names[0], "settings": settings, "runs": found}, indent=2) + "\n"
+        records = {name: json.loads(rows.to_json(orient="records")) for name, rows in tables.items()}
+        return json.dumps({"first": names[0], "settings": settings, "runs": records}, indent=2) + "\n"
     parts = [f"# {', '.join(names[1:])} against {names[0]}\n", markdown_table(("setting", *names), different)]
     for name, rows in tables.items():
         parts += [f"## {name}: {verdict(rows)}\n", comparison_markdown(rows)]
@@ -74,7 +80,7 @@ def _written(
 
 
 def _names(runs: Sequence[Path]) -> list[str]:
-    """What the runs are called: their folders' names, with more of their paths where these are the same."""
+    """The names of the runs' folders, or their paths if two have the same name."""
     short = [run.resolve().name for run in runs]
     return short if len(set(short)) == len(runs) else [str(run) for run in runs]
 
@@ -84,7 +90,7 @@ def _attempts(run: Path) -> pd.DataFrame:
 
 
 def _different(settings: Sequence[RunSettings]) -> list[list[str]]:
-    """A line a setting in which the runs differ: its name, then each run's value."""
+    """A line for each setting in which the runs differ: its name, then the value of each run."""
     flat = [dict(_leaves("", asdict(each))) for each in settings]
     names = dict.fromkeys(name for each in flat for name in each)
     rows = [[name, *(json.dumps(each.get(name)) for each in flat)] for name in names]
@@ -92,7 +98,7 @@ def _different(settings: Sequence[RunSettings]) -> list[list[str]]:
 
 
 def _leaves(prefix: str, values: dict[str, Any]) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
+    leaves: list[tuple[str, Any]] = []
     for name, value in values.items():
-        found += _leaves(f"{prefix}{name}.", value) if isinstance(value, dict) else [(prefix + name, value)]
-    return found
+        leaves += _leaves(f"{prefix}{name}.", value) if isinstance(value, dict) else [(prefix + name, value)]
+    return leaves

@@ -1,4 +1,4 @@
-"""Experience curve: what memories of fewer experiences recall, each with the whole pipeline of its own."""
+"""Experience curve: what memories of fewer experiences recall, each made by a run of its own."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from tasks.stages.measure_recall import MEASURE_RECALL
 
 
 def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
-    """The run with a fifth, two fifths ... and all of its experiences; UsageError for too few of them.
+    """The run with a fifth, two fifths … and all of its experiences; UsageError if it has too few.
 
-    The smaller ones are those of continual improvement: what either has made serves the other.
+    The smaller runs are those of continual improvement, so neither makes again what the other has made.
     """
     return [*runs_of_continual(replace(settings, continual="all")), settings]
 
 
 def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
-    """Print the curve of these runs, and draw it beside the figures of the run with all experiences."""
+    """Print the curve of some runs, and draw it among the figures of the last one, the largest."""
     rows = pd.concat([_rows(data, run) for run in runs], ignore_index=True)
     console().print(experience_table(rows))
     save(experience_chart(rows), run_folder(data, runs[-1]).figures, "experience-curve")

@@ -22,10 +22,17 @@ ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv"}
 
 
 def export_run(folder: Path, form: str, out: Path) -> None:
-    """Write a run's attempts to ``out``, whole or not at all, and say so.
+    """Write the attempts of a run, whole or not at all, in the format of another tool.
 
-    ``form``: ``ompl``, a folder of benchmark logs; ``planner-arena``, a SQLite database; ``csv``. UsageError
-    for another form or name, StorageError where the folder is no run or has no attempts.
+    Args:
+        folder: the run's folder.
+        form: ``ompl``, a folder of benchmark logs; ``planner-arena``, a SQLite database; or ``csv``.
+        out: where to write them.
+
+    Raises:
+        UsageError: another form, or a path that does not fit the form.
+        StorageError: the folder is not a run, or has no attempts.
+
     """
     check_known("format", [form], ENDINGS)
     if ENDINGS[form] and out.suffix != ENDINGS[form]:
@@ -47,7 +54,7 @@ def export_run(folder: Path, form: str, out: Path) -> None:
 
 
 def _write_csv(path: Path, results: Path) -> None:
-    """All attempt rows; the recalled plans of each with spaces between."""
+    """Write all attempt rows, the numbers of recalled plans separated by spaces."""
     with path.open("w", encoding="utf-8", newline="") as text:
         for number, rows in enumerate(attempt_frames(results)):
             rows["recalled"] = [" ".join(map(str, plans)) for plans in rows["recalled"]]

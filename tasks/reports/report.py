@@ -1,4 +1,4 @@
-"""Report: tables, figures and the page of a run, from its rows alone."""
+"""Report: the tables, figures and page of a run, made from its rows alone."""
 
 from __future__ import annotations
 
@@ -47,30 +47,20 @@ from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.measure_recall import MEASURE_RECALL
 from tasks.stages.sweep import sweep_rows
 
-COLUMNS = 110  # of the tables where there is no terminal
+COLUMNS: Final = 110  # width of tables that are not printed to a terminal
 NOT_NEEDED: Final = (
     "recalled", "run_id", "vehicle", "verified", "seed", "nodes", "expansions", "length_m", "duration_s",
     "host", "commit",
 )  # fmt: skip
-MEASURED: Final = (
-    "preset",
-    "classes",
-    "worlds",
-    "planners",
-    "assists",
-    "test_problems",
-    "combined",
-    "strict",
-    "candidates",
-    "continual",
-)
-
-
-_MEASURED_BY: Final = ["problem_class", "planner"]
+MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared by their experiences
+    "experiences", "preset", "classes", "worlds", "planners", "assists", "test_problems", "combined",
+    "strict", "candidates", "continual",
+)  # fmt: skip
+MEASURED_ON: Final = ["problem_class", "planner"]
 
 
 class Report(NamedTuple):
-    """What a run found."""
+    """The results of a run."""
 
     summary: pd.DataFrame  # ``dashboards.statistics.panels.summarise``
     retrieval: pd.DataFrame  # ``dashboards.statistics.retrieval_rates.summarise_retrieval``
@@ -78,14 +68,14 @@ class Report(NamedTuple):
 
 
 def report_run(data: str, settings: RunSettings) -> Report:
-    """Write tables, charts and the page into the run's folder; a StorageError where the run has no rows."""
+    """Write tables, charts and the page into a run's folder; StorageError if the run has no rows."""
     run = run_folder(data, settings)
     attempts = read_attempts(run.results, NOT_NEEDED)
-    grown = continual_rows(data, settings, attempts)
+    continual = continual_rows(data, settings, attempts)
     summary, recalls = summarise(attempts), _recall_rows(data, settings)
-    found = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, grown)))
+    report = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, continual)))
     _write(run.summary("csv"), as_csv(summary))
-    texts = [summary_markdown(summary), retrieval_markdown(found.retrieval), claims_markdown(found.claims)]
+    texts = [summary_markdown(summary), retrieval_markdown(report.retrieval), claims_markdown(report.claims)]
     _write(run.summary("md"), "\n".join(texts))
     figures = {
         "planning-times": planning_times(summary),
@@ -96,52 +86,60 @@ def report_run(data: str, settings: RunSettings) -> Report:
     }
     if (summary["recall"] == "random").any():
         figures["ablation"] = ablation(summary)
-    if len(grown):
-        figures["continual-improvement"] = continual_improvement(summarise_continual(grown))
+    if len(continual):
+        figures["continual-improvement"] = continual_improvement(summarise_continual(continual))
     for name, figure in figures.items():
         save(figure, run.figures, name)
     made_by = {name: distinct_values(run.results, name) for name in ("host", "commit")}
-    html = page_of(run, settings, attempts, summary, found.retrieval, found.claims, made_by)
-    _write(run.report, html)
-    return found
+    _write(run.report, page_of(run, settings, attempts, *report, made_by))
+    return report
 
 
 def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> pd.DataFrame:
-    """The run's ``attempts``, and those of all runs that differ from it in ``experiences``, a column here.
+    """The attempts of all runs that are like this one but for the number of their experiences.
 
-    Which planners, assists and problems they measured may differ too: a planner on a class is here if several
-    runs measured it, and so are the attempts with the combined memory. Empty where there is no other number.
+    Runs may also differ in what they measured. A planner on a class is here if runs with several numbers of
+    experiences measured it, and so is the combined memory.
+
+    Args:
+        data: the data folder.
+        settings: those of the run.
+        attempts: the attempts of the run.
+
+    Returns:
+        attempts, with the column ``experiences``; none if all runs have the same number.
+
     """
     own = run_folder(data, settings)
-    places: dict[int, Path] = {}
+    results: dict[int, Path] = {}  # by number of experiences
     for run in open_data_folder(data).runs():
         if run.path == own.path or not (is_there(run.settings) and is_there(run.results)):
             continue
         try:
-            asked = recorded_settings(run)
+            other = recorded_settings(run)
         except StorageError:  # of another version, or edited
             continue
-        may_differ = {name: getattr(settings, name) for name in (*MEASURED, "experiences")}
-        if replace(asked, **may_differ) == settings and asked.experiences != settings.experiences:
-            places.setdefault(asked.experiences, run.results)
-    if not places:
+        may_differ = {name: getattr(settings, name) for name in MAY_DIFFER}
+        if replace(other, **may_differ) == settings and other.experiences != settings.experiences:
+            results.setdefault(other.experiences, run.results)
+    if not results:
         return pd.DataFrame()
-    tables = {count: read_attempts(place, NOT_NEEDED) for count, place in places.items()}
-    others = pd.concat([table[_MEASURED_BY].drop_duplicates() for table in tables.values()])
-    known = pd.MultiIndex.from_frame(others.drop_duplicates())
-    tables[settings.experiences] = attempts[pd.MultiIndex.from_frame(attempts[_MEASURED_BY]).isin(known)]
+    tables = {count: read_attempts(path, NOT_NEEDED) for count, path in results.items()}
+    by_others = pd.concat([table[MEASURED_ON].drop_duplicates() for table in tables.values()])
+    shared = pd.MultiIndex.from_frame(by_others.drop_duplicates())
+    tables[settings.experiences] = attempts[pd.MultiIndex.from_frame(attempts[MEASURED_ON]).isin(shared)]
     rows = pd.concat(
         [table.assign(experiences=count) for count, table in sorted(tables.items())], ignore_index=True
     )
     combined = rows["memory"] == COMBINED
     if rows.loc[combined, "experiences"].nunique() < 2:
         rows = rows[~combined]
-    measured = rows.groupby(_MEASURED_BY)["experiences"].transform("nunique")
+    measured = rows.groupby(MEASURED_ON)["experiences"].transform("nunique")
     return rows[measured > 1]
 
 
 def report_retrieval(data: str, settings: RunSettings) -> pd.DataFrame:
-    """Write the table and the chart of what the memories recall; gives the table."""
+    """Write the table and the chart of what the memories recall, and return the table."""
     run = run_folder(data, settings)
     curve = retrieval_curve(_recall_rows(data, settings))
     retrieval = summarise_retrieval(curve)
@@ -155,7 +153,7 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
 
 
 def show(report: Report, run: RunFolder) -> None:
-    """Print the tables, and how the stages went."""
+    """Print the tables, and how long each stage took."""
     console().print(summary_table(report.summary))
     show_retrieval(report.retrieval)
     console().print(stages_table(stage_cells(stages_of(run))))
@@ -167,12 +165,12 @@ def show_retrieval(retrieval: pd.DataFrame) -> None:
 
 
 def show_sweep(chunks: Iterable[Chunk]) -> None:
-    """Print what the variants of a sweep came to."""
+    """Print how well each variant of a sweep ranks."""
     console().print(sweep_table(sweep_rows(chunks)))
 
 
 def console() -> Console:
-    """Where tables are printed: as wide as the terminal, or as tables are without one."""
+    """The console that tables are printed on, as wide as the terminal if there is one."""
     return Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
 
 

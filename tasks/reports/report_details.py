@@ -1,4 +1,4 @@
-"""A run's report as one page: which pictures it shows, and what it says of how the run was made."""
+"""The page of a run's report: which pictures it shows, and what it says about how the run was made."""
 
 from __future__ import annotations
 
@@ -42,7 +42,15 @@ def page_of(
 ) -> str:
     """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from.
 
-    ``made_by``: the hosts and the commits that made rows.
+    Args:
+        run: the run's folder.
+        settings: those of the run.
+        attempts: the benchmark's attempts.
+        summary: planning times, as ``summarise`` gives them.
+        retrieval: what the memories recall, as ``summarise_retrieval`` gives it.
+        claims: the paper's claims, with a verdict each.
+        made_by: "host" and "commit", and all that the rows say of them.
+
     """
     problems = attempts["problem_id"].nunique()
     return page(
@@ -59,17 +67,17 @@ def page_of(
 
 
 def _pictures(run: RunFolder) -> list[Picture]:
-    """Every figure once, as PNG or SVG, whichever is smaller."""
+    """Every figure once, as the smaller one of PNG and SVG."""
     smaller: dict[str, Path] = {}
     drawn = [fetch(path) for path in files_in(run.figures, "*.[ps][nv]g")]
     for path in sorted(drawn, key=lambda path: path.stat().st_size):
         smaller.setdefault(path.stem, path)
-    return [Picture(smaller[name], CAPTIONS.get(name, _words(name))) for name in sorted(smaller, key=_place)]
+    return [Picture(smaller[name], CAPTIONS.get(name, _words(name))) for name in sorted(smaller, key=_order)]
 
 
-def _place(name: str) -> tuple[int, str]:
-    known = list(CAPTIONS)
-    return (known.index(name) if name in known else len(known), name)
+def _order(name: str) -> tuple[int, str]:
+    names = list(CAPTIONS)
+    return (names.index(name) if name in names else len(names), name)
 
 
 def _words(name: str) -> str:
@@ -83,7 +91,7 @@ def _made(
 ) -> dict[str, dict[str, str]]:
     """Where the rows come from: host and commit of the rows themselves, settings, stages, versions."""
     records = stages_of(run)
-    rows = {name: ", ".join(known) or "unknown" for name, known in made_by.items()}
+    rows = {name: ", ".join(values) or "unknown" for name, values in made_by.items()}
     measured = next((each for each in reversed(records) if each["stage"] == "benchmark"), None)
     of_machine = {name: str(measured[name]) for name in ("processor", "system")} if measured else {}
     stages = {

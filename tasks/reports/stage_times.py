@@ -1,4 +1,4 @@
-"""How long each stage of a run took, when, on which machine and with which versions: ``stages.json``."""
+"""When and where each stage of a run was done, how long it took, and with which versions: ``stages.json``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PACKAGES: Final = (
 
 
 def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, str], None]:
-    """Wrap a stage so that each time it ends, a record of it is added to its run's folder."""
+    """Wrap the flow of a stage so that a record is added to the run's folder each time the flow ends."""
 
     @functools.wraps(stage)
     def wrapped(settings: RunSettings, data: str) -> None:
@@ -48,19 +48,19 @@ def timed(stage: Callable[[RunSettings, str], None]) -> Callable[[RunSettings, s
 
 
 def stages_of(run: RunFolder) -> list[dict[str, Any]]:
-    """The records of a run's stages, oldest first; a stage that was continued has several."""
+    """The records of a run's stages, oldest first; a stage that was interrupted has several."""
     records = read_json(run.stages) if is_there(run.stages) else []
-    return [{"fan_outs": []} | record for record in records]  # older ones do not say
+    return [{"fan_outs": []} | record for record in records]  # older records lack them
 
 
 def stage_seconds(records: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """Seconds that each stage took in all."""
+    """Seconds that each stage took, summed over its records."""
     names = dict.fromkeys(record["stage"] for record in records)
     return {name: sum(each["seconds"] for each in records if each["stage"] == name) for name in names}
 
 
 def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
-    """A row of ``dashboards.report.tables.STAGE_HEADINGS`` for each stage, and for all of them."""
+    """A row of ``dashboards.report.tables.STAGE_HEADINGS`` for each stage, and one for all of them."""
     seconds = stage_seconds(records)
     of_stage = {
         name: [Load(**load) for each in records if each["stage"] == name for load in each["fan_outs"]]
@@ -72,7 +72,7 @@ def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
 
 
 def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
-    """Dashes where no chunk was to be done."""
+    """The row of one stage; dashes if it did no chunk."""
     if load is None:
         return [name, f"{seconds:,.1f}", *[NOTHING] * 5]
     megabytes = [f"{size / 1e6:,.0f}" for size in (load.first_bytes, load.last_bytes)]
@@ -82,7 +82,7 @@ def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
 
 @functools.cache
 def machine() -> dict[str, Any]:
-    """What the measured times depend on: host, processor, operating system, versions, commit."""
+    """Everything that measured times depend on: host, processor, operating system, versions, commit."""
     return {
         "host": platform.node(),
         "processor": _processor(),
@@ -93,7 +93,7 @@ def machine() -> dict[str, Any]:
 
 
 def _processor() -> str:
-    """Model and number of cores."""
+    """The number of cores, and their model."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

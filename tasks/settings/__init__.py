@@ -1,1 +1,1 @@
-"""What a run is asked to do, checked once; and what may not be shown."""
+"""The settings of a run, and checks of what commands are given."""

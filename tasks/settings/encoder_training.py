@@ -12,9 +12,9 @@ _DEFAULT = TrainingSettings()
 
 @dataclass(frozen=True)
 class Learning:
-    """What can be chosen of ``TrainingSettings``, and how many seeds are trained with."""
+    """The fields of ``TrainingSettings`` that a user can choose, and the number of training seeds."""
 
-    seeds: int = 1  # encoders trained a memory; the one best on validation problems is kept
+    seeds: int = 1  # encoders trained for a memory; the best on validation problems is kept
     patience: int = _DEFAULT.patience
     learning_rate: float = _DEFAULT.learning_rate
     origin_weight: float = _DEFAULT.origin_weight
@@ -25,14 +25,14 @@ class Learning:
     dimensions: int = _DEFAULT.architecture.dimensions
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))  # lists, where they come from JSON
+        object.__setattr__(self, "channels", tuple(self.channels))  # lists if they come from JSON
         object.__setattr__(self, "hidden", tuple(self.hidden))
         if self.seeds < 1:
             raise ValueError(f"{self.seeds} training seeds: give 1 or more.")
         self.settings(_DEFAULT.objective, 1, 0)
 
     def settings(self, objective: str, epochs: int, seed: int) -> TrainingSettings:
-        """All settings of one training; ValueError with one line where it is impossible."""
+        """All settings of one training; ValueError with one line if they are impossible."""
         return TrainingSettings(
             objective=objective,
             epochs=epochs,

@@ -12,10 +12,10 @@ STEPS: Final = 5  # memories, the largest being the run's own
 
 
 def runs_of_continual(settings: RunSettings) -> list[RunSettings]:
-    """The run with a fifth, two fifths ... of its experiences, as much of it as ``continual`` asks for.
+    """The run with a fifth, two fifths … of its experiences, chosen from as small a share of its candidates.
 
-    They are chosen of proportionally fewer candidates. None where ``continual`` is ``none``, or asks for GUST
-    on curves and the run has not both; UsageError where there are too few experiences.
+    There are none if ``continual`` is ``none``, or if it is ``paper``, which measures GUST on curves, and the
+    run has not both. UsageError if there are too few experiences.
     """
     if settings.continual == "none":
         return []

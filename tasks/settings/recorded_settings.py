@@ -1,4 +1,4 @@
-"""What a run was asked for, read again from its folder and not believed if somebody has edited it."""
+"""The settings in the folder of a run, which are refused if somebody has edited them."""
 
 from __future__ import annotations
 

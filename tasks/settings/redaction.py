@@ -1,4 +1,4 @@
-"""What is secret in a text goes out of it before anybody sees, logs or stores it."""
+"""Secrets are taken out of a text before it is shown, logged or stored."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ _IN_ADDRESS: Final = re.compile(r"(?<=://)[^/\s\"']*@")  # scheme://user:passwor
 
 
 def redacted(text: str) -> str:
-    """The text with passwords in addresses, and values of secret environment variables, as ``***``."""
+    """The text, with ``***`` for passwords in addresses and for values of secret environment variables."""
     text = _IN_ADDRESS.sub(f"{HIDDEN}@", text)
-    for secret in sorted(set(_secrets()), key=len, reverse=True):  # the whole before its part
+    for secret in sorted(set(_secrets()), key=len, reverse=True):  # a secret before one that is part of it
         text = text.replace(secret, HIDDEN)
     return text
 
 
 def _secrets() -> Iterator[str]:
-    """Values of secret variables, what stands behind ``user:`` in them and in addresses, and their Base64."""
+    """Values of secret variables, the part after ``user:`` of them and of addresses, and their Base64."""
     for name, value in os.environ.items():
         address = _IN_ADDRESS.search(value)
         if _NAMES.search(name):
-            found = [value, value.partition(":")[2], base64.b64encode(value.encode()).decode()]
+            secrets = [value, value.partition(":")[2], base64.b64encode(value.encode()).decode()]
         elif address:
-            found = [address.group()[:-1].partition(":")[2]]
+            secrets = [address.group()[:-1].partition(":")[2]]
         else:
             continue
-        yield from (each for each in found if len(each) >= SHORTEST)
+        yield from (each for each in secrets if len(each) >= SHORTEST)

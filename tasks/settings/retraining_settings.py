@@ -10,10 +10,10 @@ SEEDS_APART: Final = 10**9  # between the seeds of two retrainings' held-back pr
 
 
 class Champion(NamedTuple):
-    """The memory that is in use, by what it is rather than by where the registry keeps it."""
+    """The memory in use, identified by its content rather than by its place in the registry."""
 
     memory: str  # a class, or the combined memory
-    run: str  # that made it; empty where nobody says
+    run: str  # that made it; empty if that is not recorded
     digest: str  # of the archive
 
 
@@ -21,29 +21,29 @@ class Champion(NamedTuple):
 class Retraining:
     """A run that begins from champions: their encoders, and what was hallucinated around their plans."""
 
-    number: int  # from 1; problems to judge by follow from it
+    number: int  # from 1; the problems to judge by follow from it
     champions: tuple[Champion, ...]
 
     def __post_init__(self) -> None:
-        known = tuple(Champion(*champion) for champion in self.champions)  # lists, where they come from JSON
-        object.__setattr__(self, "champions", known)
+        champions = tuple(Champion(*champion) for champion in self.champions)  # lists if they come from JSON
+        object.__setattr__(self, "champions", champions)
 
     def champion(self, memory: str) -> Champion | None:
-        """The champion of a memory; None where it has none."""
+        """The champion of a memory; None if it has none."""
         return next((each for each in self.champions if each.memory == memory), None)
 
 
 def number_of(retraining: Retraining | None) -> int:
-    """The number of a retraining, 0 for the run that first champions come from."""
+    """The number of a retraining; 0 for a run that makes first champions."""
     return 0 if retraining is None else retraining.number
 
 
 def held_back_seed(seed: int, number: int) -> int:
-    """The seed of the problems that a retraining is judged by: no run's, and no other retraining's."""
+    """The seed of the problems by which a retraining is judged; no run and no other retraining has it."""
     return seed + SEEDS_APART * (number + 1)
 
 
 def champions_of(memories: Sequence[str], retraining: Retraining | None) -> list[Champion]:
-    """The champions of some memories, those that have one."""
-    found = [retraining.champion(name) for name in memories] if retraining else []
-    return [each for each in found if each is not None]
+    """The champions of those memories that have one."""
+    champions = [retraining.champion(name) for name in memories] if retraining else []
+    return [each for each in champions if each is not None]

@@ -72,12 +72,12 @@ class RunSettings:
     difficulty: str
     seed: int
     objective: Objective
-    experiences: int  # solved problems kept a class
+    experiences: int  # solved problems that are kept of a class
     problems_per_experience: int  # hallucinated for each plan that is taught, its own problem included
-    test_problems: int  # unseen problems a class
+    test_problems: int  # unseen problems of a class
     collector: str  # the planner whose plans are kept
     planners: tuple[str, ...]  # those that are measured
-    assists: tuple[Assist, ...]  # how, besides without memory
+    assists: tuple[Assist, ...]  # that they are measured with, besides none
     epochs: int
     combined: bool  # also one memory for all classes together
     strict: bool = False  # a bad world stops the run instead of being skipped
@@ -85,15 +85,14 @@ class RunSettings:
     optimised: bool = False  # collected plans are made shorter and clearer before they are kept
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
-    candidates: int = 0  # solved problems a class that experiences are chosen of; few: the first are kept
-
-    learned: str = ""  # snapshot of what was learned on the job, and a digest of it; more candidates
+    candidates: int = 0  # solved problems of a class to choose experiences from; few: the first are kept
+    learned: str = ""  # a snapshot of what was learned on the job: more candidates
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
-    retraining: Retraining | None = None  # what it begins from, where it is one
+    retraining: Retraining | None = None  # what it begins from, if it is one
 
     @property
     def wanted(self) -> int:
-        """Solved problems a class to collect."""
+        """How many solved problems of each class to collect."""
         return max(self.candidates, self.experiences)
 
     @property
@@ -116,7 +115,7 @@ class RunSettings:
 
     @property
     def taught(self) -> int:
-        """How many experiences of a class problems are hallucinated for: the first, that encoders learn."""
+        """How many experiences of a class, the first ones, encoders are taught."""
         return min(self.experiences, TAUGHT)
 
     @property
@@ -127,21 +126,21 @@ class RunSettings:
     @property
     def digest(self) -> str:
         """Eight hexadecimal digits that tell settings with different results apart."""
-        asked = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
-        del asked["strict"], asked["continual"]
-        for name, default in _LATER.items():  # runs with these were made, and named, before there was another
-            if asked.get(name) == default:
-                del asked[name]
-        return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()[:8]
+        values = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
+        del values["strict"], values["continual"]
+        for name, default in _LATER.items():  # so that runs from before a field was added keep their names
+            if values.get(name) == default:
+                del values[name]
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
 
     @property
     def run_name(self) -> str:
         """Name of the run's folder and of its parent run in MLflow, like ``laptop-labels-3f2a91c0``.
 
-        Of another vehicle than the car it says the name, like ``laptop-labels-car-1-trailer-81d5c2e7``.
+        It names the vehicle unless that is the car, like ``laptop-labels-car-1-trailer-81d5c2e7``.
         """
-        driven = [] if self.vehicle == DEFAULT_VEHICLE else [self.vehicle]
-        return "-".join([self.preset, self.objective, *driven, self.digest])
+        vehicle = [] if self.vehicle == DEFAULT_VEHICLE else [self.vehicle]
+        return "-".join([self.preset, self.objective, *vehicle, self.digest])
 
     def to_json(self) -> str:
         """The settings as one JSON object; ``from_json`` gives them back."""
@@ -149,11 +148,11 @@ class RunSettings:
 
     @classmethod
     def from_json(cls, text: str) -> RunSettings:
-        """The settings that ``to_json`` wrote; ValueError with one line when they are of another version."""
+        """The settings that ``to_json`` wrote; ValueError with one line if they are of another version."""
         values: dict[str, Any] = _LATER | json.loads(text)
-        known = {field.name for field in fields(cls)}
-        if set(values) != known:
-            odd = ", ".join(sorted(set(values) ^ known))
+        names = {field.name for field in fields(cls)}
+        if set(values) != names:
+            odd = ", ".join(sorted(set(values) ^ names))
             raise ValueError(
                 f"Settings of another version: {odd} missing or unknown. Start a new data folder."
             )
@@ -169,5 +168,5 @@ class RunSettings:
 
 def world_class(path: str | Path) -> str:
     """The class name of worlds or of a map: the folder's name, or the file's without its ending."""
-    place = Path(path).resolve()
-    return place.name if place.is_dir() else place.stem
+    path = Path(path).resolve()
+    return path.name if path.is_dir() else path.stem

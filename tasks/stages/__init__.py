@@ -1,1 +1,1 @@
-"""One file a stage: its chunks, and how one of them is done."""
+"""The stages of a run, one or two closely related ones in a file."""
