@@ -58,8 +58,8 @@ def undisturbed(problems: Path) -> pd.DataFrame:
 def test_parts_are_so_small_that_improving_one_takes_seconds(
     problems: Path, tmp_path: Path, seconds: float, size: int
 ) -> None:
-    way = WAY._replace(improve_seconds=seconds)
-    pieces = parts.parts_of(parts.Asked(problems, tmp_path / "rows.parquet", way, ""))
+    settings = ASSISTANT._replace(improve_seconds=seconds)
+    pieces = parts.parts_of(parts.SolveRequest(problems, tmp_path / "rows.parquet", settings, ""))
     assert pieces[0].piece.count == size
 
 
