@@ -35,14 +35,9 @@ def experience_rows(recalls: pd.DataFrame) -> pd.DataFrame:
         hit = by_problem.mean()
         rows.append(
             {
-                "panel": panel,
-                "plans": free.shape[1],
-                "problems": len(by_problem),
-                "seeds": of_class["training_seed"].nunique(),
-                "hit": hit,
-                "low": max(0.0, hit - error),
-                "high": min(1.0, hit + error),
-                "oracle": free.any(axis=1).mean(),
+                "panel": panel, "plans": free.shape[1], "problems": len(by_problem),
+                "seeds": of_class["training_seed"].nunique(), "oracle": free.any(axis=1).mean(),
+                "hit": hit, "low": max(0.0, hit - error), "high": min(1.0, hit + error),
             }
-        )
+        )  # fmt: skip
     return pd.DataFrame(rows)

@@ -58,18 +58,13 @@ class Drift:
 
     def to_row(self) -> dict[str, Any]:
         """The row of ``storage.tables.schemas.WATCHED``, without its time."""
+        now, then = self.now, self.then
         return {
-            "memory": self.memory,
-            "configuration": self.configuration,
-            "problems": self.now.problems,
-            "hits": self.now.hits,
-            "mean_ms": self.now.mean_ms,
-            "benchmark_problems": self.then.problems,
-            "benchmark_hits": self.then.hits,
-            "benchmark_mean_ms": self.then.mean_ms,
-            "p_value": self.p_value,
-            "has_fallen": self.has_fallen,
-        }
+            "memory": self.memory, "configuration": self.configuration,
+            "problems": now.problems, "hits": now.hits, "mean_ms": now.mean_ms,
+            "benchmark_problems": then.problems, "benchmark_hits": then.hits,
+            "benchmark_mean_ms": then.mean_ms, "p_value": self.p_value, "has_fallen": self.has_fallen,
+        }  # fmt: skip
 
     def __str__(self) -> str:
         verdict = "fallen" if self.has_fallen else "as it was"

@@ -50,11 +50,10 @@ def write_plan(path: Path, record: PlanRecord) -> None:
     write_json(
         path,
         {
-            "problem_id": record.problem_id,
-            "status": record.status,
-            "source": record.source,
-            "planner": record.planner,
-            "assist": record.assist,
+            **{
+                name: getattr(record, name)
+                for name in ("problem_id", "status", "source", "planner", "assist")
+            },
             "vehicle": name_of(record.vehicle),
             **scale,
             "dt": None if plan is None else plan.dt,
