@@ -1,4 +1,4 @@
-"""The colours of figures and pages, each said once; Okabe and Ito's are told apart with any colour vision."""
+"""The colours of figures and pages, in one place; any colour vision tells Okabe and Ito's apart."""
 
 from __future__ import annotations
 

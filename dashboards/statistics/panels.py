@@ -175,17 +175,17 @@ COLUMNS: Final = (
 
 def _panel(name: str, rows: pd.DataFrame, configurations: dict[str, Configuration]) -> Panel:
     """Give each row its cell; problems are sorted, so that the order of the rows cannot change a result."""
-    known = list(configurations.values())
+    in_order = list(configurations.values())
     planners = ranked(rows["planner"].unique(), PLANNERS)
     numbers = {
         each: planners.index(each) if each in planners else -1 for each in rows["planner"].cat.categories
     }
     planner = rows["planner"].cat.rename_categories(numbers).astype(int).to_numpy()
-    pair = planner * len(known) + rows["configuration"].cat.codes.to_numpy(int)
+    pair = planner * len(in_order) + rows["configuration"].cat.codes.to_numpy(int)
     attempted, column = np.unique(pair, return_inverse=True)
     problem, problems = pd.factorize(rows["problem_id"], sort=True)
     cells = problem * len(attempted) + column
-    columns = [(planners[i // len(known)], known[i % len(known)]) for i in attempted.tolist()]
+    columns = [(planners[i // len(in_order)], in_order[i % len(in_order)]) for i in attempted.tolist()]
     return Panel(name, rows.assign(cell=cells), len(problems), columns)
 
 

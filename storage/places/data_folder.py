@@ -145,7 +145,7 @@ def open_data_folder(path: Path | str) -> DataFolder:
 
 @functools.lru_cache(maxsize=8)
 def _open_remote(folder: Path) -> DataFolder:
-    """The same of a folder in object storage, by its copy here; asked once a process."""
+    """Open a folder in object storage, by its copy here; storage is asked once a process."""
     try:
         folder.mkdir(OWNER_ONLY, parents=True, exist_ok=True)
     except OSError as error:
@@ -162,8 +162,8 @@ def _open_remote(folder: Path) -> DataFolder:
 
 
 def _check_layout(folder: Path) -> None:
-    found = read_json(folder / MARK)
-    version = found.get("layout") if isinstance(found, dict) else None
+    mark = read_json(folder / MARK)
+    version = mark.get("layout") if isinstance(mark, dict) else None
     if version != LAYOUT:
         raise StorageError(
             f"{shown(folder)} has data layout {version!r}, this program reads layout {LAYOUT}; "

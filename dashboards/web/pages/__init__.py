@@ -1,1 +1,1 @@
-"""One file a page: what the address asked for in, a ``Page`` out."""
+"""The pages, one a file, and the charts of those that have many."""

@@ -47,9 +47,9 @@ def problem(data: DataReader, params: Parameters) -> Page:
     run = data.run(params.run)
     chosen = selection(data, params)
     attempts = chosen.attempts.rows
-    found = _row(attempts, params)
-    row = found.to_dict()
-    position = _position(chosen.rows, found.name, params.number("place", 0, 10**9, 0))
+    named = _row(attempts, params)
+    row = named.to_dict()
+    position = _position(chosen.rows, named.name, params.number("place", 0, 10**9, 0))
     replayed, drawn = _replayed(data, run, row, chosen.attempts.configurations[row["configuration"]])
     vehicle, plan = data.vehicle(run), replayed.attempt.plan
     show_tree, show_roadmap = params.flag("tree"), params.flag("roadmap")
@@ -69,7 +69,7 @@ def problem(data: DataReader, params: Parameters) -> Page:
         "after": _beside(params, chosen, position + 1) if position >= 0 else "",
         "table": link(f"{base}/problems", {**chosen.values, "page": page}),
         "where": f"{position + 1:,} of {len(chosen.rows):,} in this selection" if position >= 0 else "",
-        "others": _others(params.run, same, found.name),
+        "others": _others(params.run, same, named.name),
         "try_it": link(f"{base}/try", names | {"planner": row["planner"]}),
         "neighbours": link(f"{base}/memory", names),
         "faults": chosen.attempts.faults,
