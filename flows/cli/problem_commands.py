@@ -1,4 +1,4 @@
-"""Problems of one's own: one planned for, one optimised, very many solved."""
+"""Commands for the user's own problems: plan for one, optimise one, solve many."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def plan(
     learn: Path | None = None,
     options: SolveOptions = _USUAL,
 ) -> None:
-    """Plan for one problem: one plan, one picture.
+    """Plan for one problem; write the plan and a picture.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ def plan(
     assist
         How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
     improve_seconds
-        Keep improving the plan for this long; 0: the first plan is the answer.
+        Seconds to improve the plan; 0 keeps the first plan.
     explain
-        Say, and mark in the picture, what was recalled, where it collides and what was done then.
+        Print and draw which plans were recalled, where they collide and how they were used.
     out
         Where to write the plan, .json.
     picture
         Where to draw it, .png, .svg or .pdf.
     learn
-        Data folder that is to remember the plan where it is new.
+        Data folder that remembers the plan if it is new.
     options
         How the problem is solved.
 
@@ -66,7 +66,7 @@ def optimise(
     out: Path | None = None,
     picture: Path | None = None,
 ) -> None:
-    """Optimise a plan for one problem, from a plan that may be blocked, a planner's, or a straight line.
+    """Optimise a plan for one problem, from a plan that may collide, a planner's plan, or a straight line.
 
     Parameters
     ----------
@@ -75,11 +75,11 @@ def optimise(
     plan
         Begin with the plan of this .json file, made for this problem or another.
     planner
-        Begin with the plan of rrt, gust or follow; follow where no beginning is given.
+        Begin with the plan of rrt, gust or follow; default follow.
     straight
         Begin with a straight line from start to goal.
     clearance_weight
-        How much a plan should keep away from obstacles rather than be short in time.
+        Weight of the distance to obstacles against the duration of the plan.
     vehicle
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
@@ -87,13 +87,13 @@ def optimise(
     out
         Where to write the plan, .json.
     picture
-        Where to draw guess and plan, .png, .svg or .pdf.
+        Where to draw the guess and the plan, .png, .svg or .pdf.
 
     """
-    from tasks.requests.optimise_one import beginning, optimise_one
+    from tasks.requests.optimise_one import initial_guess, optimise_one
 
-    begin = beginning(plan, planner, straight, vehicle, seed)
-    optimise_one(begin, problem, clearance_weight, out, picture)
+    initial = initial_guess(plan, planner, straight, vehicle, seed)
+    optimise_one(initial, problem, clearance_weight, out, picture)
 
 
 def solve(
@@ -107,7 +107,7 @@ def solve(
     workers: int | None = None,
     options: SolveOptions = _USUAL,
 ) -> None:
-    """Solve many problems of one's own: one attempt row each. The same command goes on where it was stopped.
+    """Solve many problems, and write one row each. A repeated command continues where it stopped.
 
     Parameters
     ----------
@@ -116,15 +116,15 @@ def solve(
     assist
         How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
     improve_seconds
-        Keep improving the plan for this long; 0: the first plan is the answer.
+        Seconds to improve the plan; 0 keeps the first plan.
     out
         Where to write the rows, .parquet.
     plans
-        Folder for the plans, one .json a problem.
+        Folder for the plans, one .json for each problem.
     learn
-        Data folder that is to remember what was newly solved.
+        Data folder that remembers the newly solved problems.
     workers
-        Worker processes; default one a core. A few problems are solved without.
+        Worker processes; default one for each core. A few problems are solved without.
     options
         How the problems are solved.
 

@@ -23,11 +23,11 @@ class Options:
     preset
         Size of the run: smoke (a minute), laptop (minutes) or paper (an hour).
     classes
-        Generated problem classes; all of them by default, none beside --worlds.
+        Generated problem classes; default all of them, or none if --worlds is given.
     worlds
-        A folder of worlds, or a map to cut problems from: one more class. Can be given several times.
+        A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
     difficulty
-        Of the generated classes: easy, standard or hard.
+        Difficulty of the generated classes: easy, standard or hard.
     vehicle
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
@@ -37,50 +37,50 @@ class Options:
     data
         Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
     workers
-        Worker processes; default one a core.
+        Worker processes; default one for each core.
     scheduler
-        Address of a Dask scheduler to use instead, like tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
+        Dask scheduler to use instead, such as tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
     strict
         Stop at a bad world instead of skipping it.
     continual
-        Measure with 20, 40 ... % of the experiences too: none, paper (GUST on curves) or all.
+        Also measure with 20, 40 ... % of the experiences: none, paper (GUST on curves) or all.
     optimised
-        Make collected plans shorter and clearer before they are kept: about a second each.
+        Optimise collected plans, for length and clearance, before they are kept: about a second each.
     experiences
-        Solved problems kept a class; default by preset, as the next four.
+        Solved problems to keep of each class; the preset gives the default, as for the next four.
     candidates
-        Solved problems a class of which they are chosen; as many as experiences: the first are kept.
+        Solved problems of each class to choose them from; if as many as experiences, the first are kept.
     problems_per_experience
-        Problems hallucinated for each of them.
+        Problems hallucinated for each experience.
     test_problems
-        New problems a class to measure with.
+        New problems of each class to measure with.
     epochs
-        Epochs of training, at most.
+        The most epochs of a training.
     training_seeds
-        Encoders trained a memory, each from a seed of its own; the best on validation problems is kept.
+        Encoders trained for each memory, each with its own seed; the best on validation problems is kept.
     patience
         Epochs without improvement after which a training ends.
     learning_rate
-        The highest of its schedule.
+        The highest learning rate of the schedule.
     origin_weight
-        Objective labels: how much, at first, the plan a problem was made for should come before others that
-        are free; falls to a tenth.
+        Objective labels: how much the plan that a problem was made from should rank before other free plans,
+        at first; it falls to a tenth.
     margin
-        Objective triplet: how much farther a dissimilar problem should be than a similar one.
+        Objective triplet: how much farther away a dissimilar problem should be than a similar one.
     semi_hard
         Objective triplet: learn only from triplets within the margin.
     channels
         Widths of the encoder's convolutions.
     hidden
-        Widths of its fully connected layers.
+        Widths of the encoder's fully connected layers.
     dimensions
-        Of the embedding.
+        Dimensions of the embedding.
     learned
-        Choose among what --learn has added to the data folder too: a name, of what is there when it is first
-        used. The same name means the same experiences from then on.
+        Also use the experiences that --learn has added to the data folder. The name freezes those that exist
+        when it is first used; later the same name means the same experiences.
     hallucination
-        Methods that make problems around a plan, with weights, like rearrange=0.7 minimal=0.3; of rearrange,
-        maximal, minimal and learned.
+        Methods that make problems around a plan, with weights, such as rearrange=0.7 minimal=0.3; the methods
+        are rearrange, maximal, minimal and learned.
 
     """
 
@@ -123,17 +123,17 @@ class Options:
 
     @property
     def learning(self) -> dict[str, Any]:
-        """What was asked for of the fields of ``tasks.settings.encoder_training.Learning``."""
-        asked = {name: getattr(self, name) for name in _LEARNING} | {"seeds": self.training_seeds}
-        return {name: value for name, value in asked.items() if value is not None}
+        """The given fields of ``tasks.settings.encoder_training.Learning``."""
+        options = {name: getattr(self, name) for name in _LEARNING} | {"seeds": self.training_seeds}
+        return {name: value for name, value in options.items() if value is not None}
 
 
-def worker_count(asked: int | None) -> int:
-    """How many worker processes; UsageError for fewer than one."""
+def worker_count(workers: int | None) -> int:
+    """The number of worker processes; None means one for each core. Raises UsageError if it is below 1."""
     from dask.system import CPU_COUNT  # of this process: with its affinity and its control group
 
     from tasks.settings.checks import check_count
 
-    workers = int(CPU_COUNT) if asked is None else asked
+    workers = int(CPU_COUNT) if workers is None else workers
     check_count("workers", workers)
     return workers

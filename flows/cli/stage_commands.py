@@ -1,4 +1,4 @@
-"""A run, whole or by one stage: each takes the same options."""
+"""Commands for a run or one of its stages; all take the same options."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NO_OPTIONS: Final = Options()
 
 
 def run(options: Options = NO_OPTIONS) -> None:
-    """The main job: every stage, figures, MLflow runs, and the table of how much faster planning became."""
+    """Do all stages, draw figures, log to MLflow, and print how much faster planning became."""
     with _session("run", options) as (settings, data):
         from flows.run import run as flow
 
@@ -23,7 +23,7 @@ def run(options: Options = NO_OPTIONS) -> None:
 
 
 def collect(options: Options = NO_OPTIONS) -> None:
-    """Draw problems, solve them, and keep the N of each class whose plans are of most use."""
+    """Draw problems, solve them, and keep the most useful plans of each class."""
     with _session("collect", options) as (settings, data):
         from flows.collect import collect as flow
 
@@ -31,7 +31,7 @@ def collect(options: Options = NO_OPTIONS) -> None:
 
 
 def hallucinate(options: Options = NO_OPTIONS) -> None:
-    """Make many problems that each collected plan solves."""
+    """Make many problems for each collected plan, all solved by it."""
     with _session("hallucinate", options) as (settings, data):
         from flows.hallucinate import hallucinate as flow
 
@@ -47,7 +47,7 @@ def train(options: Options = NO_OPTIONS) -> None:
 
 
 def build_memory(options: Options = NO_OPTIONS) -> None:
-    """Join encoder, centroids and plans into one archive a memory."""
+    """Join encoder, centroids and plans into one archive for each memory."""
     with _session("build_memory", options) as (settings, data):
         from flows.build_memory import build_memory as flow
 
@@ -55,7 +55,7 @@ def build_memory(options: Options = NO_OPTIONS) -> None:
 
 
 def sweep(options: Options = NO_OPTIONS) -> None:
-    """Compare sizes of the encoder and learning rates on the hallucinated problems."""
+    """Compare encoder sizes and learning rates on the hallucinated problems."""
     with _session("sweep", options) as (settings, data):
         from flows.sweep import sweep as flow
 
@@ -63,7 +63,7 @@ def sweep(options: Options = NO_OPTIONS) -> None:
 
 
 def experience_curve(options: Options = NO_OPTIONS) -> None:
-    """Make memories of 20, 40 ... 100 % of the experiences, and compare what they recall."""
+    """Make memories of 20, 40 ... 100 % of the experiences, and compare how well they recall."""
     with _session("experience_curve", options) as (settings, data):
         from flows.experience_curve import experience_curve as flow
 
@@ -71,7 +71,7 @@ def experience_curve(options: Options = NO_OPTIONS) -> None:
 
 
 def benchmark(options: Options = NO_OPTIONS) -> None:
-    """Solve unseen problems with and without memory: one row an attempt."""
+    """Solve unseen problems with and without memory, and write one row for each attempt."""
     with _session("benchmark", options) as (settings, data):
         from flows.benchmark import benchmark as flow
 
@@ -79,7 +79,7 @@ def benchmark(options: Options = NO_OPTIONS) -> None:
 
 
 def report(options: Options = NO_OPTIONS) -> None:
-    """Tables and figures from the rows of the benchmark."""
+    """Make tables and figures from the rows of the benchmark."""
     with _session("report", options) as (settings, data):
         from flows.report import report as flow
 
@@ -87,7 +87,7 @@ def report(options: Options = NO_OPTIONS) -> None:
 
 
 def settings_of(options: Options) -> RunSettings:
-    """The settings that options ask for, but for what was learned; UsageError where there are none."""
+    """The settings of the options, without ``learned``. Raises UsageError if they are not possible."""
     from tasks.settings.presets import for_preset
 
     return for_preset(
@@ -113,7 +113,7 @@ def settings_of(options: Options) -> RunSettings:
 
 @contextmanager
 def _session(name: str, options: Options) -> Iterator[tuple[RunSettings, str]]:
-    """What the flow of that name is called with, once it may be imported."""
+    """Set up a command; yields the arguments of the flow ``name``, which may be imported from then on."""
     from tasks.session.command_session import command_session
 
     settings = settings_of(options)

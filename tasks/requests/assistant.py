@@ -1,4 +1,4 @@
-"""Solve problems of one's own: rows, plans and pictures in files."""
+"""Solve the user's own problems: ``Assistant`` plans, ``plan_one`` is the command ``plan``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tasks.settings.checks import check_known, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
-WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, a hundred that search, none of a second
+WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
 
 
 class AssistantSettings(NamedTuple):
@@ -46,7 +46,7 @@ class AssistantSettings(NamedTuple):
 
 
 class Assistant:
-    """Solves a user's own problems, with the memory of each class that turns up."""
+    """Plans with one vehicle, planner and assist; loads the memory of a class when a problem of it comes."""
 
     def __init__(
         self,
@@ -59,9 +59,28 @@ class Assistant:
         improve_seconds: float = 0.0,
         recall: str | None = None,
     ) -> None:
-        """UsageError with one line for an unknown name, a top k below 1, a missing memory.
+        """Check the settings; memories are loaded later.
 
-        StorageError: the memory lies in object storage, and cannot be fetched.
+        Parameters
+        ----------
+        planner, assist, vehicle, recall
+            Names; ``recall`` None takes the strategy that suits the memory.
+        top_k
+            How many plans to recall, at least 1.
+        memory
+            The folder of a memory or a run, or a model in MLflow; None for assists without a memory.
+        seed
+            Seed of the search, 0 or more.
+        improve_seconds
+            How long to improve a plan after it is found, in seconds.
+
+        Raises
+        ------
+        UsageError
+            A name is unknown, a number is out of range, or the assist needs a memory.
+        StorageError
+            The memory lies in object storage and cannot be fetched.
+
         """
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
@@ -76,44 +95,47 @@ class Assistant:
             raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
         self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
         self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
-        self._place = None if assist in WITHOUT_MEMORY or memory is None else _place_of(str(memory))
+        needs_memory = assist not in WITHOUT_MEMORY and memory is not None
+        self._address = _local_address(str(memory)) if needs_memory else None
         self._memories: dict[str, Memory] = {}
         self.recall = recall
         self._workspace = Workspace()
 
     def memory_of(self, class_name: str) -> Memory | None:
-        """The memory for problems of a class: its own, else the combined, else the only one there is."""
-        if self._place is None:
+        """The memory for problems of a class: that of the class, else the combined, else the only one."""
+        if self._address is None:
             return None
-        place = self._place if is_model_uri(self._place) else _folder_of(class_name, Path(self._place))
-        if place not in self._memories:
-            self._memories[place] = load_from(place, self.vehicle)
-        return self._memories[place]
+        address = self._address
+        if not is_model_uri(address):
+            address = _folder_of(class_name, Path(address))
+        if address not in self._memories:
+            self._memories[address] = load_from(address, self.vehicle)
+        return self._memories[address]
 
     def warm_up(self, problem: Problem) -> None:
-        """Attempt a problem so that nothing is cold when the time counts: once, then while that is quick.
+        """Attempt a problem at least once, and for ``WARM_SECONDS`` if it is quick, so that caches are warm.
 
-        In the benchmark an attempt stands between others at the same problem; so it does here, between
-        searches, all of them from other seeds, or a processor would know the one attempt by heart.
+        As in the benchmark, each attempt follows a search of the same problem. The seeds differ from the one
+        that is timed later, because a processor would learn to predict the branches of one repeated attempt.
         """
         canonical, _ = to_canonical(problem)
-        last = perf_counter() + WARM_SECONDS
+        deadline = perf_counter() + WARM_SECONDS
         seed = self.seed
         while True:
-            others = [self.attempt(canonical, assist, seed + 1) for assist in (None, UNASSISTED.name)]
-            if perf_counter() + sum(each.planning_seconds for each in others) > last:
+            attempts = [self.attempt(canonical, assist, seed + 1) for assist in (None, UNASSISTED.name)]
+            if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
                 break
             seed += 1
 
     def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:
-        """An attempt at a canonical problem, with another assist or seed if one is named; not checked."""
-        use = assist or self.assist
+        """Attempt a canonical problem, with another assist or seed if given; the plan is not checked."""
+        assist = assist or self.assist
         return solve(
             canonical,
             self.planner,
-            use,
+            assist,
             self.top_k,
-            None if use in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
+            None if assist in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
             self.seed if seed is None else seed,
             vehicle=self.vehicle,
             strategy=self.recall,
@@ -121,7 +143,7 @@ class Assistant:
         )
 
     def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
-        """The attempt, checked, and its plan in the frame of the problem."""
+        """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
         canonical, alignment = to_canonical(problem)
         attempt = self.attempt(canonical)
         if self.improve_seconds > 0.0:
@@ -147,10 +169,26 @@ def plan_one(
     explained: bool = False,
     learn: Path | None = None,
 ) -> None:
-    """Plan for the one problem of a file; RunError when it has another number, or no plan was found.
+    """Plan for the one problem in a file, and print a line about the plan.
 
-    ``explained``: say and draw what was recalled, where it collides and what was done then. ``learn``: the
-    data folder that the problem and its plan are added to as an experience.
+    Parameters
+    ----------
+    assistant
+        Solves the problem.
+    problem
+        The file; it must hold one problem.
+    out, drawing
+        Where to write the plan and a picture, or None.
+    explained
+        Whether to print and draw the recalled plans, where they collide and how they were used.
+    learn
+        The data folder to which the problem and its plan are added as an experience, or None.
+
+    Raises
+    ------
+    RunError
+        The file does not hold exactly one problem, or no plan was found.
+
     """
     check_picture(drawing)
     problems = read_problems(problem, assistant.vehicle)
@@ -164,35 +202,35 @@ def plan_one(
     if learn is not None:
         remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
-    told = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
+    summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
 
         with whole_file(drawing) as temporary:
-            caption = f"{assistant.planner}, {assistant.assist}: {told}"
+            caption = f"{assistant.planner}, {assistant.assist}: {summary}"
             figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     if explained:
         _explain(assistant, problems[0], attempt, recalled)
     if plan is None:
-        raise RunError(f"No plan for {problems[0].id or problem}: {told}.")
-    print(f"{told}, {problems[0].scale * plan.length_m:.1f} m, {plan.duration_s:.1f} s")
-    for what, place in (("plan", out), ("picture", drawing)):
-        if place is not None:
-            print(f"{what:8} {place}")
+        raise RunError(f"No plan for {problems[0].id or problem}: {summary}.")
+    print(f"{summary}, {problems[0].scale * plan.length_m:.1f} m, {plan.duration_s:.1f} s")
+    for label, path in (("plan", out), ("picture", drawing)):
+        if path is not None:
+            print(f"{label:8} {path}")
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
-    from tasks.requests.explain import tell  # late: tables cost a tenth of a second
+    from tasks.requests.explain import print_explanation  # late: tables cost a tenth of a second
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
-    looked_at = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
-    tell(attempt, memory, list(zip(looked_at, recalled, strict=True)), problem.scale)
+    recollected = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
+    print_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale)
 
 
 def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
-    """What is told of an attempt in a file; the plan is in the frame of the problem."""
+    """The record of an attempt for a plan file; the plan is in the frame of the problem."""
     return PlanRecord(
         problem.id,
         attempt.status,
@@ -206,18 +244,17 @@ def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: 
     )
 
 
-def _place_of(memory: str) -> str:
-    """A model's name in MLflow, or the folder of a memory or a run, fetched if it is elsewhere."""
+def _local_address(memory: str) -> str:
+    """The URI of a model in MLflow as it is, or a folder's path, fetched first if it is in object storage."""
     return memory if is_model_uri(memory) else str(folders_here(memory, "memories"))
 
 
-def _folder_of(class_name: str, place: Path) -> str:
-    """The folder of the memory for problems of a class: ``place`` itself, or one of the run's there."""
-    memories = place / "memories"
+def _folder_of(class_name: str, folder: Path) -> str:
+    """The folder of the memory for problems of a class, in a run's folder; else ``folder`` itself."""
+    memories = folder / "memories"
     candidates = [memories / class_name, memories / COMBINED, *memories.glob("[!.]*/")]
-    found = [folder for folder in candidates if (folder / "memory.json").is_file()]
-    several = len({folder.name for folder in found}) > 1 and found[0].name not in (class_name, COMBINED)
-    if several:
-        names = ", ".join(sorted(folder.name for folder in found))
+    archives = [candidate for candidate in candidates if (candidate / "memory.json").is_file()]
+    if len({archive.name for archive in archives}) > 1 and archives[0].name not in (class_name, COMBINED):
+        names = ", ".join(sorted(archive.name for archive in archives))
         raise RunError(f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}.")
-    return str(found[0] if found else place)
+    return str(archives[0] if archives else folder)

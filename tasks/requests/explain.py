@@ -1,4 +1,4 @@
-"""``plan --explain``: what was recalled, how near it was, where it collides, and what was done then."""
+"""``plan --explain``: which plans were recalled, where they collide, and how they were used."""
 
 from __future__ import annotations
 
@@ -22,16 +22,25 @@ USES: Final = {
 }
 
 
-def tell(
+def print_explanation(
     attempt: Attempt,
     memory: Memory | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
 ) -> None:
-    """Print a table of recalled plans, each with its ``Plan`` in the problem's frame, and what was done.
+    """Print how the memory was used, a table of the recalled plans, the work done and the times.
 
-    Its columns: the plan's number, its rank by the encoder, how many of its cells and states are blocked,
-    the first of the states and where that is, what the plan was used for.
+    Parameters
+    ----------
+    attempt
+        The attempt to explain.
+    memory
+        The memory that was used, or None.
+    recalled
+        The recalled plans, best first; each ``Plan`` is in the frame of the problem.
+    scale
+        Metres of the problem in a canonical metre.
+
     """
     print(_recall_line(attempt, memory, recalled))
     if recalled:
@@ -47,14 +56,12 @@ def _recall_line(
     attempt: Attempt, memory: Memory | None, recalled: Sequence[tuple[Recollection, Plan]]
 ) -> str:
     if memory is None:
-        return f"recall   no memory was asked ({attempt.assist}, {attempt.planner})"
-    asked = (
-        f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
-    )
+        return f"recall   no memory was used ({attempt.assist}, {attempt.planner})"
+    line = f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
     if not recalled:
-        return f"{asked}: none is worth trying"
+        return f"{line}: none is worth trying"
     free = sum(not (each.blocked.any() or each.goal_missed_m > 1e-9) for each, _ in recalled)
-    return f"{asked}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
+    return f"{line}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
 
 
 def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> Table:

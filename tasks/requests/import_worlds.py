@@ -1,4 +1,4 @@
-"""Import worlds: problems of worlds and maps, in one file or in a folder for ``run --worlds``."""
+"""The command ``import-worlds``: turn worlds and maps into problems, in a file or in a folder for ``run``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tasks.settings.errors import RunError, UsageError
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
 SHOWN_SKIPPED: Final = 20
-ONLY_OF_MAPS: Final = {"scale": 1.0, "tolerance_m": 0.0, "seed": 1}  # options, and what they are by default
+ONLY_OF_MAPS: Final = {"scale": 1.0, "tolerance_m": 0.0, "seed": 1}  # options with their defaults
 
 Unknown = Literal["occupied", "free"]
 
@@ -43,9 +43,35 @@ def import_settings(
     unknown: str,
     tolerance: float,
 ) -> ImportSettings:
-    """The settings as asked; UsageError with one line where one is not possible."""
+    """Check the options of an import, and return its settings.
+
+    Parameters
+    ----------
+    vehicle
+        The vehicle's name; it must have room at the start of each problem.
+    seed
+        Seed of the poses on a map, 0 or more.
+    strict
+        Whether to stop at the first unfit world.
+    problems
+        How many problems of each part to import, at least 1, or None for the default.
+    scale
+        Metres of the map in a canonical metre.
+    resolution
+        Metres in a cell of the map, or None to take the map's own.
+    unknown
+        What unknown cells count as: "occupied" or "free".
+    tolerance
+        How far the outline of what is occupied may move, in metres, 0 or more.
+
+    Raises
+    ------
+    UsageError
+        An option is out of range or its name is unknown.
+
+    """
     check_known("vehicle", [vehicle], VEHICLES)
-    check_known("way to take unknown cells", [unknown], get_args(Unknown))
+    check_known("meaning of unknown cells", [unknown], get_args(Unknown))
     if problems is not None:
         check_count("problems", problems)
     check_seed(seed)
@@ -68,44 +94,73 @@ def import_settings(
 
 
 def import_worlds(
-    path: Path, named: str | None, out: Path, part: str, settings: ImportSettings, drawing: Path | None
+    path: Path,
+    source_format: str | None,
+    out: Path,
+    part: str,
+    settings: ImportSettings,
+    drawing: Path | None,
 ) -> None:
-    """Import, write, and print a table; RunError where there is no problem to write."""
-    check_known("format", [] if named is None else [named], FORMATS)
+    """Import worlds or a map, write the problems, and print a table of them.
+
+    Parameters
+    ----------
+    path
+        The file or folder to import.
+    source_format
+        Its format, or None to recognise it.
+    out
+        Where to write: a file of problems, or a folder with a file for each part.
+    part
+        One of the parts of the worlds, or "both" for "train" and "test".
+    settings
+        How worlds and maps are read.
+    drawing
+        Where to draw the map and the problems, or None.
+
+    Raises
+    ------
+    UsageError
+        An option is not possible or would change nothing, or ``out`` holds something else.
+    RunError
+        There is no problem to write, or two parts have a problem of the same id.
+
+    """
+    check_known("format", [] if source_format is None else [source_format], FORMATS)
     check_known("part", [part], (*PARTS, BOTH))
     if out.suffix not in ("", *PROBLEM_FORMATS):
         raise UsageError(f"{out} is neither a folder's name nor ends in {', '.join(PROBLEM_FORMATS)}.")
     check_picture(drawing)
-    source = source_at(path, named)
+    source = source_at(path, source_format)
     _refuse_unused(source, settings, drawing)
     if out.suffix == "":
         _refuse_foreign(out, source)
     parts: tuple[Part, ...] = ("train", "test") if part == BOTH else tuple(p for p in PARTS if p == part)
     table = Table("class", "part", "problems", "skipped", "pieces", "a problem", "seconds", box=None)
-    found: dict[Part, Imported] = {}
+    imported_parts: dict[Part, Imported] = {}
     for name in parts:
         began = time.perf_counter()
-        with progress(f"import {name}", ended=False) as tell:
-            found[name] = import_part(source, name, settings, tell)
-        _add_row(table, source, name, found[name], time.perf_counter() - began)
-    _refuse_empty(source, out, found)
-    _write(out, found)
+        with progress(f"import {name}", ended=False) as show:
+            imported_parts[name] = import_part(source, name, settings, show)
+        _add_row(table, source, name, imported_parts[name], time.perf_counter() - began)
+    _refuse_empty(source, out, imported_parts)
+    _write(out, imported_parts)
     if drawing is not None:
-        _draw(source, settings, found, drawing)
+        _draw(source, settings, imported_parts, drawing)
     Console().print(table)
-    _tell_skipped([line for imported in found.values() for line in imported.skipped])
+    _print_skipped([line for imported in imported_parts.values() for line in imported.skipped])
     print(f"problems {out}")
 
 
-def _write(out: Path, found: Mapping[Part, Imported]) -> None:
+def _write(out: Path, imported_parts: Mapping[Part, Imported]) -> None:
     if out.suffix == "":
         with whole_folder(out) as folder:
-            for part, imported in found.items():
+            for part, imported in imported_parts.items():
                 (folder / part).mkdir()
                 write_problems(folder / part / PROBLEMS_FILE, imported.problems)
         return
     problems: dict[str, Problem] = {}
-    for problem in (problem for imported in found.values() for problem in imported.problems):
+    for problem in (problem for imported in imported_parts.values() for problem in imported.problems):
         if problem.id in problems:
             raise RunError(
                 f'Both parts have a problem "{problem.id}"; ask for one --part, or --out a folder.'
@@ -115,12 +170,12 @@ def _write(out: Path, found: Mapping[Part, Imported]) -> None:
 
 
 def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | None) -> None:
-    """UsageError for an option that would change nothing."""
+    """Raise UsageError for an option that would change nothing."""
     if source.is_map:
         if source.format == "ros" and settings.resolution is not None:
-            raise UsageError(f"--resolution is not for {source.path}: its YAML says it.")
+            raise UsageError(f"--resolution is not for {source.path}: its YAML file gives it.")
         return
-    given = [name for name, otherwise in ONLY_OF_MAPS.items() if getattr(settings, name) != otherwise]
+    given = [name for name, default in ONLY_OF_MAPS.items() if getattr(settings, name) != default]
     given += ["resolution"] * (settings.resolution is not None) + ["picture"] * (drawing is not None)
     if given:
         option = given[0].removesuffix("_m")
@@ -128,18 +183,18 @@ def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | Non
 
 
 def _refuse_foreign(out: Path, source: Source) -> None:
-    """UsageError where a folder to write holds something else than an earlier import."""
+    """Raise UsageError if the folder to write holds anything but an earlier import."""
     if out.absolute() == source.path or source.path.is_relative_to(out.absolute()):
-        raise UsageError(f"{out} is what is to be imported; give --out another name.")
+        raise UsageError(f"{out} is the folder to import; give --out another name.")
     own = {Path(part) / PROBLEMS_FILE for part in PARTS} | {Path(part) for part in PARTS}
     if out.is_file() or (out.is_dir() and any(file.relative_to(out) not in own for file in out.rglob("*"))):
-        raise UsageError(f"{out} is there and holds something else; give --out the name of a new folder.")
+        raise UsageError(f"{out} exists and holds something else; give --out the name of a new folder.")
 
 
-def _refuse_empty(source: Source, out: Path, found: Mapping[Part, Imported]) -> None:
-    empty = [part for part, imported in found.items() if not imported.problems]
-    if len(empty) == len(found) or (out.suffix == "" and empty):
-        reason = found[empty[0]].explained()
+def _refuse_empty(source: Source, out: Path, imported_parts: Mapping[Part, Imported]) -> None:
+    empty = [part for part, imported in imported_parts.items() if not imported.problems]
+    if len(empty) == len(imported_parts) or (out.suffix == "" and empty):
+        reason = imported_parts[empty[0]].explained()
         raise RunError(f"{source.path} holds no usable problem of part {empty[0]} ({reason}).")
 
 
@@ -152,9 +207,9 @@ def _add_row(table: Table, source: Source, part: str, imported: Imported, second
     )
 
 
-def _tell_skipped(skipped: list[tuple[str, str]]) -> None:
+def _print_skipped(skipped: list[tuple[str, str]]) -> None:
     if skipped:
-        shown = [f"{place}: {reason}" for place, reason in skipped[:SHOWN_SKIPPED]]
+        shown = [f"{item}: {reason}" for item, reason in skipped[:SHOWN_SKIPPED]]
         more = [f"and {len(skipped) - SHOWN_SKIPPED:,} more"] * (len(skipped) > SHOWN_SKIPPED)
         print(
             f"{len(skipped):,} skipped (use --strict to stop instead):",
@@ -165,10 +220,12 @@ def _tell_skipped(skipped: list[tuple[str, str]]) -> None:
         )
 
 
-def _draw(source: Source, settings: ImportSettings, found: Mapping[Part, Imported], drawing: Path) -> None:
+def _draw(
+    source: Source, settings: ImportSettings, imported_parts: Mapping[Part, Imported], drawing: Path
+) -> None:
     from dashboards.figures.map_picture import map_picture  # late: few imports draw
 
-    cuts: dict[str, Any] = {part: imported.cuts for part, imported in found.items()}
+    cuts: dict[str, Any] = {part: imported.cuts for part, imported in imported_parts.items()}
     figure = map_picture(load_map(source, settings), cuts, settings.scale, settings.vehicle)
     with whole_file(drawing) as temporary:
         figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)

@@ -1,4 +1,4 @@
-"""Optimise a plan for one problem of one's own: from a plan file, a planner's plan, or a straight line."""
+"""The command ``optimise``: optimise a plan for one problem, from a file, a planner or a straight line."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from storage.places.files import whole_file
 from tasks.settings.checks import check_known, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 
-STRAIGHT: Final = "straight-line"  # what a plan file calls its planner then
+STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
 
 
 @dataclass(frozen=True)
-class Beginning:
-    """Where an optimisation begins: a plan file, a planner, or else a straight line."""
+class InitialGuess:
+    """Where the first guess comes from: a plan file, a planner, or else a straight line."""
 
     plan: Path | None
     planner: str | None
@@ -34,7 +34,7 @@ class Beginning:
     seed: int
 
     def guess(self, problem: Problem) -> tuple[Plan, str]:
-        """The guess and the planner it came from; RunError where there is none."""
+        """The guess and the name of its planner. Raises RunError if there is no plan to begin with."""
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
             if record.plan is None or len(record.plan.controls) == 0:
@@ -43,84 +43,127 @@ class Beginning:
         if self.planner is None:
             return straight_line(problem, self.vehicle), STRAIGHT
         rng = generator(self.seed, "search", problem.id, self.planner)
-        found = plan(self.planner, problem, rng, vehicle=self.vehicle)
-        if found.plan is None:
+        outcome = plan(self.planner, problem, rng, vehicle=self.vehicle)
+        if outcome.plan is None:
             raise RunError(
-                f"{self.planner} found no plan to begin with for {problem.id}: {found.status}; "
+                f"{self.planner} found no plan to begin with for {problem.id}: {outcome.status}; "
                 "try --straight."
             )
-        return found.plan, self.planner
+        return outcome.plan, self.planner
 
-    def tell_of_another(self, problem: Problem) -> None:
-        """Print a line if the plan file is of another problem: then it is only a guess."""
+    def warn_of_other_problem(self, problem: Problem) -> None:
+        """Print a line if the plan file was made for another problem."""
         record = None if self.plan is None else read_plan(self.plan, self.vehicle)
         if record is not None and (record.problem_id, record.scale) != (problem.id, problem.scale):
             print(
                 f"only a guess: {self.plan} is for problem {record.problem_id} of scale {record.scale:g}, "
-                f"asked is {problem.id} of scale {problem.scale:g}"
+                f"not for {problem.id} of scale {problem.scale:g}"
             )
 
 
-def beginning(stored: Path | None, planner: str | None, straight: bool, vehicle: str, seed: int) -> Beginning:
-    """Where to begin as asked, by default with Follow's plan; UsageError for two ways or an unknown name."""
-    ways = [
-        way for way, given in (("--plan", stored), ("--planner", planner), ("--straight", straight)) if given
-    ]
-    if len(ways) > 1:
-        raise UsageError(f"{' and '.join(ways)} are given: an optimisation begins in one way.")
+def initial_guess(
+    plan_file: Path | None, planner: str | None, straight: bool, vehicle: str, seed: int
+) -> InitialGuess:
+    """The first guess that the options choose; without any, a plan by Follow.
+
+    Parameters
+    ----------
+    plan_file
+        A plan file to begin with, or None.
+    planner
+        The planner whose plan to begin with, or None.
+    straight
+        Whether to begin with a straight line.
+    vehicle
+        The vehicle's name.
+    seed
+        The planner's seed, 0 or more.
+
+    Raises
+    ------
+    UsageError
+        Two guesses are chosen, a name is unknown, or the seed is negative.
+
+    """
+    options = {"--plan": plan_file, "--planner": planner, "--straight": straight}
+    chosen = [option for option, value in options.items() if value]
+    if len(chosen) > 1:
+        raise UsageError(f"{' and '.join(chosen)} are given; give one of them.")
     check_known("planner", [planner] if planner else [], tuple(PLANNERS))
     check_known("vehicle", [vehicle], VEHICLES)
     check_seed(seed)
-    return Beginning(stored, planner or (None if ways else "follow"), vehicle_named(vehicle), seed)
+    return InitialGuess(plan_file, planner or (None if chosen else "follow"), vehicle_named(vehicle), seed)
 
 
 def optimise_one(
-    begin: Beginning, problem: Path, clearance_weight: float, out: Path | None, drawing: Path | None
+    initial: InitialGuess, problem_file: Path, clearance_weight: float, out: Path | None, drawing: Path | None
 ) -> None:
-    """Optimise a plan for the one problem of a file; RunError when it does not converge."""
+    """Optimise a plan for the one problem in a file, and print a line about it.
+
+    Parameters
+    ----------
+    initial
+        Where the first guess comes from.
+    problem_file
+        The file; it must hold one problem.
+    clearance_weight
+        Weight of the clearance in the objective, 0 or more.
+    out, drawing
+        Where to write the plan and a picture, or None.
+
+    Raises
+    ------
+    UsageError
+        The weight or the picture's format is not possible.
+    RunError
+        The file does not hold exactly one problem, or the optimisation does not converge.
+
+    """
     check_picture(drawing)
     if not 0.0 <= clearance_weight < float("inf"):
         raise UsageError(f"Clearance weight {clearance_weight}: give 0 or more.")
-    problems = read_problems(problem, begin.vehicle)
+    problems = read_problems(problem_file, initial.vehicle)
     if len(problems) != 1:
-        raise RunError(f"{problem} holds {len(problems)} problems; `optimise` takes one.")
-    asked = problems[0]
+        raise RunError(f"{problem_file} holds {len(problems)} problems; `optimise` takes one.")
+    problem = problems[0]
     objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=clearance_weight)
-    begin.tell_of_another(asked)
-    guess, planner = begin.guess(asked)  # the first makes code warm
-    began = perf_counter()
-    guess, planner = begin.guess(asked)
-    found = optimise(asked, guess, DEFAULT_SETTINGS._replace(objective=objective), begin.vehicle)
-    seconds = perf_counter() - began
+    initial.warn_of_other_problem(problem)
+    initial.guess(problem)  # compiles and fills caches before the time counts
+    start = perf_counter()
+    guess, planner = initial.guess(problem)
+    optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(objective=objective), initial.vehicle)
+    seconds = perf_counter() - start
     if out is not None:
-        write_plan(out, _record(asked, found, planner, seconds, begin.vehicle))
-    told = f"{found.status}, {found.iterations} iterations, {1000 * seconds:.0f} ms"
+        write_plan(out, _record(problem, optimised, planner, seconds, initial.vehicle))
+    summary = f"{optimised.status}, {optimised.iterations} iterations, {1000 * seconds:.0f} ms"
     if drawing is not None:
         with whole_file(drawing) as temporary:
-            caption = f"optimised, {planner}: {told}"
-            figure = picture(asked, found.plan, caption, [guess], begin.vehicle, called="guess")
+            caption = f"optimised, {planner}: {summary}"
+            figure = picture(problem, optimised.plan, caption, [guess], initial.vehicle, called="guess")
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
-    if found.plan is None:
-        raise RunError(f"No plan for {asked.id or problem}: {told}.")
-    clearance = least_clearance(asked, found.plan.states, begin.vehicle)
+    if optimised.plan is None:
+        raise RunError(f"No plan for {problem.id or problem_file}: {summary}.")
+    clearance = least_clearance(problem, optimised.plan.states, initial.vehicle)
     print(
-        f"{told}, {asked.scale * found.plan.length_m:.1f} m, {found.plan.duration_s:.1f} s"
-        f" (guess: {guess.duration_s:.1f} s), {asked.scale * clearance:.2f} m clear"
+        f"{summary}, {problem.scale * optimised.plan.length_m:.1f} m, {optimised.plan.duration_s:.1f} s"
+        f" (guess: {guess.duration_s:.1f} s), {problem.scale * clearance:.2f} m clear"
     )
-    for what, place in (("plan", out), ("picture", drawing)):
-        if place is not None:
-            print(f"{what:8} {place}")
+    for label, path in (("plan", out), ("picture", drawing)):
+        if path is not None:
+            print(f"{label:8} {path}")
 
 
-def _record(problem: Problem, found: Optimised, planner: str, seconds: float, vehicle: Vehicle) -> PlanRecord:
+def _record(
+    problem: Problem, optimised: Optimised, planner: str, seconds: float, vehicle: Vehicle
+) -> PlanRecord:
     return PlanRecord(
         problem.id,
-        "solved" if found.converged else str(found.status),
-        "optimised" if found.converged else None,
+        "solved" if optimised.converged else str(optimised.status),
+        "optimised" if optimised.converged else None,
         planner,
         "none",
         seconds,
-        found.plan,
+        optimised.plan,
         vehicle,
         problem.scale,
     )

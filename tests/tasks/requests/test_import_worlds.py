@@ -69,7 +69,7 @@ def test_a_folder_is_written_for_runs_and_written_again_but_never_over_something
     assert call([*asked, str(tmp_path / "worlds")]) == 2
     assert "holds something else" in capsys.readouterr().err
     assert call([*asked, str(tmp_path)]) == 2
-    assert "is what is to be imported" in capsys.readouterr().err
+    assert "is the folder to import" in capsys.readouterr().err
     assert (tmp_path / "worlds" / "note.txt").read_text() == "mine"
 
 
