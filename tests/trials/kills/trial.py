@@ -24,6 +24,7 @@ LONGEST_SECONDS: Final = 900.0  # of a command on a busy machine: longer is hang
 AWAY_SECONDS: Final = 3.0  # until a scheduler is started again
 HELD_SECONDS: Final = 180.0  # for which what a dead command started may hold its folder
 LOOK_SECONDS: Final = 0.1
+SETTLED_SECONDS: Final = 1.0  # a table this old was finished: its writer had the time to say so
 IN_USE: Final = "in use by another command"
 
 Strike = Callable[[subprocess.Popen[bytes]], bool]  # kills the victim, if there is one by now
@@ -103,7 +104,7 @@ def killed(trial: Trial, victim: str, chance: random.Random) -> dict[str, Any] |
             if running.poll() is not None:
                 return None
             time.sleep(LOOK_SECONDS)
-        began = time.monotonic()
+        began, finished = time.monotonic(), _finished(trial.place)
         code = trial.end(running)
         ended, told = time.monotonic() - began, trial.told()
         fault = "hangs" if code is None else _in_doubt(trial, old)
@@ -118,9 +119,21 @@ def killed(trial: Trial, victim: str, chance: random.Random) -> dict[str, Any] |
         "code": code,
         "told": told[-300:],
         "outcome": "went on" if code == 0 else "was done" if done else "goes on",
-        "fault": fault or trial.difference(),
+        "fault": fault or trial.difference() or _made_again(finished),
         "seconds": round(time.monotonic() - began, 1),
     }
+
+
+def _finished(place: Path) -> dict[Path, int]:
+    """Tables of runs that are finished: when they were written."""
+    before = time.time() - SETTLED_SECONDS
+    times = {path: path.stat() for path in (place / "data" / "runs").rglob("[!.]*.parquet")}
+    return {path: stat.st_mtime_ns for path, stat in times.items() if stat.st_mtime < before}
+
+
+def _made_again(finished: dict[Path, int]) -> str:
+    again = [path.name for path, when in finished.items() if path.stat().st_mtime_ns != when]
+    return f"finished, and made once more: {', '.join(again)}" if again else ""
 
 
 def _in_doubt(trial: Trial, old: list[int]) -> str:
