@@ -137,9 +137,7 @@ def test_a_rollback_restores_the_champion_before(story: Story) -> None:
 
 
 def test_a_registry_that_cannot_be_reached_is_one_line_and_changes_nothing(story: Story) -> None:
-    assert story.seen["unreachable said"].startswith(
-        "MLflow's registry at http://127.0.0.1:9 cannot be used, champions are as they were"
-    )
+    assert "registry at http://127.0.0.1:9 cannot be used" in story.seen["unreachable said"]
     assert "\n" not in story.seen["unreachable said"]
     assert story.seen["unreachable"]["champion"] == 1
 
