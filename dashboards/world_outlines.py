@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.search.repair import Flags, blocked_states
-from planners.world.arrays import Floats
+from planners.search.repair import blocked_states
+from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints

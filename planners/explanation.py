@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
-from planners.memory.plans.nearly_free import least_blocked
-from planners.memory.plans.sweeps import START_TOLERANCE
-from planners.memory.recall import Memory
-from planners.search.repair import Flags, blocked_states
-from planners.solve import Attempt, turned
+from planners.memory.plans.fit import ends_of, least_blocked, turned
+from planners.search.repair import blocked_states
+from planners.solve import Attempt
+from planners.world.arrays import Flags
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
@@ -47,7 +47,7 @@ def recollections(
     embedding = memory.forward(view.bits)
     scores = memory.vectors[1:] @ embedding + memory.biases[1:]
     ranking = rank_by_cells(memory.masks, view.bits, view.workspace).cells
-    stored = memory.heading is not None and abs(problem.start[2] - memory.heading) <= START_TOLERANCE
+    stored = memory.begins_with(problem.start[2])
     best = _least_blocked(problem, attempt, memory, view)
     found: list[Recollection] = []
     for number in attempt.recalled:
@@ -76,5 +76,5 @@ def _least_blocked(problem: Problem, attempt: Attempt, memory: Memory, view: Vie
     if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
         return {}
     order = np.array(attempt.recalled, np.int32)
-    best, _ = least_blocked(order, memory.sweeps, view.scene, problem.start)
+    best, _ = least_blocked(order, memory.sweeps, ends_of(problem), view.scene)
     return {int(best): "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}

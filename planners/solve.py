@@ -5,23 +5,23 @@ Planning time is measured once around everything between receiving a problem and
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from time import perf_counter
 
 import numpy as np
 
-from planners.memory.plans.nearly_free import least_blocked
-from planners.memory.plans.sweeps import START_TOLERANCE
-from planners.memory.recall import Memory, Recalled, default_recall, recall, scale_fault
+from planners.memory.memory import Memory, scale_fault
+from planners.memory.plans.fit import ends_of, least_blocked, turned
+from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
 from planners.search.guides.grid_path import grid_path
 from planners.search.guides.guidance import guidance
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Guide, Limits, Query
 from planners.search.registry import PLANNERS
-from planners.search.repair import Flags, blocked_states, free_prefix, repair
+from planners.search.repair import blocked_states, free_prefix, repair
+from planners.world.arrays import Flags
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
@@ -72,19 +72,6 @@ _PARTS = tuple(
 )
 
 
-def turned(stored: Plan, heading: float) -> Plan:
-    """A plan turned rigidly about its first position, so that it begins with ``heading`` (radians)."""
-    angle = heading - stored.states[0, 2]
-    if abs(angle) <= START_TOLERANCE:
-        return stored
-    cos, sin = math.cos(angle), math.sin(angle)
-    states = stored.states.copy()
-    offsets = states[:, :2] - states[0, :2]
-    states[:, :2] = states[0, :2] + offsets @ np.array([[cos, sin], [-sin, cos]])
-    states[:, 2] += angle
-    return Plan(states, stored.controls, stored.dt)
-
-
 def nearly_free(
     memory: Memory, recalled: Sequence[int], view: View, vehicle: Vehicle
 ) -> tuple[tuple[Plan, Flags] | None, int]:
@@ -93,7 +80,7 @@ def nearly_free(
     Also how many collision checks were made.
     """
     order = np.array(recalled, np.int32)
-    best, checks = least_blocked(order, memory.sweeps, view.scene, view.problem.start)
+    best, checks = least_blocked(order, memory.sweeps, ends_of(view.problem), view.scene)
     found: tuple[Plan, Flags] | None = None
     if best >= 0:
         stored = turned(memory.plans[int(best)], view.problem.start[2])

@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from planners.memory.plans.sweeps import Flags
-from planners.world.arrays import Floats
+from planners.world.arrays import Flags, Floats
 from storage.tables.columns import Array
 from storage.tables.configurations import BASELINE, Configuration, configured
 

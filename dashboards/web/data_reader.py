@@ -19,7 +19,7 @@ from dashboards.statistics.panels import summarise
 from dashboards.web.attempt_rows import COLUMNS, Attempts, attempts_of
 from dashboards.web.memory_versions import MemoryVersion, Versions
 from dashboards.web.notices import MissingError, NoticeError
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, vehicle_named

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from planners.explanation import Recollection, recollections
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import turned
 from planners.search.query import Limits
 from planners.search.traces import Roads, Trace, last_roadmap, last_tree
-from planners.solve import WITHOUT_MEMORY, Attempt, solve, turned
+from planners.solve import WITHOUT_MEMORY, Attempt, solve
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace

@@ -7,32 +7,31 @@ saves one. The most chords that do not cross are a largest independent set of a 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
 from planners.maps.occupancy_map import Cells
-
-Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
+from planners.world.arrays import Indices
 
 
 class Rectangles(NamedTuple):
     """Rectangles of cells: ``[n]`` first row and column, and the row and column after the last."""
 
-    first_rows: Array
-    last_rows: Array
-    first_columns: Array
-    last_columns: Array
+    first_rows: Indices
+    last_rows: Indices
+    first_columns: Indices
+    last_columns: Indices
 
 
 class _Chords(NamedTuple):
     """Lines of the lattice of cell corners, all along its rows or all along its columns."""
 
-    at: Array  # [n] the row, or column, they lie on
-    first: Array  # [n] where they begin along it
-    last: Array  # [n] where they end
+    at: Indices  # [n] the row, or column, they lie on
+    first: Indices  # [n] where they begin along it
+    last: Indices  # [n] where they end
 
 
 def rectangles_of(occupied: Cells) -> Rectangles:
@@ -104,7 +103,7 @@ def _uncrossed(upright: _Chords, level: _Chords, shape: tuple[int, ...]) -> Cell
     return kept
 
 
-def _along(first: Array, last: Array) -> tuple[Array, Array]:
+def _along(first: Indices, last: Indices) -> tuple[Indices, Indices]:
     """For each range its number, repeated, and the integers from ``first`` to before ``last``."""
     lengths = last - first
     which = np.repeat(np.arange(len(lengths)), lengths)

@@ -13,13 +13,11 @@ from scipy.sparse import csgraph
 
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.pieces import Shapes, pieces_of
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
 
 WINDOW: Final = BOUNDS[2] - BOUNDS[0]  # canonical metres a side
 SPECK: Final = 1e-6  # square metres: what a window cuts off smaller than this is left out
-
-Indices = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from planners.memory.encoder.training import TrainedEncoder
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import Memory
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle
 

@@ -17,8 +17,8 @@ import numpy as np
 from planners.memory.labelling import label_problems
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.sweeps import Flags, sweep_plans
-from planners.world.arrays import Floats, Integers
+from planners.memory.plans.sweeps import sweep_plans
+from planners.world.arrays import Flags, Floats, Integers
 from planners.world.geometry.occupancy import ALL_CELLS, Bits
 from planners.world.jit import jit
 from planners.world.vehicles.vehicle import CAR, Vehicle

@@ -13,12 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.sweeps import Flags, free_plans, sweep_plans
+from planners.memory.plans.fit import free_plans
+from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.ranking.inverted_lists import FROM_PLANS, list_readout
-from planners.memory.ranking.readout import NO_PLAN_ODDS, nearest_readout
-from planners.memory.recall import Memory
-from planners.world.arrays import Floats, Floats32
+from planners.memory.ranking.readout import NO_PLAN_ODDS, mean_embeddings, nearest_readout
+from planners.world.arrays import Flags, Floats, Floats32
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of
 from planners.world.jit import lean
@@ -53,7 +54,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
     moments = moments_of(
         embeddings, (free_plans(sweeps, scene_of(problem)) for problem in problems), len(plans)
     )
-    centroids = mean_embeddings(moments)
+    centroids = mean_embeddings(moments.sums, moments.counts).astype(np.float32)
     if memory.objective == "triplet":
         vectors, biases = nearest_readout(centroids, scatter(moments, centroids))
     else:
@@ -87,14 +88,6 @@ def _add(embedding: Floats, square: float, free: Flags, none: bool, moments: Mom
             moments.squares[row] += square
             for k in range(embedding.shape[0]):
                 moments.sums[row, k] += embedding[k]
-
-
-def mean_embeddings(moments: Moments) -> Floats32:
-    """Centroids ``[N + 1, D]``; a row without problems is infinitely far from everything."""
-    met = moments.counts > 0
-    means = np.full_like(moments.sums, np.inf)
-    means[met] = moments.sums[met] / moments.counts[met, np.newaxis]
-    return means.astype(np.float32)
 
 
 def scatter(moments: Moments, centroids: Floats32) -> float:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.plans.sweeps import Flags, PlanSweeps, free_plans
-from planners.world.arrays import Floats, Integers
+from planners.memory.plans.fit import free_plans
+from planners.memory.plans.sweeps import PlanSweeps
+from planners.world.arrays import Flags, Floats, Integers
 from planners.world.geometry.collision import build_scene
 from planners.world.geometry.occupancy import GRID, Grid, draw_occupancy
 from planners.world.jit import jit

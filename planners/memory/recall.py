@@ -14,24 +14,17 @@ plans are free at all, one of these mostly is, so the time to find it does not g
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.encoder.encoder import Encoder, Weights, to_onnx
-from planners.memory.encoder.forward_pass import Forward, forward_of
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.first_free import first_free
-from planners.memory.plans.sweeps import START_TOLERANCE, PlanSweeps, first_answer
-from planners.memory.ranking.inverted_lists import InvertedLists, best_listed
+from planners.memory.plans.fit import ends_of, first_fitting, first_fitting_drawn
+from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
-from planners.world.arrays import Floats32, Integers
-from planners.world.geometry.occupancy import Bits, Grid, bits_of
-from planners.world.problem import Plan
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.arrays import Integers
+from planners.world.geometry.occupancy import Grid, bits_of
 from planners.world.view import View
 
 RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")
@@ -43,76 +36,12 @@ TRIED_DRAWN: Final = 8  # plans checked from the drawing; if all are blocked, a 
 WORTH_CELLS: Final = 40  # blocked cells: of plans with 30 or more none was free, in no class
 
 
-@dataclass(frozen=True, eq=False)
-class Memory:
-    """Stored plans and what finds them: masks, encoder, centroids, readout. Plan ``i`` is row ``i + 1``."""
-
-    class_name: str
-    vehicle: Vehicle
-    plans: Sequence[Plan]  # N plans in the canonical frame
-    sweeps: PlanSweeps  # the same plans' swept boxes
-    masks: Bits  # [N, 64] and the cells of the occupancy grid that these meet, a bit each
-    centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of the S_0 problems
-    vectors: Floats32  # [N + 1, D] readout
-    biases: Floats32  # [N + 1] readout
-    objective: str  # what the encoder was trained for: "triplet" or "labels"
-    weights: Weights  # of the encoder
-    metadata: dict[str, Any] = field(default_factory=dict)  # JSON values only
-    lists: InvertedLists | None = None  # over the readout of very many plans
-
-    def __post_init__(self) -> None:
-        rows = len(self.plans) + 1
-        if len(self.masks) != len(self.plans):
-            raise ValueError(
-                f"Memory has masks of {len(self.masks)} plans, {len(self.plans)} are stored. Were they built "
-                "together?"
-            )
-        for name in ("centroids", "vectors", "biases"):
-            if len(getattr(self, name)) != rows:
-                raise ValueError(
-                    f"Memory has {len(getattr(self, name))} rows of {name}, {len(self.plans)} plans need "
-                    f"{rows} (row 0 is 'no plan'). Were they built together?"
-                )
-
-    @functools.cached_property
-    def scales(self) -> tuple[float, ...]:
-        """Of the problems whose plans it holds: metres of the world outside in a canonical metre."""
-        return tuple(self.metadata.get("scales", (1.0,)))
-
-    @functools.cached_property
-    def encoder(self) -> Encoder:
-        """The encoder for many grids at once."""
-        return Encoder(to_onnx(self.weights))
-
-    @functools.cached_property
-    def forward(self) -> Forward:
-        """The encoder for the bits of one grid."""
-        return forward_of(self.weights)
-
-    @functools.cached_property
-    def heading(self) -> float | None:
-        """The heading (radians) that all stored plans begin with; None where they do not agree."""
-        headings = self.sweeps.first_poses[:, 2]
-        return float(headings[0]) if len(headings) and np.ptp(headings) <= START_TOLERANCE else None
-
-
 class Recalled(NamedTuple):
     """What a memory has for a problem."""
 
     plans: tuple[int, ...]  # at most k, best first
     free: int  # one of these that answers the problem; -1: none of all that were checked does
     checks: int  # collision checks to know
-
-
-def scale_fault(memory: Memory, scale: float) -> str | None:
-    """Why a memory has nothing to say of problems of a scale, or None."""
-    if scale in memory.scales:
-        return None
-    made = " and ".join(f"{each:g}" for each in memory.scales)
-    return (
-        f"memory of {memory.class_name} was made of problems of scale {made}, asked was {scale:g}: make one "
-        "of that scale"
-    )
 
 
 def default_recall(memory: Memory) -> str:
@@ -138,7 +67,7 @@ def recall(
     if strategy not in RECALLS or k < 1:
         raise ValueError(f"recall {k} plans by '{strategy}': give 1 or more, and one of {', '.join(RECALLS)}")
     count, spent = len(memory.plans), 0
-    stored = memory.heading is not None and abs(view.problem.start[2] - memory.heading) <= START_TOLERANCE
+    stored = memory.begins_with(view.problem.start[2])
     if stored and count > ASKED_FIRST and strategy in ("exhaustive", "hybrid"):
         early = among_the_first(memory, view, k)
         if early.free >= 0:
@@ -212,12 +141,13 @@ def first_check(memory: Memory, view: View, order: Integers, stored: bool) -> tu
     problem = view.problem
     found, checks = -1, 0
     if stored:
-        found, checks = first_free(order[:TRIED_DRAWN], memory.sweeps, memory.masks, view.drawing, problem)
+        found, checks = first_fitting_drawn(
+            order[:TRIED_DRAWN], memory.sweeps, memory.masks, view.drawing, problem
+        )
         order = order[TRIED_DRAWN:]
         view.lap("check")
     if found < 0 and len(order):
-        ends = (problem.start, problem.goal, problem.goal_radius)
-        found, more = first_answer(memory.sweeps, order, view.scene, *ends)
+        found, more = first_fitting(order, memory.sweeps, ends_of(problem), view.scene)
         checks += more
         view.lap("check")
     return int(found), int(checks)

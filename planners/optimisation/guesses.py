@@ -35,7 +35,7 @@ def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
     return Plan(states, controls, vehicle.dt)
 
 
-def least_blocked(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR) -> int:
+def nearest_to_free(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR) -> int:
     """The number of the plan with the fewest states in collision, the first of equals.
 
     Raises ValueError when there is no plan.

@@ -18,7 +18,7 @@ import numpy as np
 from planners.optimisation.clearance_field import CELL_M, clearance_field
 from planners.optimisation.equations import bounds_of
 from planners.optimisation.guesses import begun_at, resampled
-from planners.optimisation.transcription import Objective, Solution, transcribe
+from planners.optimisation.transcription import CostWeights, Solution, transcribe
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem, start_state
@@ -31,7 +31,7 @@ FEWEST_STEPS = 4
 class OptimiseSettings(NamedTuple):
     """How to optimise; IPOPT's settings are reasoned about in docs/optimisation.md."""
 
-    objective: Objective = Objective()
+    weights: CostWeights = CostWeights()
     iterations: int = 300  # IPOPT's, of all programmes of an optimisation together
     discs: int = 3  # a body: a car's swept half width of 0.66 m becomes 0.77; 0.90 with two, 0.73 with four
     cell_m: float = CELL_M
@@ -46,7 +46,7 @@ class OptimiseSettings(NamedTuple):
 DEFAULT_SETTINGS = OptimiseSettings()
 
 
-class Status(StrEnum):
+class Ending(StrEnum):
     """How an optimisation ended. Not to converge is data, not an error."""
 
     CONVERGED = "converged"
@@ -60,7 +60,7 @@ class Status(StrEnum):
 class Optimised(NamedTuple):
     """One optimisation: its plan, if it converged, and what it cost."""
 
-    status: Status
+    status: Ending
     plan: Plan | None
     iterations: int
     seconds: float  # everything, from the problem and the guess to the plan
@@ -85,15 +85,15 @@ def optimise(
     field_seconds = 0.0
     iterations = 0
 
-    def ended(status: Status, plan: Plan | None = None) -> Optimised:
+    def ended(status: Ending, plan: Plan | None = None) -> Optimised:
         return Optimised(status, plan, iterations, perf_counter() - began, field_seconds)
 
     start = start_state(problem, vehicle)
     alone = Plan(start[None], np.empty((0, 2)), vehicle.dt)
     if count_free_prefix(alone.states, vehicle, scene) == 0:
-        return ended(Status.START_BLOCKED)
+        return ended(Ending.START_BLOCKED)
     if math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
-        return ended(Status.CONVERGED, alone)
+        return ended(Ending.CONVERGED, alone)
     building = perf_counter()
     field = clearance_field(problem, settings.cell_m)
     field_seconds = perf_counter() - building
@@ -103,7 +103,7 @@ def optimise(
     ) -> Solution:
         """The first of the solutions, a barrier each, that converges; else the last."""
         nonlocal iterations
-        programme = transcribe(problem, field, steps, settings.objective, vehicle, settings.discs, margin_m)
+        programme = transcribe(problem, field, steps, settings.weights, vehicle, settings.discs, margin_m)
         found = Solution(SPENT, 0, near)
         for barrier in barriers:
             if iterations < settings.iterations and found.status != SOLVED:
@@ -124,13 +124,13 @@ def optimise(
                 plan = _driven(problem, found.trajectory, vehicle)
                 free = count_free_prefix(plan.states, vehicle, scene) == len(plan.states)
                 if free and not faults(problem, plan, vehicle):
-                    return ended(Status.CONVERGED, plan)
+                    return ended(Ending.CONVERGED, plan)
                 margin_m += settings.more_margin_m
             steps += 1
-    return ended(_ENDINGS.get(found.status, Status.FAILED))
+    return ended(_ENDINGS.get(found.status, Ending.FAILED))
 
 
-def improve(
+def refined(
     problem: Problem, plan: Plan, settings: OptimiseSettings = DEFAULT_SETTINGS, vehicle: Vehicle = CAR
 ) -> Plan:
     """The valid ``plan`` optimised, if that makes it better by the objective; else ``plan`` itself."""
@@ -139,7 +139,7 @@ def improve(
         return plan
     field = clearance_field(problem, settings.cell_m)
     old, new = (
-        transcribe(problem, field, len(each.controls), settings.objective, vehicle, settings.discs).cost(each)
+        transcribe(problem, field, len(each.controls), settings.weights, vehicle, settings.discs).cost(each)
         for each in (plan, better)
     )
     return better if new < old else plan
@@ -147,9 +147,9 @@ def improve(
 
 SOLVED, SPENT = "Solve_Succeeded", "Maximum_Iterations_Exceeded"  # IPOPT's own words
 _ENDINGS = {
-    SOLVED: Status.REFUSED,
-    SPENT: Status.ITERATIONS_SPENT,
-    "Infeasible_Problem_Detected": Status.INFEASIBLE,
+    SOLVED: Ending.REFUSED,
+    SPENT: Ending.ITERATIONS_SPENT,
+    "Infeasible_Problem_Detected": Ending.INFEASIBLE,
 }
 
 

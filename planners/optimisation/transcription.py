@@ -27,7 +27,7 @@ GOAL_SHY_M = 1e-3  # inside the goal disc: states simulated again are some 1e-7 
 H_UNIT_S = 0.1  # the unknown step length is near 1, like the others
 
 
-class Objective(NamedTuple):
+class CostWeights(NamedTuple):
     """What a plan should be: short in time, gentle, clear of obstacles."""
 
     time_weight: float = 1.0  # a second
@@ -86,7 +86,7 @@ def transcribe(
     problem: Problem,
     field: ClearanceField,
     steps: int,
-    objective: Objective,
+    weights: CostWeights,
     vehicle: Vehicle,
     discs: int,
     margin_m: float = 0.0,
@@ -105,10 +105,10 @@ def transcribe(
 
     limits = bounds_of(vehicle)
     effort = ca.sumsqr(controls / ca.repmat(ca.DM(limits.control_high), 1, steps))
-    cost = objective.time_weight * steps * h + objective.effort_weight * h * effort
-    if objective.clearance_weight > 0.0:
-        lacking = ca.fmax(0.0, objective.wanted_clearance_m - gaps)
-        cost += objective.clearance_weight * h * ca.sumsqr(lacking)
+    cost = weights.time_weight * steps * h + weights.effort_weight * h * effort
+    if weights.clearance_weight > 0.0:
+        lacking = ca.fmax(0.0, weights.wanted_clearance_m - gaps)
+        cost += weights.clearance_weight * h * ca.sumsqr(lacking)
 
     low, high = limits.state_low.copy(), limits.state_high.copy()
     low[:2], high[:2] = problem.bounds[:2], problem.bounds[2:]

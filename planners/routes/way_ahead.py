@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from planners.maps.cutting import LONGEST_WAY
 from planners.maps.global_path import GlobalPaths
-from planners.world.arrays import Floats
+from planners.world.arrays import Flags, Floats
 from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS
 
 HEADINGS: Final = 120  # directions looked at from a place
@@ -78,9 +78,9 @@ class WayAhead:
         """Remember that from about a pose ``[>= 2]`` the goal cannot be reached in one leg."""
         self._in_vain.append((float(pose[0]), float(pose[1])))
 
-    def arrived(self, poses: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def arrived(self, poses: Floats) -> Flags:
         """Whether each of ``poses [n, >= 2]`` lies in the goal disc."""
-        near: np.ndarray[tuple[int, ...], np.dtype[np.bool_]] = self._distance(poses) <= GOAL_RADIUS
+        near: Flags = self._distance(poses) <= GOAL_RADIUS
         return near
 
     def local_goals(self, pose: Floats, most: int) -> list[LocalGoal]:

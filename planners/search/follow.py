@@ -26,7 +26,6 @@ from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
-from planners.search.structures.neighbours import Indices
 from planners.search.structures.roadmap import (
     Roadmap,
     RoadmapSettings,
@@ -34,7 +33,7 @@ from planners.search.structures.roadmap import (
     resample_way,
 )
 from planners.search.structures.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
 from planners.world.vehicles.vehicle import Vehicle

@@ -13,7 +13,7 @@ from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
-from planners.search.structures.neighbours import Indices, nearest_for
+from planners.search.structures.neighbours import nearest_for
 from planners.search.structures.roadmap import (
     CHECKS as ROADMAP_CHECKS,
 )
@@ -34,7 +34,7 @@ from planners.search.structures.tree import (
     Tree,
     extend,
 )
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length

@@ -18,7 +18,7 @@ from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
-from planners.world.arrays import Floats
+from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.geometry.occupancy import Bits
 from planners.world.jit import lean
@@ -26,8 +26,6 @@ from planners.world.problem import Plan
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
-
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 TOO_LATE_STEPS = 10  # before a collision: a second, too late to turn away
 LONGEST = 4096  # states of a repaired plan: a stored one has some 250

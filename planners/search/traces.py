@@ -9,10 +9,9 @@ import numpy as np
 from planners.search.follow import FollowSettings
 from planners.search.gust import GustSettings
 from planners.search.query import Limits
-from planners.search.structures.neighbours import Indices
 from planners.search.structures.roadmap import BLOCKED, EDGES, FREE, NODES, allocate_roadmap
 from planners.search.structures.tree import SIZE, allocate_tree
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.workspace import Workspace
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planners.search.structures.tree import EXTENSION, Extension, pid
+from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.dynamics import admissible, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 ARRIVED, BLOCKED, LOST = range(3)
@@ -22,7 +22,7 @@ class Tracking(NamedTuple):
     ahead_s: float = 0.3  # ... plus the way driven in this time
     lost_m: float = 4.0  # farther from the plan than this, it is not followed any more
     slowest_share: float = 0.25  # of the maximal speed: where a plan stands still, it is driven on
-    controller: Extension = EXTENSION  # gains of the steering and speed controllers
+    gains: Gains = Gains()
 
 
 TRACKING = Tracking()
@@ -46,13 +46,8 @@ def track(
     state checked; ``goal [3]`` is x, y, radius in metres. Returns how it ended, the last state that was
     filled, and the state of ``way`` that was looked at then.
     """
-    gains = settings.controller
-    limit_1, limit_2 = control_limits(vehicle)
     state = load(states, first, vehicle)
-    turn_sum = 0.0
-    speed_sum = 0.0
-    last_turn = 0.0
-    last_speed = 0.0
+    errors = NO_ERRORS
     at = beginning
     filled = first
     most = min(states.shape[0] - 1, first + 2 * (way.shape[0] - beginning) + 50)
@@ -62,17 +57,10 @@ def track(
             at += 1
         if length(way[at, 0] - state[0], way[at, 1] - state[1]) > ahead + settings.lost_m:
             return LOST, filled, at
-        turn = turn_error(state, way[at, 0], way[at, 1], vehicle)
-        lack = max(way[at, 3], settings.slowest_share * vehicle.max_speed) - state[3]
-        if filled == first:
-            last_turn = turn
-            last_speed = lack
-        turn_sum += turn * vehicle.dt
-        speed_sum += lack * vehicle.dt
-        control_2 = pid(turn, last_turn, turn_sum, gains, vehicle.dt, limit_2)
-        control_1 = pid(lack, last_speed, speed_sum, gains, vehicle.dt, limit_1)
-        last_turn = turn
-        last_speed = lack
+        speed = max(way[at, 3], settings.slowest_share * vehicle.max_speed)
+        control_1, control_2, errors = steer(
+            state, way[at, 0], way[at, 1], speed, errors, filled == first, settings.gains, vehicle
+        )
         driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
         state = step(state, driven_1, driven_2, vehicle)
         if not state_is_free(state, vehicle, scene):

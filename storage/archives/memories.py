@@ -16,11 +16,11 @@ import numpy as np
 
 from planners.memory.encoder.encoder import Architecture, architecture_of, to_onnx, weight_shapes
 from planners.memory.encoder.training import OBJECTIVES
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.stored_plans import StoredPlans, store_plans
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans, sweeps_with
 from planners.memory.ranking.inverted_lists import lists_with
-from planners.memory.recall import Memory
 from planners.world.arrays import Floats
 from planners.world.geometry.occupancy import GRID, Bits
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M

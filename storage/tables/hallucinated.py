@@ -9,8 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from planners.memory.plans.sweeps import Flags
-from planners.world.arrays import Integers
+from planners.world.arrays import Flags, Integers
 from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.fields import short

@@ -9,9 +9,10 @@ from typing import Final
 import numpy as np
 
 from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import RECALLS, TRIED_DRAWN, Memory
+from planners.memory.recall import RECALLS, TRIED_DRAWN
 from planners.solve import solve
 from planners.world.problem import (
     BOUNDS,

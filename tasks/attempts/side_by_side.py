@@ -6,7 +6,7 @@ import gc
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.solve import Attempt, solve
 from planners.world.problem import Problem
 from planners.world.randomness import generator

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from planners.memory.growth import grow
+from planners.memory.memory import Memory
 from planners.memory.plans.experience import Experience
-from planners.memory.recall import Memory
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.memories import load_memory
 from storage.places.data_folder import DataFolder

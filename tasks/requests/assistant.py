@@ -10,9 +10,11 @@ from time import perf_counter
 from typing import Final, NamedTuple
 
 from planners.explanation import recollections
-from planners.memory.recall import RECALLS, Memory
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import turned
+from planners.memory.recall import RECALLS
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve, turned
+from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from planners.explanation import Recollection
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.solve import Attempt
 from planners.world.problem import Plan
 

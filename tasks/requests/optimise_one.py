@@ -126,12 +126,12 @@ def optimise_one(
     if len(problems) != 1:
         raise RunError(f"{problem_file} holds {len(problems)} problems; `optimise` takes one.")
     problem = problems[0]
-    objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=clearance_weight)
+    weights = DEFAULT_SETTINGS.weights._replace(clearance_weight=clearance_weight)
     initial.warn_of_other_problem(problem)
     initial.guess(problem)  # compiles and fills caches before the time counts
     start = perf_counter()
     guess, planner = initial.guess(problem)
-    optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(objective=objective), initial.vehicle)
+    optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)
     seconds = perf_counter() - start
     if out is not None:
         write_plan(out, _record(problem, optimised, planner, seconds, initial.vehicle))

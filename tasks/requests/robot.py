@@ -14,7 +14,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from planners.memory.recall import RECALLS, Memory, default_recall
+from planners.memory.memory import Memory
+from planners.memory.recall import RECALLS, default_recall
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, to_canonical

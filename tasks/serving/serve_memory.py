@@ -8,7 +8,7 @@ import math
 import os
 from pathlib import Path
 
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.archives.memories import load_memory
 from tasks.registry.memory_at import memory_at

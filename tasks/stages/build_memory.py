@@ -11,7 +11,7 @@ from dashboards.figures.embeddings import embedding_map
 from dashboards.figures.recall_curves import training_curves
 from dashboards.figures.style import save
 from planners.memory.build_memory import build_memory
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.world.geometry.occupancy import GRID
 from storage.archives.encoders import load_encoder
 from storage.archives.memories import save_memory

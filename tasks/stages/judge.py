@@ -9,7 +9,8 @@ from typing import Final, NamedTuple
 
 import pandas as pd
 
-from planners.memory.recall import Memory, default_recall
+from planners.memory.memory import Memory
+from planners.memory.recall import default_recall
 from planners.solve import WITHOUT_MEMORY
 from planners.world.authority.authority import faults
 from storage.archives.memories import load_memory

@@ -32,10 +32,10 @@ def improve_chunk(chunk: Chunk) -> None:
 
 def _improved(problem: Problem, plan: Plan, vehicle: Vehicle) -> Plan:
     """The plan made shorter and clearer; the same plan if that fails."""
-    from planners.optimisation.optimise import DEFAULT_SETTINGS, improve  # late: few runs need CasADi
+    from planners.optimisation.optimise import DEFAULT_SETTINGS, refined  # late: few runs need CasADi
 
-    objective = DEFAULT_SETTINGS.objective._replace(clearance_weight=CLEARANCE_WEIGHT)
-    return improve(problem, plan, DEFAULT_SETTINGS._replace(objective=objective), vehicle)
+    weights = DEFAULT_SETTINGS.weights._replace(clearance_weight=CLEARANCE_WEIGHT)
+    return refined(problem, plan, DEFAULT_SETTINGS._replace(weights=weights), vehicle)
 
 
 IMPROVE: Final = Stage(

@@ -12,10 +12,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from planners.memory.encoder.training import TrainedEncoder
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.sweeps import Flags, free_plans
-from planners.memory.recall import Memory, rank
-from planners.world.arrays import Integers
+from planners.memory.plans.fit import free_plans
+from planners.memory.recall import rank
+from planners.world.arrays import Flags, Integers
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import Grid, bits_of, occupancy_of, unpack
 from storage.archives.encoders import load_encoder

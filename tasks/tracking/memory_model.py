@@ -21,10 +21,9 @@ from mlflow.pyfunc.model import PythonModel, PythonModelContext
 from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
-from planners.memory.plans.sweeps import plan_answers
+from planners.memory.memory import Memory, scale_fault
+from planners.memory.plans.fit import ends_of, plan_fits, turned
 from planners.memory.ranking.scores import best_plans
-from planners.memory.recall import Memory, scale_fault
-from planners.solve import turned
 from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
@@ -119,9 +118,7 @@ class MemoryModel(PythonModel):
         rows = []
         best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
         for rank, i in enumerate(best, start=1):
-            free, _ = plan_answers(
-                memory.sweeps, i, scene, canonical.start, canonical.goal, canonical.goal_radius
-            )
+            free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
             aligned = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
             plan = scaled(aligned, problem.scale)
             row = (problem.id, rank, i, bool(free), float(scores[i]), plan.dt)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import Memory
 from planners.solve import solve
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.plans.sweeps import free_plans
+from planners.memory.plans.fit import free_plans, turned
 from planners.memory.recall import RECALLS
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import ASSISTS, improved, solve, turned
+from planners.solve import ASSISTS, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator

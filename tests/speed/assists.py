@@ -25,9 +25,10 @@ from planners.memory.encoder.training import TrainingSettings, train
 from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
+from planners.memory.memory import Memory
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.sweeps import free_plans, sweep_plans
-from planners.memory.recall import Memory
+from planners.memory.plans.fit import free_plans
+from planners.memory.plans.sweeps import sweep_plans
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
 from planners.world.arrays import Floats

@@ -26,11 +26,11 @@ from scipy.stats import binomtest
 from planners.memory.curation import coverage, curate
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.sweeps import Flags, sweep_plans
+from planners.memory.plans.sweeps import sweep_plans
 from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.world.alignment import to_canonical
-from planners.world.arrays import Floats
+from planners.world.arrays import Flags, Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.randomness import generator

@@ -32,8 +32,10 @@ from rich.progress import track
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from planners.memory.plans.sweeps import Flags, free_plans
-from planners.memory.recall import RECALLS, Memory, default_recall, recall
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import free_plans
+from planners.memory.recall import RECALLS, default_recall, recall
+from planners.world.arrays import Flags
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem

@@ -19,8 +19,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from planners.memory.plans.sweeps import free_plans
-from planners.memory.recall import RECALLS, Memory, recall
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import free_plans
+from planners.memory.recall import RECALLS, recall
 from planners.solve import solve
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import scene_of

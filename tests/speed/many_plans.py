@@ -10,11 +10,11 @@ import numpy as np
 from rich.progress import track
 
 from planners.memory.growth import grow
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.stored_plans import StoredPlans, store_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.ranking.inverted_lists import list_readout
-from planners.memory.recall import Memory
 from planners.solve import solve
 from planners.world.classes.problem_classes import ProblemClass
 from planners.world.problem import Plan

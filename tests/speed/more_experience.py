@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.solve import Attempt, solve
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import problem_class

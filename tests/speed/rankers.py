@@ -8,9 +8,9 @@ from time import thread_time
 
 import numpy as np
 
+from planners.memory.memory import Memory
 from planners.memory.ranking.inverted_lists import best_listed, list_readout
 from planners.memory.ranking.scores import best_plans
-from planners.memory.recall import Memory
 from planners.world.arrays import Floats32, Integers
 
 CANDIDATES = 16  # plans asked for

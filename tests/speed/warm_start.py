@@ -22,8 +22,8 @@ from rich.table import Table
 from scipy.stats import bootstrap
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, least_blocked, straight_line
-from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, improve, optimise
+from planners.optimisation.guesses import count_blocked, nearest_to_free, straight_line
+from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise, refined
 from planners.search.registry import plan
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
@@ -73,12 +73,12 @@ def guesses_for(problem: Problem, stored: Sequence[Plan]) -> dict[str, Callable[
     """How each start comes by its guess: in the timed region."""
 
     def recalled() -> Plan:
-        return stored[least_blocked(stored, scene_of(problem))]
+        return stored[nearest_to_free(stored, scene_of(problem))]
 
     def blocked() -> Plan:
         scene = scene_of(problem)
         colliding = [each for each in stored if count_blocked(each.states, CAR, scene) > 0]
-        return colliding[least_blocked(colliding, scene)]
+        return colliding[nearest_to_free(colliding, scene)]
 
     def searched() -> Plan:
         found = plan("follow", problem, generator(SEED, problem.id)).plan
@@ -165,9 +165,9 @@ def improvements() -> Table:
         settings = DEFAULT_SETTINGS
         better = [each for _, each in pairs]
         if weight is not None:
-            objective = settings.objective._replace(clearance_weight=weight)
-            settings = settings._replace(objective=objective)
-            better = [improve(problem, each, settings) for problem, each in pairs]
+            weights = settings.weights._replace(clearance_weight=weight)
+            settings = settings._replace(weights=weights)
+            better = [refined(problem, each, settings) for problem, each in pairs]
         clear = [least_clearance(pair[0], each.states, CAR) for pair, each in zip(pairs, better, strict=True)]
         changed = sum(each is not pair[1] for pair, each in zip(pairs, better, strict=True))
         durations = np.array([each.duration_s for each in better])

@@ -9,10 +9,10 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from planners.memory.encoder.encoder import Architecture, initial_weights
+from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import Memory
 from planners.world.arrays import Floats
 from planners.world.problem import (
     BOUNDS,

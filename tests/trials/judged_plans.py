@@ -25,7 +25,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve

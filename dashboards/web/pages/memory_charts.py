@@ -11,9 +11,8 @@ from dashboards.palette import GREEN, GREY, SERIES, VERMILLION
 from dashboards.statistics.embedding_plane import embedding_plane, spread_plans
 from dashboards.web.charts import FAINT, Chart, Line, Mark, lines, map_of
 from dashboards.web.parameters import Parameters, link
-from planners.memory.plans.sweeps import Flags
-from planners.memory.recall import Memory
-from planners.world.arrays import Floats, Floats32, Integers
+from planners.memory.memory import Memory
+from planners.world.arrays import Flags, Floats, Floats32, Integers
 
 _MOST_CENTROIDS: Final = 150  # of which all are shown; of more only those of coloured plans
 _SHOWN_PLANS: Final = 12

@@ -13,7 +13,7 @@ from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
 from dashboards.web.parameters import Parameters
 from dashboards.world_outlines import outlines, shown_states
-from planners.memory.recall import Memory, scale_fault
+from planners.memory.memory import Memory, scale_fault
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve

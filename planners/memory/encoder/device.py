@@ -11,7 +11,7 @@ from torch import Tensor
 
 from planners.memory.encoder.torch_network import embed
 
-Forward = Callable[[dict[str, Tensor], Tensor], Tensor]
+Embedder = Callable[[dict[str, Tensor], Tensor], Tensor]
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def deterministic(threads: int) -> Iterator[torch.device]:
         torch.use_deterministic_algorithms(was_deterministic)
 
 
-def forward_on(device: torch.device) -> Forward:
+def forward_on(device: torch.device) -> Embedder:
     """The encoder (``network.embed``) as training runs it on a device."""
     if device.type == "cpu":
         return embed

@@ -11,10 +11,10 @@ from planners.memory.encoder.device import forward_on
 from planners.memory.encoder.encoder import Weights
 from planners.memory.encoder.objectives import Objective
 from planners.memory.encoder.torch_network import embed_all
-from planners.world.arrays import Floats32, Integers
+from planners.world.arrays import Flags, Floats32, Integers
 from planners.world.geometry.occupancy import Grid
 
-State = tuple[Floats32, Floats32, Floats32, Floats32]
+LearnerState = tuple[Floats32, Floats32, Floats32, Floats32]
 
 
 class Learner:
@@ -22,7 +22,7 @@ class Learner:
 
     def __init__(
         self,
-        problems: tuple[Grid, Integers, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]],
+        problems: tuple[Grid, Integers, Flags],
         weights: Weights,
         own: Weights,
         weight_decay: float,
@@ -74,12 +74,12 @@ class Learner:
         """Embeddings ``[len(asked), D]`` by the parameters that were kept."""
         return _array(embed_all(self._parameters.named(self._best), self._bits[asked]))
 
-    def state(self) -> State:
+    def state(self) -> LearnerState:
         """All that changes while learning, ``[P]`` each: parameters, the optimiser's two means, the best."""
         values, mean, square, best = map(_array, self._places())
         return values, mean, square, best
 
-    def restore(self, state: State, steps: int) -> None:
+    def restore(self, state: LearnerState, steps: int) -> None:
         """Take a ``state`` back, reached after so many steps; ValueError where it is another network's."""
         if any(kept.shape != self._best.shape for kept in state):
             raise ValueError(

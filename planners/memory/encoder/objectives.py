@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.nn.functional import binary_cross_entropy_with_logits, linear, relu
 
 from planners.memory.encoder.encoder import Weights
+from planners.memory.ranking.readout import centroids_of, nearest_readout
 
 VECTORS = "readout.vectors"
 BIASES = "readout.biases"
@@ -97,10 +98,7 @@ class Triplet:
     def readout(
         self, own: Mapping[str, Tensor], embeddings: Tensor, rows: Tensor, count: int
     ) -> tuple[Tensor, Tensor]:
-        """The sample's centroids, ranked by distance (``readout.nearest_readout``)."""
-        known = rows >= 0
-        sizes = torch.bincount(rows[known], minlength=count)
-        sums = embeddings.new_zeros((count, embeddings.shape[1]))
-        sums.index_add_(0, rows[known], embeddings[known])
-        centroids = sums / sizes.clamp(min=1)[:, None]
-        return centroids, torch.where(sizes > 0, -0.5 * centroids.square().sum(1), -torch.inf)
+        """The sample's centroids, ranked by distance."""
+        centroids, _ = centroids_of(embeddings.cpu().numpy(), rows.cpu().numpy(), count)
+        vectors, biases = (torch.from_numpy(each) for each in nearest_readout(centroids, 0.0))
+        return vectors.to(embeddings.device), biases.to(embeddings.device)

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.plans.sweeps import Flags
-from planners.world.arrays import Integers
+from planners.world.arrays import Flags, Integers
 from planners.world.randomness import generator
 
 

@@ -12,9 +12,8 @@ import numpy as np
 
 from planners.memory.encoder.encoder import Architecture, Weights, architecture_of, initial_weights
 from planners.memory.encoder.splits import first_of_each, split
-from planners.memory.plans.sweeps import Flags
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
-from planners.world.arrays import Floats32, Integers
+from planners.world.arrays import Flags, Floats32, Integers
 from planners.world.geometry.occupancy import Grid
 from planners.world.randomness import generator
 

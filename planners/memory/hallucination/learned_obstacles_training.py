@@ -36,6 +36,7 @@ from planners.memory.hallucination.learned_obstacles import (
     weight_shapes,
 )
 from planners.memory.plans.experience import Experience
+from planners.world.arrays import Floats, Floats32
 from planners.world.randomness import generator
 
 INITIAL_LOG_STD: Final = -1.0  # narrower than the prior: a plan is lost in what it draws
@@ -110,7 +111,7 @@ def planned(
 
 def _loss(
     weights: dict[str, Tensor],
-    ways: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    ways: Floats,
     noise: Tensor,
     smoothing: Tensor,
     settings: LearnedTraining,
@@ -136,7 +137,7 @@ def _loss(
     )
 
 
-def _smoothing() -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+def _smoothing() -> Floats32:
     """How far a push on one point moves the others ``[POINTS, POINTS]``: the inverse of an elastic band.
 
     Scaled so that no point moves by more than it is pushed; the two ends stay.

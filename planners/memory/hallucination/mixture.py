@@ -14,7 +14,7 @@ from planners.memory.hallucination.method import DrawObstacles, Method
 from planners.memory.hallucination.minimal import Minimal
 from planners.memory.hallucination.rearrange import Rearrange
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.sweeps import plan_is_free
+from planners.memory.plans.fit import ends_of, plan_fits
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 
@@ -57,10 +57,7 @@ def hallucinate(
     RuntimeError: the plan does not solve its own problem.
     """
     origin = experience.problem
-    free, _ = plan_is_free(
-        experience.sweep, 0, scene_of(origin), origin.start, origin.goal, origin.goal_radius
-    )
-    if not free:
+    if not plan_fits(experience.sweep, 0, ends_of(origin), scene_of(origin))[0]:
         raise RuntimeError(f"{origin.id} is not solved by its own plan; collect it again")
     samplers = [method_named(name, weights).around(experience, rng) for name in mixture]
     names, limits = list(mixture), np.cumsum(list(mixture.values()))

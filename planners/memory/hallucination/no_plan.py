@@ -14,8 +14,9 @@ from planners.memory.hallucination.placing import (
     obstacle_meets,
     take_obstacle,
 )
-from planners.memory.plans.sweeps import Flags, PlanSweeps, free_plans, sweep_is_free
-from planners.world.arrays import Floats
+from planners.memory.plans.fit import free_plans, sweep_is_free
+from planners.memory.plans.sweeps import PlanSweeps
+from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import build_scene
 from planners.world.jit import jit
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
@@ -66,7 +67,7 @@ def _with_blocking(
     taken = np.zeros(extras, np.bool_)
     for i in range(free.shape[0]):
         if free[i]:
-            unblocked, checked = sweep_is_free(sweeps, i, scene)
+            unblocked, checked = sweep_is_free(sweeps, i, 1.0, 0.0, scene)
             if not unblocked:
                 last = sweeps.starts[i] + checked
                 blocked = sweeps.boxes[last - 1 : last].reshape((1, 1, 6))

@@ -13,13 +13,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.classes.shapes import distance_to_piece
 from planners.world.jit import inlined, jit
 from planners.world.problem import BOUNDS, Obstacles
 
-Lattice = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-Closed = Lattice  # [SIDE * SIDE] bit k of a point: closed by obstacle k
+Closed = Indices  # [SIDE * SIDE] bit k of a point: closed by obstacle k
 
 STEP_M: Final = 0.5  # between lattice points; start and goal of the canonical frame are such points
 SIDE: Final = 1 + int((BOUNDS[2] - BOUNDS[0]) / STEP_M)
@@ -27,7 +26,7 @@ MOST: Final = 62  # obstacles, one bit each
 OUTSIDE: Final = 62  # the bit of points that are too near to the bounds, or beyond
 
 
-def _moves() -> Lattice:
+def _moves() -> Indices:
     """Steps ``[16, 4]``: columns and rows on, then those of two points that a knight's move passes between.
 
     Ways of 16 directions are at most 2.7 % longer than straight ones.
@@ -45,11 +44,11 @@ def _moves() -> Lattice:
 _MOVES: Final = _moves()
 
 
-class Way(NamedTuple):
+class LatticePath(NamedTuple):
     """A shortest way over the lattice."""
 
     length_m: float  # infinite where there is none within the limit
-    points: Lattice  # lattice points from the goal back to the start
+    points: Indices  # lattice points from the goal back to the start
 
 
 def inflated_radius(width_m: float) -> float:
@@ -104,7 +103,7 @@ def ways_left(goal: tuple[float, float], goal_radius: float) -> Floats:
 @jit
 def shortest_way(
     closed: Closed, ignored: int, start: tuple[float, float], left: Floats, limit_m: float
-) -> Way:
+) -> LatticePath:
     """The shortest way from the point next to ``start`` into the goal disc, if below ``limit_m``.
 
     Obstacles whose bits are set in ``ignored`` are not there. ``left`` is what ``ways_left`` gives.
@@ -124,7 +123,7 @@ def shortest_way(
             points = [point]
             while points[-1] != begin:
                 points.append(came_from[points[-1]])
-            return Way(lengths[point], np.array(points))
+            return LatticePath(lengths[point], np.array(points))
         if not unsettled[point]:
             continue
         unsettled[point] = False
@@ -142,4 +141,4 @@ def shortest_way(
                 lengths[to] = length
                 came_from[to] = point
                 heapq.heappush(queue, (length + left[to], to))
-    return Way(math.inf, np.empty(0, np.int64))
+    return LatticePath(math.inf, np.empty(0, np.int64))

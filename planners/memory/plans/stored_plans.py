@@ -8,10 +8,8 @@ from typing import overload
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.problem import Plan
-
-Offsets = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +21,7 @@ class StoredPlans(Sequence[Plan]):
 
     states: Floats  # [T_0 + ... + T_{N-1}, S] of all plans, one after another
     controls: Floats  # [T_0 + ... + T_{N-1} - N, 2]
-    starts: Offsets  # [N + 1] plan i owns states[starts[i] : starts[i + 1]]
+    starts: Indices  # [N + 1] plan i owns states[starts[i] : starts[i + 1]]
     dt: Floats  # [N] seconds
 
     def __post_init__(self) -> None:

@@ -6,25 +6,20 @@ only moves through them. They are exactly the boxes that ``collision.state_is_fr
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.plans.stored_plans import Offsets, StoredPlans, store_plans
-from planners.world.arrays import Floats, Integers
-from planners.world.geometry.collision import Scene, box_is_free
-from planners.world.jit import inlined, jit
+from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.world.arrays import Floats, Indices, Integers
+from planners.world.jit import jit
 from planners.world.problem import Plan
 from planners.world.vehicles.bodies import body_count
 from planners.world.vehicles.dynamics import load, swept_bodies
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-
 COARSEST_STRIDE = 64  # first states visited are 64 steps apart: some 20 m of driving
-START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
 
 
 class PlanSweeps(NamedTuple):
@@ -57,7 +52,7 @@ def coarse_to_fine(count: int) -> Integers:
 
 
 @jit
-def _fill_sweeps(states: Floats, starts: Offsets, vehicle: Vehicle, boxes: Floats) -> None:
+def _fill_sweeps(states: Floats, starts: Indices, vehicle: Vehicle, boxes: Floats) -> None:
     filled = 0
     for i in range(starts.shape[0] - 1):
         for t in coarse_to_fine(starts[i + 1] - starts[i]):
@@ -83,140 +78,3 @@ def sweeps_with(boxes: Floats, plans: StoredPlans) -> PlanSweeps:
     first, last = plans.states[plans.starts[:-1]], plans.states[plans.starts[1:] - 1]
     starts = (bodies * plans.starts).astype(np.int32)
     return PlanSweeps(boxes, starts, first[:, :3].copy(), last[:, :2].copy())
-
-
-@inlined
-def sweep_is_free(sweeps: PlanSweeps, i: int, scene: Scene) -> tuple[bool, int]:
-    """Whether plan ``i``'s sweep is free in a scene, and how many boxes were checked to know."""
-    boxes = sweeps.boxes
-    for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
-        if not box_is_free(
-            boxes[j, 0], boxes[j, 1], boxes[j, 2], boxes[j, 3], boxes[j, 4], boxes[j, 5], scene
-        ):
-            return False, j - sweeps.starts[i] + 1
-    return True, sweeps.starts[i + 1] - sweeps.starts[i]
-
-
-@jit
-def free_plans(sweeps: PlanSweeps, scene: Scene) -> Flags:
-    """Label vector ``[N]``: which plans' sweeps are free in a scene of the canonical frame."""
-    free = np.empty(sweeps.starts.shape[0] - 1, np.bool_)
-    for i in range(free.shape[0]):
-        free[i], _ = sweep_is_free(sweeps, i, scene)
-    return free
-
-
-@inlined
-def plan_joins(
-    sweeps: PlanSweeps,
-    i: int,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    goal_radius: float,
-) -> bool:
-    """Whether plan ``i`` begins at a start pose and ends in a goal disc."""
-    if (
-        abs(sweeps.first_poses[i, 0] - start[0]) > START_TOLERANCE
-        or abs(sweeps.first_poses[i, 1] - start[1]) > START_TOLERANCE
-        or abs(sweeps.first_poses[i, 2] - start[2]) > START_TOLERANCE
-    ):
-        return False
-    last = sweeps.last_positions
-    return math.hypot(last[i, 0] - goal[0], last[i, 1] - goal[1]) <= goal_radius
-
-
-@inlined
-def turned_box_is_free(
-    boxes: Floats, j: int, px: float, py: float, cos: float, sin: float, scene: Scene
-) -> bool:
-    """Whether box ``j``, turned about (px, py) by an angle of that cosine and sine, is free."""
-    dx = boxes[j, 0] - px
-    dy = boxes[j, 1] - py
-    return box_is_free(
-        px + cos * dx - sin * dy,
-        py + sin * dx + cos * dy,
-        cos * boxes[j, 2] - sin * boxes[j, 3],
-        sin * boxes[j, 2] + cos * boxes[j, 3],
-        boxes[j, 4],
-        boxes[j, 5],
-        scene,
-    )
-
-
-@jit
-def plan_is_free(
-    sweeps: PlanSweeps,
-    i: int,
-    scene: Scene,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    goal_radius: float,
-) -> tuple[bool, int]:
-    """Whether plan ``i`` answers a problem: begins at its start, ends in its goal disc, and is free.
-
-    Also how many footprints were checked to know.
-    """
-    if not plan_joins(sweeps, i, start, goal, goal_radius):
-        return False, 0
-    return sweep_is_free(sweeps, i, scene)
-
-
-@jit
-def turned_plan_is_free(
-    sweeps: PlanSweeps,
-    i: int,
-    scene: Scene,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    goal_radius: float,
-) -> tuple[bool, int]:
-    """Like ``plan_is_free`` for plan ``i`` turned rigidly about its first position to the start's heading."""
-    pose = sweeps.first_poses[i]
-    px = pose[0]
-    py = pose[1]
-    if abs(px - start[0]) > START_TOLERANCE or abs(py - start[1]) > START_TOLERANCE:
-        return False, 0
-    cos = math.cos(start[2] - pose[2])
-    sin = math.sin(start[2] - pose[2])
-    dx = sweeps.last_positions[i, 0] - px
-    dy = sweeps.last_positions[i, 1] - py
-    if math.hypot(px + cos * dx - sin * dy - goal[0], py + sin * dx + cos * dy - goal[1]) > goal_radius:
-        return False, 0
-    for j in range(sweeps.starts[i], sweeps.starts[i + 1]):
-        if not turned_box_is_free(sweeps.boxes, j, px, py, cos, sin, scene):
-            return False, j - sweeps.starts[i] + 1
-    return True, sweeps.starts[i + 1] - sweeps.starts[i]
-
-
-@jit
-def plan_answers(
-    sweeps: PlanSweeps,
-    i: int,
-    scene: Scene,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    goal_radius: float,
-) -> tuple[bool, int]:
-    """Whether plan ``i``, turned to the start's heading if it has another, answers a problem; the checks."""
-    if abs(sweeps.first_poses[i, 2] - start[2]) <= START_TOLERANCE:
-        return plan_is_free(sweeps, i, scene, start, goal, goal_radius)
-    return turned_plan_is_free(sweeps, i, scene, start, goal, goal_radius)
-
-
-@jit
-def first_answer(
-    sweeps: PlanSweeps,
-    order: Integers,
-    scene: Scene,
-    start: tuple[float, float, float],
-    goal: tuple[float, float],
-    goal_radius: float,
-) -> tuple[int, int]:
-    """The first plan of ``order`` that answers a problem (-1: none), and how many footprints were checked."""
-    checks = 0
-    for i in order:
-        free, checked = plan_answers(sweeps, i, scene, start, goal, goal_radius)
-        checks += checked
-        if free:
-            return i, checks
-    return -1, checks

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.memory.ranking.scores import insert
-from planners.world.arrays import Floats32, Integers
+from planners.world.arrays import Floats32, Indices, Integers
 from planners.world.jit import inlined, lean
 from planners.world.randomness import generator
 
@@ -74,7 +74,7 @@ def _rows(vectors: Floats32, biases: Floats32) -> Floats32:
     return np.column_stack((vectors[1:], biases[1:]))
 
 
-def _nearest(rows: Floats32, centres: Floats32) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+def _nearest(rows: Floats32, centres: Floats32) -> Indices:
     """The centre ``[n]`` nearest to each row."""
     halves = 0.5 * np.square(centres).sum(1)
     blocks = [rows[i : i + _BLOCK] @ centres.T - halves for i in range(0, len(rows), _BLOCK)]

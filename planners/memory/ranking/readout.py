@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.arrays import Floats32, Integers
+from planners.world.arrays import Floats, Floats32, Indices, Integers
 
 NO_PLAN_ODDS: Final = 20.0  # recalling in vain costs microseconds, not recalling a free plan costs a search
 
@@ -22,10 +22,19 @@ def centroids_of(embeddings: Floats32, rows: Integers, count: int) -> tuple[Floa
     counts = np.bincount(rows, minlength=count)
     sums = np.zeros((count, embeddings.shape[1]))
     np.add.at(sums, rows, values)
-    sums[counts == 0] = np.inf
-    centroids = sums / np.maximum(counts, 1)[:, np.newaxis]
+    centroids = mean_embeddings(sums, counts)
     scatter = np.square(values - centroids[rows]).sum(1).mean()
     return centroids.astype(np.float32), float(scatter)
+
+
+def mean_embeddings(sums: Floats, counts: Floats | Indices) -> Floats:
+    """Centroids ``[R, D]`` of R rows from the sums ``[R, D]`` and counts ``[R]`` of their embeddings.
+
+    A row without embeddings is infinitely far from everything.
+    """
+    means = np.full_like(sums, np.inf)
+    np.divide(sums, counts[:, np.newaxis], out=means, where=counts[:, np.newaxis] > 0)
+    return means
 
 
 def nearest_readout(centroids: Floats32, scatter: float) -> tuple[Floats32, Floats32]:

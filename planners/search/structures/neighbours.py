@@ -11,12 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Indices
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
-
-# one width of integer in all search buffers: another would compile each kernel twice
-Indices = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 BUCKETS_A_SIDE = 64
 NEWEST = 16  # points looked at in a bucket

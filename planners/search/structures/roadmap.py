@@ -14,15 +14,8 @@ from numpy.random import BitGenerator
 
 from planners.search.guides.sampling import in_bounds, uniform
 from planners.search.structures.clearance import clearance, strip_is_free
-from planners.search.structures.neighbours import (
-    Buckets,
-    Indices,
-    allocate_buckets,
-    clear_buckets,
-    nearest_k,
-    put,
-)
-from planners.world.arrays import Floats
+from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, nearest_k, put
+from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, box_is_free
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.vehicle import Vehicle

@@ -8,20 +8,14 @@ import numpy as np
 from numpy.random import BitGenerator
 
 from planners.search.guides.sampling import uniform
-from planners.search.structures.neighbours import (
-    Buckets,
-    Indices,
-    allocate_buckets,
-    clear_buckets,
-    put,
-    remove,
-)
-from planners.world.arrays import Floats
+from planners.search.structures.controller import NO_ERRORS, Gains, steer
+from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
+from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 # places in Tree.counts
@@ -52,9 +46,7 @@ class Extension(NamedTuple):
     least_added: int = 12  # a vertex from which fewer steps were free is not extended again
     arrival_m: float = 1.0  # a target is reached within this distance
     slowest_share: float = 0.95  # desired speed: U(this, 1) of the maximum
-    proportional: float = 10.0
-    integral: float = 0.1
-    derivative: float = 0.1
+    gains: Gains = Gains()
 
 
 EXTENSION = Extension()
@@ -106,13 +98,6 @@ def prune(tree: Tree, size: int, bounds: Floats) -> None:
 
 
 @inlined
-def pid(error: float, last: float, total: float, gains: Extension, dt: float, limit: float) -> float:
-    """Control within plus and minus ``limit``; ``last`` error a step ago, ``total`` its sum over time."""
-    control = gains.proportional * error + gains.integral * total + gains.derivative * (error - last) / dt
-    return min(max(control, -limit), limit)
-
-
-@inlined
 def segment_distance(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance in metres from a point to the segment from a to b."""
     dx = bx - ax
@@ -159,10 +144,7 @@ def extend(
     ) * vehicle.max_speed
     control_1 = (2.0 * uniform(rng) - 1.0) * limit_1
     control_2 = (2.0 * uniform(rng) - 1.0) * limit_2
-    turn_sum = 0.0
-    speed_sum = 0.0
-    last_turn = 0.0
-    last_speed = 0.0
+    errors = NO_ERRORS
     first = counts[SIZE]
     parent = vertex
     arrived = False
@@ -170,17 +152,9 @@ def extend(
         if counts[SIZE] == states.shape[0]:
             break
         if steered:
-            turn = turn_error(state, target_x, target_y, vehicle)
-            lack = desired_speed - state[3]
-            if i == 0:
-                last_turn = turn
-                last_speed = lack
-            turn_sum += turn * vehicle.dt
-            speed_sum += lack * vehicle.dt
-            control_2 = pid(turn, last_turn, turn_sum, settings, vehicle.dt, limit_2)
-            control_1 = pid(lack, last_speed, speed_sum, settings, vehicle.dt, limit_1)
-            last_turn = turn
-            last_speed = lack
+            control_1, control_2, errors = steer(
+                state, target_x, target_y, desired_speed, errors, i == 0, settings.gains, vehicle
+            )
         driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
         state = step(state, driven_1, driven_2, vehicle)
         x = state[0]

@@ -16,9 +16,10 @@ from dashboards.report.tables import as_csv
 from dashboards.statistics.panels import summarise
 from dashboards.verdicts.drift import Usefulness, drifts
 from dashboards.web.memory_versions import MemoryVersion
-from planners.memory.plans.sweeps import Flags, free_plans
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import free_plans
 from planners.solve import solve
+from planners.world.arrays import Flags
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of, pack

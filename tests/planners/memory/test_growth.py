@@ -11,9 +11,10 @@ from scipy.optimize import minimize
 from planners.memory.build_memory import build_memory
 from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
-from planners.memory.growth import RIDGE, grow, mean_embeddings, moments_of, ridge_readout, scatter
+from planners.memory.growth import RIDGE, grow, moments_of, ridge_readout, scatter
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.sweeps import free_plans
+from planners.memory.plans.fit import free_plans
+from planners.memory.ranking.readout import mean_embeddings
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of
 from planners.world.randomness import generator
@@ -37,7 +38,7 @@ def with_row_0(labels):
 def test_moments_and_centroids_are_of_the_problems_in_which_a_plan_is_free(seed):
     embeddings, labels = some(seed)
     moments = moments_of(embeddings, iter(labels), labels.shape[1])
-    centroids = mean_embeddings(moments)
+    centroids = mean_embeddings(moments.sums, moments.counts).astype(np.float32)
     distances = []
     for row, free in enumerate(with_row_0(labels).T):
         assert moments.counts[row] == free.sum()

@@ -12,17 +12,10 @@ from scipy.spatial.distance import cdist
 from planners.memory.build_memory import build_memory
 from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
-from planners.memory.plans.sweeps import free_plans
+from planners.memory.plans.fit import free_plans
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
 from planners.memory.ranking.scores import best_plans
-from planners.memory.recall import (
-    MOST_EXHAUSTIVE,
-    RECALLS,
-    WORTH_CELLS,
-    default_recall,
-    rank,
-    recall,
-)
+from planners.memory.recall import MOST_EXHAUSTIVE, RECALLS, WORTH_CELLS, default_recall, rank, recall
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import bits_of, occupancy_of
 from planners.world.randomness import generator

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, least_blocked, resampled, straight_line
-from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, Status, improve, optimise
-from planners.optimisation.transcription import Objective
+from planners.optimisation.guesses import count_blocked, nearest_to_free, resampled, straight_line
+from planners.optimisation.optimise import DEFAULT_SETTINGS, Ending, Optimised, optimise, refined
+from planners.optimisation.transcription import CostWeights
 from planners.search.registry import plan
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import count_free_prefix, scene_of
@@ -51,7 +51,7 @@ def assert_is_a_plan(problem: Problem, answer: Plan) -> None:
 
 def test_an_optimised_plan_is_a_plan_and_takes_less_time() -> None:
     found = from_search()
-    assert found.status is Status.CONVERGED
+    assert found.status is Ending.CONVERGED
     assert found.plan is not None
     assert_is_a_plan(world(), found.plan)
     assert found.plan.duration_s < searched().duration_s
@@ -98,15 +98,15 @@ def test_every_vehicle_is_driven_around_an_obstacle(vehicle: Vehicle) -> None:
 def test_improving_never_makes_a_plan_worse() -> None:
     best = from_search().plan
     assert best is not None
-    improved = improve(world(), searched())
+    improved = refined(world(), searched())
     assert improved.duration_s == best.duration_s
-    assert improve(world(), improved).duration_s <= improved.duration_s
+    assert refined(world(), improved).duration_s <= improved.duration_s
     few = DEFAULT_SETTINGS._replace(iterations=1)
-    assert improve(world(), searched(), few) is searched()
+    assert refined(world(), searched(), few) is searched()
 
 
 def test_a_weight_on_clearance_keeps_away_from_obstacles() -> None:
-    shy = DEFAULT_SETTINGS._replace(objective=Objective(clearance_weight=1.0, wanted_clearance_m=1.0))
+    shy = DEFAULT_SETTINGS._replace(weights=CostWeights(clearance_weight=1.0, wanted_clearance_m=1.0))
     fast, clear = from_search().plan, optimise(world(), searched(), shy).plan
     assert fast is not None
     assert clear is not None
@@ -119,13 +119,13 @@ def test_what_cannot_be_reached_does_not_converge() -> None:
     found = optimise(problem, straight_line(problem), DEFAULT_SETTINGS._replace(iterations=30))
     assert found.plan is None
     assert not found.converged
-    assert found.status in (Status.INFEASIBLE, Status.ITERATIONS_SPENT)
+    assert found.status in (Ending.INFEASIBLE, Ending.ITERATIONS_SPENT)
     assert found.iterations <= 30
 
 
 def test_a_blocked_start_and_a_start_in_the_goal_need_no_iterations() -> None:
     onto = problem_of([box(0.5, 0.5, 0.0, 0.3, 0.3)])
-    assert optimise(onto, searched()).status is Status.START_BLOCKED
+    assert optimise(onto, searched()).status is Ending.START_BLOCKED
     there = replace(problem_of([]), goal=(1.0, 0.0))
     found = optimise(there, searched())
     assert found.plan is not None
@@ -164,11 +164,11 @@ def test_the_least_blocked_plan_is_chosen() -> None:
     plans = [straight_line(problem), *(plan("rrt", strewn(5, 40), generator(i)).plan for i in (1, 2))]
     scene = scene_of(problem)
     assert all(each is not None for each in plans)
-    chosen = least_blocked(plans, scene)
+    chosen = nearest_to_free(plans, scene)
     counts = [sum(count_free_prefix(state[None], CAR, scene) == 0 for state in each.states) for each in plans]
     assert chosen == int(np.argmin(counts)) > 0
     with pytest.raises(ValueError, match="no plan"):
-        least_blocked([], scene)
+        nearest_to_free([], scene)
 
 
 def test_resampling_keeps_ends_and_duration() -> None:

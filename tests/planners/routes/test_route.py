@@ -14,7 +14,7 @@ from planners.maps.cutting import cut_problems
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.memory.recall import Memory
+from planners.memory.memory import Memory
 from planners.routes.route import Route, Router, Stuck
 from planners.routes.way_ahead import WayAhead
 from planners.solve import Attempt, solve

@@ -10,8 +10,9 @@ import pytest
 
 from flows.cli.main import call
 from planners.explanation import recollections
-from planners.memory.recall import Memory
-from planners.solve import solve, turned
+from planners.memory.memory import Memory
+from planners.memory.plans.fit import turned
+from planners.solve import solve
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import Problem

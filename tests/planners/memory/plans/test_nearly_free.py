@@ -6,10 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.nearly_free import SHARE, least_blocked
+from planners.memory.plans.fit import SHARE, ends_of, least_blocked, turned
 from planners.memory.plans.sweeps import coarse_to_fine, sweep_plans
 from planners.search.repair import blocked_states
-from planners.solve import turned
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
 
@@ -28,11 +27,14 @@ def test_it_is_the_plan_with_the_fewest_blocked_states_of_an_even_sample(experie
         looked_at = coarse_to_fine(len(blocked))[: -(-len(blocked) // SHARE)]
         counts.append(int(blocked[looked_at].sum()))
     sweeps = sweep_plans([each.plan for each in experiences])
-    found, _ = least_blocked(order, sweeps, scene, (*problem.start[:2], heading))
+    found, _ = least_blocked(
+        order, sweeps, ends_of(problem)._replace(start=(*problem.start[:2], heading)), scene
+    )
     assert found == order[np.argmin(counts)]
 
 
 def test_none_that_begins_elsewhere_is_taken(experiences):
     sweeps = sweep_plans([each.plan for each in experiences])
     scene = scene_of(experiences[0].problem)
-    assert least_blocked(np.arange(8, dtype=np.int32), sweeps, scene, (1.0, 0.0, 0.0)) == (-1, 0)
+    elsewhere = ends_of(experiences[0].problem)._replace(start=(1.0, 0.0, 0.0))
+    assert least_blocked(np.arange(8, dtype=np.int32), sweeps, elsewhere, scene) == (-1, 0)

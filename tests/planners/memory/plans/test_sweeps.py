@@ -8,13 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.sweeps import (
-    coarse_to_fine,
-    free_plans,
-    plan_is_free,
-    sweep_plans,
-    turned_plan_is_free,
-)
+from planners.memory.plans.fit import Ends, free_plans, plan_fits
+from planners.memory.plans.sweeps import coarse_to_fine, sweep_plans
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import CAR, Plan
 from planners.world.randomness import generator
@@ -65,18 +60,16 @@ def test_a_plan_that_begins_or_ends_elsewhere_answers_nothing(experiences, draw,
     free = bool(free_plans(sweeps, scene)[0])
     x, y, heading = problem.start
     gx, gy = problem.goal
-    checked = plan_is_free(sweeps, 0, scene, problem.start, problem.goal, 2.0)
+    ends = Ends(problem.start, problem.goal, 2.0)
+    checked = plan_fits(sweeps, 0, ends, scene)
     assert checked[0] == free
-    assert checked == turned_plan_is_free(sweeps, 0, scene, problem.start, problem.goal, 2.0)
     assert 0 < checked[1] <= len(experiences[0].plan.states)
     assert not free or checked[1] == len(experiences[0].plan.states)
     for start, goal in [
         ((x + 1e-6, y, heading), problem.goal),
-        ((x, y, heading + 1e-6), problem.goal),
         (problem.start, (gx + 2.001, gy)),
     ]:
-        assert plan_is_free(sweeps, 0, scene, start, goal, 2.0) == (False, 0)
-    assert turned_plan_is_free(sweeps, 0, scene, problem.start, (gx + 2.001, gy), 2.0) == (False, 0)
+        assert plan_fits(sweeps, 0, Ends(start, goal, 2.0), scene) == (False, 0)
 
 
 @given(seed=SEEDS, turn=st.floats(-0.3, 0.3))
@@ -92,7 +85,7 @@ def test_a_turned_plan_is_checked_where_it_then_lies(experiences, draw, sweeps, 
     start = (problem.start[0], problem.start[1], problem.start[2] + turn)
     goal = (float(states[-1, 0]), float(states[-1, 1]))
     expected = bool(free_plans(turned, scene)[0])
-    assert turned_plan_is_free(sweeps, 0, scene, start, goal, 2.0)[0] == expected
+    assert plan_fits(sweeps, 0, Ends(start, goal, 2.0), scene)[0] == expected
 
 
 def test_no_plans_have_no_labels(experiences):

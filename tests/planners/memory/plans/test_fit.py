@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.first_free import first_free
-from planners.memory.plans.sweeps import first_answer, plan_answers, sweep_plans
+from planners.memory.plans.fit import ends_of, first_fitting, first_fitting_drawn, plan_fits
+from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import BOUNDS
@@ -21,14 +21,14 @@ def answers(experiences, problem):
     """Which of the experiences' plans answer a problem: from the drawing, and from the scene."""
     sweeps = sweep_plans([each.plan for each in experiences])
     masks, drawing, scene = masks_of(sweeps), drawing_of(problem), scene_of(problem)
-    ends = (problem.start, problem.goal, problem.goal_radius)
+    ends = ends_of(problem)
     one_by_one = [np.array([i], np.int32) for i in range(len(experiences))]
-    drawn = [first_free(each, sweeps, masks, drawing, problem)[0] >= 0 for each in one_by_one]
-    built = [plan_answers(sweeps, i, scene, *ends)[0] for i in range(len(experiences))]
+    drawn = [first_fitting_drawn(each, sweeps, masks, drawing, problem)[0] >= 0 for each in one_by_one]
+    built = [plan_fits(sweeps, i, ends, scene)[0] for i in range(len(experiences))]
     order = generator(len(drawn), "order").permutation(len(drawn)).astype(np.int32)
     first = (
-        first_free(order, sweeps, masks, drawing, problem)[0],
-        first_answer(sweeps, order, scene, *ends)[0],
+        first_fitting_drawn(order, sweeps, masks, drawing, problem)[0],
+        first_fitting(order, sweeps, ends, scene)[0],
     )
     return drawn, built, first
 
