@@ -15,7 +15,8 @@ from pathlib import Path
 
 from tasks.servers.access import hosts
 from tasks.servers.guard import Guard
-from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL, is_used, locked
+from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL
+from tasks.servers.users import is_used, locked
 
 
 def prefect_app() -> Guard:

@@ -1,8 +1,9 @@
-"""A command's own Prefect server, on loopback, with its files in the data folder.
+"""A command's own Prefect server: on loopback, inside the data folder, gone when nobody uses it.
 
-The server is a child process (``tasks.servers.prefect_app``) that watches the commands registered with it.
-When the last of them has ended, even by kill -9, it stops. A command that finds a server running shares it.
-Each server has a new password, in a file that only the owner can read.
+The server is a child process (``tasks.servers.prefect_app``) that watches the commands which registered with
+it. It outlives none of them: when the last one has ended, even by kill -9, it stops itself. A command that
+finds it alive shares it. Nobody else can be its client: its password, a new one each time, lies in a file
+that only the owner can read.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from pathlib import Path
 from typing import IO, Final
 
 from tasks.servers.access import auth_environment, new_secret
+from tasks.servers.users import is_held, is_locked, is_used, locked, register
 from tasks.settings.environment import environment
 
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
-STOP_SECONDS: Final = 0.8  # then the child exits at once, which SQLite survives
+STOP_SECONDS: Final = 0.8  # then the child ends itself the hard way; SQLite stands that
 
-CLIENT: Final = (
-    "PREFECT_API_URL",
-    "PREFECT_API_AUTH_STRING",
-)  # variables that make a process a client of the server
-URL, SECRET, LOG, USERS = "server.url", "server.auth", "server.log", "users"  # files of the server's folder
+RESTARTS: Final = 2
+HOST: Final = "127.0.0.1"
+CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")  # what makes a client of a server
+URL, SECRET, LOG = "server.url", "server.auth", "server.log"  # files of the server's folder
 
-# Set before Prefect, MLflow, Dask or a BLAS is imported, unless the user has set them.
+# Set before Prefect, MLflow, Dask or a BLAS is imported, and only where the user has not decided otherwise.
 ENVIRONMENT: Final = {
     "DO_NOT_TRACK": "true",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
@@ -46,13 +47,15 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_READ_BATCH_SIZE": "50",
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_FLUSH_INTERVAL": "1",
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
-    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command reports a failure once, in one line
-    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states are enough; logs would cost one request for each task
+    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # a failure is told once, in one line, by the command
+    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # nor that an event did not reach a server that died
+    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states say it all; logs would cost a request a task
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
-    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
+    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # what a server says whose database is away
     "MLFLOW_LOGGING_LEVEL": "ERROR",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",
+    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # that it cleans up after a process is no news
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -62,40 +65,45 @@ ENVIRONMENT: Final = {
 
 @dataclass(frozen=True)
 class LocalServer:
-    """A server that runs or is starting."""
+    """A server that is up, or coming up."""
 
     url: str  # of the API, http://127.0.0.1:<port>/api
-    folder: Path  # of its files: ``prefect`` in the data folder
+    folder: Path  # where it lives, ``prefect`` in the data folder
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self.ui_url.rpartition(":")[2])
 
     @property
     def ui_url(self) -> str:
-        """The address to open in a browser, which then asks for the password."""
+        """Address to open in a browser, which asks for the secret."""
         return self.url.removesuffix("/api")
 
     @property
     def secret_file(self) -> Path:
-        """The file with the password, which only its owner can read."""
+        """Where the secret lies, readable by its owner alone."""
         return self.folder / SECRET
 
     @property
     def secret(self) -> str:
-        """The ``user:password`` that the server asks for."""
+        """The ``user:password`` that it asks for."""
         return self.secret_file.read_text()
 
     @property
     def environment(self) -> dict[str, str]:
-        """Variables that make Prefect, in this process and its children, a client of the server."""
+        """What makes Prefect in this process, and in its children, a client of the server."""
         return dict(zip(CLIENT, (self.url, self.secret), strict=True))
 
     def __str__(self) -> str:
-        """The line that tells the user the address and the file of the password."""
+        """The line that tells people where to look, and where the password lies."""
         return f"Prefect  {self.ui_url} (while this runs; the password is in {self.secret_file})"
 
     def wait(self, seconds: float = START_SECONDS) -> None:
-        """Return when the server answers. Raises RuntimeError if it does not within ``seconds``."""
+        """Return when the server answers; RuntimeError with one line when it does not."""
         deadline = time.monotonic() + seconds
         while not is_healthy(self.url):
-            if time.monotonic() > deadline or _find(self.folder) is None:
+            if time.monotonic() > deadline:
                 raise RuntimeError(
                     f"The local Prefect server did not start; see {self.folder / LOG}, "
                     "or set PREFECT_API_URL."
@@ -104,9 +112,9 @@ class LocalServer:
 
 
 def set_environment(data: Path) -> None:
-    """Set quiet and private defaults for the libraries that a command uses, with their files in ``data``.
+    """Quiet, private and embedded defaults for every library a command uses, all inside ``data``.
 
-    A password (``tasks.servers.access``) is set for Prefect's and MLflow's servers and clients too.
+    And the password of all servers, where one is set: ours ask for it, and clients send it.
     """
     home = data / "prefect"
     home.mkdir(0o700, parents=True, exist_ok=True)
@@ -121,113 +129,119 @@ def set_environment(data: Path) -> None:
 
 @contextmanager
 def local_server(data: Path) -> Iterator[LocalServer | None]:
-    """Share or start the server of a data folder, and make this process its client.
+    """Share or start the server of ``data [folder]``; None when PREFECT_API_URL names another one.
 
-    Yields the server, which needs some 5 s to start (``LocalServer.wait``), or None if PREFECT_API_URL names
-    another one.
+    Returns at once, and the server needs some 5 s more: see ``LocalServer.wait``. Sets the environment that
+    makes a client of Prefect.
     """
     set_environment(data)
     if os.environ.get("PREFECT_API_URL"):
         yield None
         return
     folder = data / "prefect"
-    server, user = _register(folder)
+    with locked(folder):
+        server, listener = _join(folder)
+        user = register(folder)
+    left = threading.Event()
+    threading.Thread(target=_keep, args=(server, listener, left), daemon=True).start()
     try:
         with environment(**server.environment):
             yield server
     finally:
+        left.set()
         _leave(folder, user)
 
 
 def running_server(data: Path) -> LocalServer | None:
-    """The running server of a data folder, or None."""
-    return _find(data / "prefect")
+    """The server that lives in a data folder, if one does; healthy or still starting."""
+    folder = data / "prefect"
+    return LocalServer((folder / URL).read_text(), folder) if is_held(folder / URL) else None
 
 
-def _register(folder: Path) -> tuple[LocalServer, IO[str]]:
-    """Register as a user of the server, by the lock on a file; start the server if none runs."""
-    (folder / USERS).mkdir(parents=True, exist_ok=True)
-    with locked(folder):
-        user = (folder / USERS / str(os.getpid())).open("w")
-        fcntl.flock(user, fcntl.LOCK_EX)
-        return _find(folder) or _start(folder), user
+def _join(folder: Path) -> tuple[LocalServer, socket.socket | None]:
+    """The server that other commands use, who start it again if it has died, or a new one and its socket."""
+    if is_held(folder / URL) or is_used(folder):
+        return LocalServer((folder / URL).read_text(), folder), None
+    new_secret(folder / SECRET)
+    (folder / LOG).unlink(missing_ok=True)
+    listener = socket.create_server((HOST, 0))  # at once, so that no program of others takes the port first
+    server = LocalServer(f"http://{HOST}:{listener.getsockname()[1]}/api", folder)
+    _start(server, listener)
+    return server, listener
 
 
-def _start(folder: Path) -> LocalServer:
-    """Start the server in a child process, at a port opened here, so that no other program takes it."""
-    secret = new_secret(folder / SECRET)
-    with (
-        socket.create_server(("127.0.0.1", 0)) as listener,
-        (folder / URL).open("w") as state,
-        (folder / LOG).open("wb") as sink,
-    ):
-        server = LocalServer(f"http://127.0.0.1:{listener.getsockname()[1]}/api", folder)
-        fcntl.flock(state, fcntl.LOCK_EX)
+def _start(server: LocalServer, listener: socket.socket) -> None:
+    """Have a child be the server."""
+    folder = server.folder
+    with (folder / URL).open("w") as state, (folder / LOG).open("ab") as sink:
         state.write(server.url)
         state.flush()
+        fcntl.flock(state, fcntl.LOCK_EX)
         child = subprocess.Popen(
             [sys.executable, "-P", "-m", "tasks.servers.prefect_app", str(folder), str(listener.fileno())],
             env=os.environ
             | {
-                "PREFECT_SERVER_API_AUTH_STRING": secret,
-                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # as in this process
+                "PREFECT_SERVER_API_AUTH_STRING": server.secret,
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # what this one has
             },
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=sink,
-            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock until it ends
-            start_new_session=True,  # Ctrl-C ends the command; the server then stops by itself
+            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock for as long as it lives
+            start_new_session=True,  # Ctrl-C is for the command; the server follows by itself
         )
-    threading.Thread(target=child.wait, daemon=True).start()  # no zombie is left if it ends first
-    return server
+    threading.Thread(target=child.wait, daemon=True).start()  # no zombie, should it end first
+
+
+def _keep(server: LocalServer, listener: socket.socket | None, left: threading.Event) -> None:
+    """Start the server again whenever it dies, until this command has left it.
+
+    While nobody listens at the port, who connects to it waits, if this command opened it.
+    """
+    deaths = 0  # without an answer in between
+    while not left.wait(POLL_SECONDS):
+        if is_held(server.folder / URL):
+            deaths = 0 if deaths and is_healthy(server.url) else deaths
+            continue
+        deaths += 1
+        if deaths > RESTARTS:
+            _give_up(server, "dies again and again")
+        try:
+            with locked(server.folder):
+                if not (is_held(server.folder / URL) or left.is_set()):  # no other command was faster
+                    print("The local Prefect server died; it is started again.", file=sys.stderr)
+                    listener = listener or socket.create_server((HOST, server.port))
+                    _start(server, listener)
+        except OSError as error:
+            _give_up(server, f"died, and cannot be started again: {error.strerror}")
+    if listener is not None:
+        listener.close()
+
+
+def _give_up(server: LocalServer, why: str) -> None:
+    """End this process: it would wait for the server for minutes, whatever it does."""
+    print(
+        f"motion-memory: The local Prefect server {why}; see {server.folder / LOG}. What is finished is "
+        "kept; the same command goes on from here.",
+        file=sys.stderr,
+        flush=True,
+    )
+    os._exit(1)
 
 
 def _leave(folder: Path, user: IO[str]) -> None:
-    """Stop being a user; the last user waits for the server to end."""
+    """Be no user any more and, if this was the last, see the server go."""
     with (folder / URL).open("a") as state:  # the child still holds it after it removed the name
         Path(user.name).unlink(missing_ok=True)
         user.close()
         deadline = time.monotonic() + STOP_SECONDS + 4 * POLL_SECONDS
-        while not is_used(folder) and _is_locked(state) and time.monotonic() < deadline:
+        while not is_used(folder) and is_locked(state) and time.monotonic() < deadline:
             time.sleep(0.05)
 
 
-def _find(folder: Path) -> LocalServer | None:
-    """The server of ``folder`` that runs or is starting, or None."""
-    path = folder / URL
-    return LocalServer(path.read_text(), folder) if _is_held(path) else None
-
-
-def is_used(folder: Path) -> bool:
-    """Whether a registered command is alive; files of dead ones are removed."""
-    entries = list((folder / USERS).glob("*"))
-    for entry in entries:
-        if not _is_held(entry):
-            entry.unlink(missing_ok=True)
-    return any(entry.exists() for entry in entries)
-
-
-def _is_held(path: Path) -> bool:
-    """Whether a living process holds the lock on a file; the kernel releases the locks of dead ones."""
-    try:
-        with path.open() as file:
-            return _is_locked(file)
-    except FileNotFoundError:
-        return False
-
-
-def _is_locked(file: IO[str]) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    fcntl.flock(file, fcntl.LOCK_UN)
-    return False
-
-
 def is_healthy(url: str) -> bool:
-    """Whether the server at an address answers that it is healthy."""
-    import urllib.request  # late: few importers of this module start a server
+    """Whether the server at an address answers that it is."""
+    import urllib.request  # late: few who import this start a server
 
     try:
         direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -236,11 +250,3 @@ def is_healthy(url: str) -> bool:
             return status == 200
     except OSError:
         return False
-
-
-@contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Keep other processes from starting or ending the server of ``folder``."""
-    with (folder / "server.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield

@@ -14,12 +14,23 @@ import pytest
 
 from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder
+from tasks.servers.prefect_server import running_server
 from tests.flows.same_rows import assert_same_rows
 
 ROOT = Path(__file__).parents[2]
 KILLS = 20
 LONGEST_SECONDS = 15.0  # until a kill; even a smoke run that has nothing left to do takes longer
 SETTLED_SECONDS = 1.0  # a shard this old was finished: whoever wrote it had the time to say so
+
+STAGE_MARKS = (  # what is there once a stage has begun
+    "prefect/server.url",
+    "runs/*/candidates/*/*.parquet",
+    "runs/*/hallucinated/*/*.parquet",
+    "runs/*/models/*/*",
+    "runs/*/memories/*/*",
+    "runs/*/results/*/*.parquet",
+    "runs/*/figures/*",
+)
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
 
@@ -80,6 +91,26 @@ def test_a_run_killed_twenty_times_ends_with_the_rows_of_an_undisturbed_one(
     run = _finish(data, 2)
     again = [path for path, when in finished.items() if path.stat().st_mtime_ns != when]
     assert not again, f"finished, and made once more: {again}"
+    assert_same_rows(run, undisturbed)
+
+
+def test_a_run_whose_server_is_killed_in_each_stage_goes_on(undisturbed: RunFolder, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    running = _start(data, 2)
+    for mark in STAGE_MARKS:
+        while not list(data.glob(mark)):
+            assert running.poll() is None, _log(data)
+            time.sleep(0.05)
+        if mark is not STAGE_MARKS[0]:  # after the first kill it is starting already
+            server = running_server(data)
+            assert server is not None
+            server.wait()
+        for process in psutil.Process(running.pid).children():
+            if "tasks.servers.prefect_app" in process.cmdline():
+                process.kill()
+    assert running.wait(timeout=900) == 0, _log(data)
+    assert not [trouble for trouble in ("Traceback", "Errno", "ERROR", "leaked") if trouble in _log(data)]
+    (run,) = DataFolder(data).runs()
     assert_same_rows(run, undisturbed)
 
 

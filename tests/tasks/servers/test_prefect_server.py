@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import stat
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import httpx
@@ -18,7 +18,8 @@ from selenium.webdriver import Keys
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from tasks.servers.prefect_server import _is_held, local_server, running_server, set_environment
+from tasks.servers.prefect_server import RESTARTS, local_server, running_server, set_environment
+from tasks.servers.users import is_held
 from tests.dashboards.web.browser import CHROMIUM, DRIVER, browser
 from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, websocket_status
 
@@ -32,6 +33,9 @@ with local_server(Path(sys.argv[1])) as server:
     time.sleep(240)
 """
 ROOT = Path(__file__).parents[3]
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")} | {
+    "PYTHONPATH": str(ROOT)
+}
 
 
 class Patient(httpx.HTTPTransport):
@@ -50,12 +54,10 @@ class Shared:
     """A server in use by two commands."""
 
     def __init__(self, data: Path) -> None:
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-        environment["PYTHONPATH"] = str(ROOT)
         command = [sys.executable, "-c", HOLD, str(data)]
         self.data = data
         self.users = [
-            subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)
+            subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True) for _ in range(2)
         ]
         self.urls = [user.stdout.readline().strip() for user in self.users if user.stdout]
         found = running_server(data)
@@ -98,7 +100,7 @@ def test_only_the_owner_can_read_the_password_whatever_the_umask(shared: Shared)
     assert stat.S_IMODE(shared.server.secret_file.stat().st_mode) == 0o600
     secret = shared.server.secret.partition(":")[2]
     assert len(secret) >= 32
-    assert not [line for line in _command_lines() if secret in line]
+    assert not [line for line in _command_lines().values() if secret in line]
     files = [path for path in shared.data.rglob("*") if path.is_file() and path != shared.server.secret_file]
     assert not [path for path in files if secret.encode() in path.read_bytes()]
 
@@ -157,29 +159,62 @@ def test_in_a_browser_a_page_elsewhere_reaches_nothing_and_the_servers_own_asks_
         waiting.until(lambda driver: "scheduled" in driver.find_element(By.TAG_NAME, "body").text)
 
 
+def test_a_killed_server_is_there_again_for_who_asks_meanwhile(shared: Shared, deployment: str) -> None:
+    (killed,) = _servers_of(shared.data)
+    killed.kill()
+    killed.wait()
+    with shared.client() as client:  # at the same address, with the same password and records
+        assert client.get(deployment, timeout=60.0).json()["name"] == "scheduled"
+    assert running_server(shared.data) == shared.server
+    assert _servers_of(shared.data) != [killed]
+
+
 def test_a_server_outlives_no_user_and_leaves_no_password(shared: Shared) -> None:
     state = shared.data / "prefect" / "server.url"  # last: it ends what the others ask
-    shared.users[0].send_signal(signal.SIGKILL)
+    (server,) = _servers_of(shared.data)
+    (starter,) = [user for user in shared.users if user.pid == server.ppid()]
+    (other,) = [user for user in shared.users if user is not starter]
+    starter.kill()
     time.sleep(0.5)
-    assert _is_held(state)
+    assert is_held(state)
     shared.server.wait(5.0)  # still answers the one that is left
-    shared.users[1].kill()
+    server.kill()
+    shared.server.wait(60.0)  # which starts it again
+    other.kill()
     deadline = time.monotonic() + 10.0
-    while (state.exists() or _lives_in(shared.data)) and time.monotonic() < deadline:
+    while (state.exists() or _servers_of(shared.data)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not state.exists()
     assert not shared.server.secret_file.exists()
-    assert not _lives_in(shared.data)
+    assert not _servers_of(shared.data)
     assert running_server(shared.data) is None
 
 
-def _command_lines() -> list[str]:
-    return [" ".join(process.info["cmdline"] or []) for process in psutil.process_iter(["cmdline"])]
+def test_a_server_that_does_not_stay_ends_its_command_in_one_line(tmp_path: Path) -> None:
+    user = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)], env=ENVIRONMENT, stderr=subprocess.PIPE, text=True
+    )
+    began = time.monotonic()
+    while user.poll() is None and time.monotonic() < began + 60.0:
+        for server in _servers_of(tmp_path):
+            with suppress(psutil.NoSuchProcess):
+                server.kill()
+    told = user.communicate()[1].splitlines()
+    assert user.returncode == 1
+    assert len(told) == 1 + RESTARTS
+    assert str(tmp_path / "prefect" / "server.log") in told[-1]
+    assert "Traceback" not in str(told)
 
 
-def _lives_in(folder: Path) -> bool:
-    """Whether the child that was started for the folder is there."""
-    return any("prefect_app" in line and str(folder) in line for line in _command_lines())
+def _command_lines() -> dict[psutil.Process, str]:
+    found = psutil.process_iter(["cmdline"])
+    return {process: " ".join(process.info["cmdline"] or []) for process in found}
+
+
+def _servers_of(folder: Path) -> list[psutil.Process]:
+    """The children that were started for the folder, and live."""
+    lines = _command_lines().items()
+    return [process for process, line in lines if "prefect_app" in line and str(folder) in line]
 
 
 def test_a_server_of_the_users_own_is_left_alone(tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
