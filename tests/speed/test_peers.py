@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import start_state
+from planners.world.problem import Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR
@@ -19,8 +20,12 @@ from tests.speed.peers.answer import MissingError
 from tests.speed.peers.native import Native
 from tests.speed.peers.settings import KPIECE1, RRT
 
-PROBLEM = problem_class("trap", "easy").draw(77, 0)
 LIMIT_S = 30.0
+
+
+@cache
+def problem() -> Problem:
+    return problem_class("trap", "easy").draw(77, 0)
 
 
 @pytest.fixture(scope="module")
@@ -37,25 +42,25 @@ def test_a_plan_of_the_wheel_is_a_plan_by_our_rules() -> None:
     pytest.importorskip("ompl", reason="the ompl wheel is not here", exc_type=ImportError)
     from tests.speed.peers.wheel import Wheel
 
-    answer = Wheel().kpiece1(PROBLEM, 1, LIMIT_S, KPIECE1)
+    answer = Wheel().kpiece1(problem(), 1, LIMIT_S, KPIECE1)
     assert answer.plan is not None
-    assert faults(PROBLEM, answer.plan) == []
+    assert faults(problem(), answer.plan) == []
 
 
 @pytest.mark.parametrize("name", ["kpiece1", "rrt"])
 def test_a_plan_of_the_native_program_is_a_plan_by_our_rules(native: Native, name: str) -> None:
     for seed in range(1, 6):
         answer = (
-            native.kpiece1(PROBLEM, seed, LIMIT_S, KPIECE1)
+            native.kpiece1(problem(), seed, LIMIT_S, KPIECE1)
             if name == "kpiece1"
-            else native.rrt(PROBLEM, seed, LIMIT_S, RRT)
+            else native.rrt(problem(), seed, LIMIT_S, RRT)
         )
         assert answer.plan is not None
-        assert faults(PROBLEM, answer.plan) == []
+        assert faults(problem(), answer.plan) == []
 
 
 def test_the_same_seed_gives_the_same_native_plan(native: Native) -> None:
-    one, other = (native.kpiece1(PROBLEM, 3, LIMIT_S, KPIECE1) for _ in range(2))
+    one, other = (native.kpiece1(problem(), 3, LIMIT_S, KPIECE1) for _ in range(2))
     assert one.plan is not None
     assert other.plan is not None
     assert one.checks == other.checks
@@ -63,20 +68,20 @@ def test_the_same_seed_gives_the_same_native_plan(native: Native) -> None:
 
 
 def test_the_native_checker_agrees_with_ours(native: Native) -> None:
-    low = [PROBLEM.bounds[0], PROBLEM.bounds[1], -10.0, CAR.min_speed, -CAR.max_steering]
-    high = [PROBLEM.bounds[2], PROBLEM.bounds[3], 10.0, CAR.max_speed, CAR.max_steering]
+    low = [problem().bounds[0], problem().bounds[1], -10.0, CAR.min_speed, -CAR.max_steering]
+    high = [problem().bounds[2], problem().bounds[3], 10.0, CAR.max_speed, CAR.max_steering]
     states = generator(0, "states").uniform(low, high, (20_000, 5))
-    scene = scene_of(PROBLEM)
+    scene = scene_of(problem())
     free = np.array([count_free_prefix(states[i : i + 1], CAR, scene) == 1 for i in range(len(states))])
     assert 0.1 < free.mean() < 0.9
-    assert np.array_equal(native.free(PROBLEM, states), free)
+    assert np.array_equal(native.free(problem(), states), free)
 
 
 def test_the_native_equations_agree_with_ours(native: Native) -> None:
     rng = generator(0, "controls")
     for _ in range(20):
         controls = rng.uniform(-1.0, 1.0, (200, 2)) * (CAR.max_acceleration, CAR.max_steering_rate)
-        start = start_state(PROBLEM)
+        start = start_state(problem())
         start[2] = rng.uniform(-math.pi, math.pi)
         driven = native.simulate(start, controls)
         assert np.abs(driven - simulate(start, controls, CAR)).max() < 1e-10

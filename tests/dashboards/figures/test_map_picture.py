@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import pytest
@@ -11,21 +12,27 @@ from shapely import Polygon, affinity, box
 
 from dashboards.figures.map_picture import SHOWN_WINDOWS, map_picture
 from dashboards.figures.style import save
-from planners.maps.cutting import cut_problems
+from planners.maps.cutting import Cut, cut_problems
+from planners.maps.regions import Part
 from planners.maps.surroundings import surroundings_of
 from planners.world.problem import BOUNDS
 from tests.planners.maps.samples import town
 
 TOWN = town(origin=(100.0, -50.0, 0.3))
-CUTS = {part: cut_problems(TOWN, surroundings_of(TOWN), part, 6, 1) for part in ("train", "test")}  # type: ignore[arg-type]
+PARTS: Final[tuple[Part, ...]] = ("train", "test")
 
 
-def test_windows_and_starts_are_drawn_where_they_lie() -> None:
-    axes = map_picture(TOWN, CUTS, 1.0).axes[0]
+@pytest.fixture(scope="module")
+def cuts() -> dict[Part, list[Cut]]:
+    return {part: cut_problems(TOWN, surroundings_of(TOWN), part, 6, 1) for part in PARTS}
+
+
+def test_windows_and_starts_are_drawn_where_they_lie(cuts: dict[Part, list[Cut]]) -> None:
+    axes = map_picture(TOWN, cuts, 1.0).axes[0]
     lines = [c for c in axes.collections if isinstance(c, LineCollection)]
     windows = [c for c in axes.collections if isinstance(c, PolyCollection)]
-    for part, starts, shown in zip(CUTS, lines, windows, strict=True):
-        poses = [cut.pose for cut in CUTS[part]]
+    for part, starts, shown in zip(cuts, lines, windows, strict=True):
+        poses = [cut.pose for cut in cuts[part]]
         assert np.allclose([segment[0] for segment in starts.get_segments()], [pose[:2] for pose in poses])
         assert len(shown.get_paths()) == SHOWN_WINDOWS
         for path, (x, y, heading) in zip(shown.get_paths(), poses, strict=False):
@@ -34,8 +41,10 @@ def test_windows_and_starts_are_drawn_where_they_lie() -> None:
             assert Polygon(path.vertices).symmetric_difference(window).area == pytest.approx(0.0, abs=1e-6)
 
 
-def test_every_window_lies_in_a_drawn_block_of_its_colour_or_beyond_the_border() -> None:
-    axes = map_picture(TOWN, CUTS, 1.0).axes[0]
+def test_every_window_lies_in_a_drawn_block_of_its_colour_or_beyond_the_border(
+    cuts: dict[Part, list[Cut]],
+) -> None:
+    axes = map_picture(TOWN, cuts, 1.0).axes[0]
     blocks = [patch for patch in axes.patches if isinstance(patch, Patch)]
     assert len(blocks) == 4
     left, bottom, turn = TOWN.origin
@@ -56,8 +65,8 @@ def test_every_window_lies_in_a_drawn_block_of_its_colour_or_beyond_the_border()
             assert met == {colour}
 
 
-def test_the_same_map_gives_the_same_picture(tmp_path: Path) -> None:
+def test_the_same_map_gives_the_same_picture(cuts: dict[Part, list[Cut]], tmp_path: Path) -> None:
     first, second = (
-        save(map_picture(TOWN, CUTS, 1.0), tmp_path / str(i), "town")[0].read_bytes() for i in (1, 2)
+        save(map_picture(TOWN, cuts, 1.0), tmp_path / str(i), "town")[0].read_bytes() for i in (1, 2)
     )
     assert first == second

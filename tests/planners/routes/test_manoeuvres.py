@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,13 +11,18 @@ from hypothesis import strategies as st
 from planners.routes.manoeuvres import FACING, bearing, braking, is_free_drive, rolling, turn_towards
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of
-from planners.world.geometry.collision import scene_of
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
 from tests.worlds import box, problem_of
 
-OPEN = scene_of(problem_of([]))
+
+@cache
+def open_scene() -> Scene:
+    return scene_of(problem_of([]))
+
+
 MIDDLE = (25.0, 25.0, 0.3)
 
 
@@ -66,7 +72,7 @@ def test_rolling_goes_straight_by_so_many_metres(metres: float) -> None:
 def test_where_there_is_room_a_vehicle_turns_to_anywhere(vehicle: Vehicle, towards: float) -> None:
     place = (25.0 + 70.0 * math.cos(towards), 25.0 + 70.0 * math.sin(towards))
     state = at_rest(*MIDDLE, vehicle)
-    controls = turn_towards(state, place, vehicle, OPEN)
+    controls = turn_towards(state, place, vehicle, open_scene())
     assert controls is not None
     states = simulate(state, controls, vehicle)
     assert abs(bearing(states[-1], place)) <= FACING
@@ -95,7 +101,7 @@ def test_where_there_is_no_room_no_turn_is_found() -> None:
 
 def test_a_trailer_never_jack_knifes_in_a_turn() -> None:
     state = at_rest(*MIDDLE, CAR_1_TRAILER)
-    controls = turn_towards(state, (25.0, 95.0), CAR_1_TRAILER, OPEN)
+    controls = turn_towards(state, (25.0, 95.0), CAR_1_TRAILER, open_scene())
     if controls is not None:
         states = simulate(state, controls, CAR_1_TRAILER)
         assert np.abs(states[:, 5]).max() <= CAR_1_TRAILER.max_hitch + 1e-9

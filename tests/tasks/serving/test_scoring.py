@@ -15,6 +15,7 @@ from planners.world.authority.authority import faults
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR
 from storage.exchange.problems import fields_of, problem_of
+from tests import worlds
 from tests.tasks.asgi import Client
 from tests.tasks.served import JSON, good_request, malformed, problem, request, write_memory
 
@@ -27,6 +28,7 @@ pytestmark = pytest.mark.filterwarnings(  # of libraries among themselves
 BAD = 400
 NONSENSE = 400  # requests
 MOST_BYTES = 8 << 20
+PLAIN = fields_of(worlds.problem_of([worlds.box(30.0, 10.0, 0.0, 2.0, 1.0)]))  # drawing one would compile
 
 
 @pytest.fixture(scope="module")
@@ -111,9 +113,9 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
         ),
         (b"\xef\xbb\xbf{}", 400, "byte order mark"),
         (b"{}".decode().encode("utf-16"), 400, "not text in UTF-8"),
-        (request(fields_of(problem(0)) | {"start_speed": 1.0}), 400, "unknown field 'start_speed'"),
+        (request(PLAIN | {"start_speed": 1.0}), 400, "unknown field 'start_speed'"),
         (
-            request(json.dumps(fields_of(problem(0)))[:-1] + ', "obstacles": []}'),
+            request(json.dumps(PLAIN)[:-1] + ', "obstacles": []}'),
             400,
             "'obstacles' more than",
         ),
@@ -125,26 +127,26 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
         (request("{}", "{}"), 400, "Problem 1: field start is missing"),
         (request("[" * 100_000), 400, "Problem 1: it is not valid JSON"),
         (b'{"inputs":' + b"[" * 100_000, 400, "The body is not valid JSON"),
-        (request(fields_of(problem(0)) | {"goal": [9.0, 9.0]}), 400, "cut a longer route"),
-        (request(fields_of(problem(0)) | {"start": [float("nan"), 0, 0]}), 400, "must be finite"),
+        (request(PLAIN | {"goal": [9.0, 9.0]}), 400, "cut a longer route"),
+        (request(PLAIN | {"start": [float("nan"), 0, 0]}), 400, "must be finite"),
         (
-            request(fields_of(problem(0)) | {"obstacles": [[[i, i * i % 7] for i in range(2000)]]}),
+            request(PLAIN | {"obstacles": [[[i, i * i % 7] for i in range(2000)]]}),
             400,
             "corners",
         ),
         (
             request(
-                fields_of(problem(0))
+                PLAIN
                 | {"bounds": [-7, -7, 900, 900], "groups": None}
                 | {"obstacles": [[[60, 60], [900, 60], [900, 900]]] * 99}
             ),
             400,
             "cover the bounds too many times",
         ),
-        (request(fields_of(problem(0)), top_k=0), 400, "top_k is 0"),
-        (request(fields_of(problem(0)), top_k=5.0), 400, "top_k is 5.0"),
-        (request(fields_of(problem(0)), speed=1), 400, "params is {'speed': 1}"),
-        (request(fields_of(problem(0)), top_k=1_001), 400, "give a number from 1"),
+        (request(PLAIN, top_k=0), 400, "top_k is 0"),
+        (request(PLAIN, top_k=5.0), 400, "top_k is 5.0"),
+        (request(PLAIN, speed=1), 400, "params is {'speed': 1}"),
+        (request(PLAIN, top_k=1_001), 400, "give a number from 1"),
         (request(*["{}"] * 300), 413, "300 problems with top_k 5 are more than 1000 plans"),
         (b" " * (MOST_BYTES + 1), 413, "is longer than"),
     ],

@@ -27,6 +27,7 @@ from storage.exchange.problems import fields_of, problem_of
 from storage.places.data_folder import open_data_folder
 from tasks.registry.model_uris import load_from
 from tasks.settings.errors import RunError
+from tests import worlds
 from tests.storage.samples import a_memory
 
 ROOT = Path(__file__).parents[3]
@@ -189,7 +190,7 @@ def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
         ("{", "Problem 1: it is not valid JSON"),
         ("[]", "Problem 1: is list, wanted was an object"),
         ("{}", "Problem 1: field start is missing"),
-        (json.dumps(fields_of(EASY.draw(0, 0)) | {"goal": [9.0, 9.0]}), "cut a longer route"),
+        (json.dumps(fields_of(worlds.problem_of([])) | {"goal": [9.0, 9.0]}), "cut a longer route"),
     ],
 )
 def test_a_bad_problem_gets_one_clear_line(at_home: dict[str, str], text: str, reason: str) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -46,7 +47,9 @@ def detour(rng: np.random.Generator, steps: int = 220) -> Experience:
     return Experience(problem_around(plan, obstacles_of([]), "detour"), plan)
 
 
-DETOURS = [detour(generator(1, i)) for i in range(6)]
+@cache
+def detours() -> list[Experience]:
+    return [detour(generator(1, i)) for i in range(6)]
 
 
 def left(experience: Experience):
@@ -114,7 +117,7 @@ def test_the_shortest_way_is_dijkstras_and_keeps_clear(seed, count):
 @given(seed=SEEDS, saving=st.sampled_from([0.02, 0.05, 0.1]))
 @settings(max_examples=6)
 def test_removing_any_placed_obstacle_lets_a_shorter_way_through(seed, saving):
-    experience = DETOURS[seed % len(DETOURS)]
+    experience = detours()[seed % len(detours())]
     goal, to_goal = experience.problem.goal, left(experience)
     placed = Minimal(saving=saving).obstacles(experience, generator(seed))
     count = len(placed.obstacle_starts) - 1
@@ -132,7 +135,7 @@ def test_removing_any_placed_obstacle_lets_a_shorter_way_through(seed, saving):
 
 def test_shortcuts_that_save_more_are_closed():
     open_ways = []
-    for i, experience in enumerate(DETOURS):
+    for i, experience in enumerate(detours()):
         limit = 0.9 * experience.plan.length_m
         placed = Minimal().obstacles(experience, generator(3, i))
         open_ways.append(shortest_way(closed_by(placed), 0, START, left(experience), limit).length_m < limit)
@@ -141,7 +144,7 @@ def test_shortcuts_that_save_more_are_closed():
 
 def test_placed_polygons_keep_their_clearance():
     method = Minimal(clearance_m=(0.5, 0.5))
-    for i, experience in enumerate(DETOURS):
+    for i, experience in enumerate(detours()):
         solid = polygons_of(method.obstacles(experience, generator(4, i)))
         way = LineString(experience.plan.states[:, :2])
         assert solid.is_empty or way.distance(solid) > 0.5 + 0.5 * CAR.width - 1e-6
