@@ -1,4 +1,4 @@
-"""Why a plan: what was recalled for a problem, how near it was, and where it collides."""
+"""Explains an attempt: what was recalled, how good it was, and where it collides."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from planners.world.workspace import Workspace
 
 
 class Recollection(NamedTuple):
-    """One recalled plan, as the problem has it."""
+    """One recalled plan, as it is in the problem."""
 
     plan: int  # its number in the memory
-    encoder_rank: int  # 1: the encoder puts it first of all plans
-    blocked_cells: int | None  # cells it shares with obstacles; None where they say nothing of it
+    encoder_rank: int  # 1: it scores best of all plans
+    blocked_cells: int | None  # cells that it shares with obstacles; None if cells say nothing about it
     blocked: Flags  # [T] which of its states are in collision
-    goal_missed_m: float  # by which it ends outside of the goal disc; 0: it does not
-    use: str  # "answer", "repaired", "guide", "" for nothing
+    goal_missed_m: float  # distance by which it ends outside the goal disc
+    use: str  # "answer", "repaired", "guide", or "" for none
 
     @property
     def first_blocked(self) -> int | None:
@@ -42,36 +42,44 @@ def recollections(
     vehicle: Vehicle = CAR,
     workspace: Workspace | None = None,
 ) -> list[Recollection]:
-    """What an attempt at a canonical problem recalled, in its order, looked at again."""
+    """Look again at what an attempt at a canonical problem recalled, in the order of recall.
+
+    Args:
+        problem: that was attempted.
+        attempt: at the problem.
+        memory: that it recalled from.
+        vehicle: what is driven.
+        workspace: the caller's buffers; by default new ones.
+    """
     view = View(problem, workspace)
     embedding = memory.forward(view.bits)
     scores = memory.vectors[1:] @ embedding + memory.biases[1:]
-    ranking = rank_by_cells(memory.masks, view.bits, view.workspace).cells
-    stored = memory.begins_with(problem.start[2])
-    best = _least_blocked(problem, attempt, memory, view)
-    found: list[Recollection] = []
+    blocked_cells = rank_by_cells(memory.masks, view.bits, view.workspace).cells
+    as_stored = memory.begins_with(problem.start[2])
+    uses = _uses(problem, attempt, memory, view)
+    looked_at: list[Recollection] = []
     for number in attempt.recalled:
         plan = turned(memory.plans[number], problem.start[2])
         blocked, _ = blocked_states(plan, view.scene, vehicle)
-        cells = int(ranking[number])
+        cells = int(blocked_cells[number])
         missed = max(math.dist(plan.states[-1, :2], problem.goal) - problem.goal_radius, 0.0)
-        free = attempt.source == "recalled" and not blocked.any() and missed <= 1e-9
-        answers = free and not any(each.use == "answer" for each in found)
-        found.append(
+        fits = attempt.source == "recalled" and not blocked.any() and missed <= 1e-9
+        is_answer = fits and not any(each.use == "answer" for each in looked_at)
+        looked_at.append(
             Recollection(
                 number,
                 1 + int(np.count_nonzero(scores > scores[number])),
-                cells if stored and cells < MOST_CELLS else None,
+                cells if as_stored and cells < MOST_CELLS else None,
                 blocked,
                 missed,
-                "answer" if answers else best.get(number, ""),
+                "answer" if is_answer else uses.get(number, ""),
             )
         )
-    return found
+    return looked_at
 
 
-def _least_blocked(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:
-    """The plan that repair, or the search, went on from, and what for."""
+def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:
+    """The plan that the repair or the search went on from, and which of both."""
     use = attempt.assist.removeprefix("random-")
     if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
         return {}

@@ -1,6 +1,6 @@
-"""Recall, check, guide, repair, search: the only place that joins memory and planners (paper, III-D).
+"""Solves a problem: recall, check, guide, repair, search. Only here memory and planners meet (paper, III-D).
 
-Planning time is measured once around everything between receiving a problem and returning a plan.
+Planning time is measured once, around everything between receiving a problem and returning a plan.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """One attempt at one problem: the attempt row of the contract, and the plan itself."""
+    """An attempt at a problem: what an attempt row holds, and the plan itself."""
 
     problem_id: str
     problem_class: str
@@ -44,23 +44,23 @@ class Attempt:
     top_k: int  # 0 without memory
     status: str
     solved: bool
-    source: str | None  # "recalled", "repaired" or "searched"; None when not solved
+    source: str | None  # "recalled", "repaired" or "searched"; None if not solved
     planning_seconds: float
     occupancy_seconds: float
     encode_seconds: float
     recall_seconds: float
     scene_seconds: float  # making the obstacles ready for collision checks
     check_seconds: float
-    guide_seconds: float  # a way over the grid, recalled plans made into a guide
-    repair_seconds: float  # repairing a recalled plan, in vain or not
+    guide_seconds: float  # finding a path over the grid and making the guide
+    repair_seconds: float  # repairing a recalled plan, successfully or not
     roadmap_seconds: float
     search_seconds: float
     recalled: tuple[int, ...]  # plans of the memory, best first
     collision_checks: int
     expansions: int
     nodes: int
-    length_m: float | None  # None when not solved
-    duration_s: float | None  # None when not solved
+    length_m: float | None  # None if not solved
+    duration_s: float | None  # None if not solved
     seed: int
     plan: Plan | None
 
@@ -75,27 +75,27 @@ _PARTS = tuple(
 def nearly_free(
     memory: Memory, recalled: Sequence[int], view: View, vehicle: Vehicle
 ) -> tuple[tuple[Plan, Flags] | None, int]:
-    """The least blocked of the recalled plans, and which of its states are blocked; None: none begins here.
+    """Find the least blocked of the recalled plans, and count the collision checks.
 
-    Also how many collision checks were made.
+    Returns the plan and which of its states are blocked, or None if no plan begins at the start.
     """
     order = np.array(recalled, np.int32)
     best, checks = least_blocked(order, memory.sweeps, ends_of(view.problem), view.scene)
-    found: tuple[Plan, Flags] | None = None
+    nearly: tuple[Plan, Flags] | None = None
     if best >= 0:
         stored = turned(memory.plans[int(best)], view.problem.start[2])
-        blocked, checked = blocked_states(stored, view.scene, vehicle)
-        found, checks = (stored, blocked), checks + checked
+        blocked, more = blocked_states(stored, view.scene, vehicle)
+        nearly, checks = (stored, blocked), checks + more
     view.lap("check")
-    return found, int(checks)
+    return nearly, int(checks)
 
 
 def guide_along(nearly: tuple[Plan, Flags] | None, view: View) -> Guide | None:
-    """A guide along a recalled plan, if there is one, and a way over the grid, if there is one."""
+    """Make a guide along a recalled plan and a path over the grid, as far as there are such."""
     problem = view.problem
     around = grid_path(view.bits, problem.start[:2], problem.goal, problem.goal_radius, view.workspace)
-    ways = [each for each in (nearly and nearly[0].states, around) if each is not None]
-    guide = guidance(ways) if ways else None
+    paths = [each for each in (nearly and nearly[0].states, around) if each is not None]
+    guide = guidance(paths) if paths else None
     view.lap("guide")
     return guide
 
@@ -112,64 +112,76 @@ def solve(
     strategy: str | None = None,
     workspace: Workspace | None = None,
 ) -> Attempt:
-    """Solve a canonical ``problem``: stored plans first, as ``assist`` says, then the planner.
+    """Solve a canonical problem: try stored plans first, as the assist says, then search.
 
-    ``closed``: the first free one of the plans that recall tries, else the planner as it is. ``open``: the
-    same, but the planner goes on from the free beginning of the least blocked of the ``top_k`` recalled
-    plans, and is guided by it and by a way over the grid. ``repair``: the same, but that plan's blocked
-    segments are planned anew; if this fails as ``open``. ``fresh``: the planner guided by a way over the
-    grid; no memory. ``strategy``: one of ``RECALLS``, by default what is best for the memory's size;
-    ``random-`` before an assist is the strategy ``random``.
+    ``none``: search only. ``closed``: return the first free plan of those that recall tries, else search.
+    ``open``: the same, but the search goes on from the free beginning of the least blocked of the recalled
+    plans, guided by that plan and by a path over the grid. ``repair``: the same, but the blocked segments of
+    that plan are planned anew; if this fails as ``open``. ``fresh``: search guided by a path over the grid.
+    ``random-`` before an assist picks the plans blindly.
 
-    Raises ValueError for an unknown planner, assist or strategy, an assist that needs a memory and has none,
-    and a memory of another vehicle or scale.
+    Args:
+        problem: in the canonical frame.
+        planner: one of ``PLANNERS``.
+        assist: one of ``ASSISTS``.
+        top_k: how many plans to recall.
+        memory: to recall from; ``none`` and ``fresh`` ignore it.
+        seed: of all random choices.
+        limits: when the search gives up; by default those of ``Limits``.
+        vehicle: what is to be driven.
+        strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
+        workspace: the caller's buffers; by default new ones.
+
+    Raises:
+        ValueError: Planner, assist or strategy is unknown, or the memory is missing or of another vehicle or
+            scale.
     """
     view = View(problem, workspace)
     if planner not in PLANNERS:
         raise ValueError(f"unknown planner '{planner}': choose one of {', '.join(PLANNERS)}")
     if assist not in ASSISTS:
         raise ValueError(f"unknown assist '{assist}': choose one of {', '.join(ASSISTS)}")
-    known = None if assist in WITHOUT_MEMORY else memory
+    memory = None if assist in WITHOUT_MEMORY else memory
     use = assist.removeprefix("random-")
     recalled = Recalled((), -1, 0)
-    if known is not None:
-        if known.vehicle != vehicle:
+    if memory is not None:
+        if memory.vehicle != vehicle:
             raise ValueError(
-                f"memory of {known.class_name} was built for vehicle {name_of(known.vehicle)}, asked was "
+                f"memory of {memory.class_name} was built for vehicle {name_of(memory.vehicle)}, asked was "
                 f"{name_of(vehicle)}: build one for {name_of(vehicle)}"
             )
-        unfit = scale_fault(known, problem.scale)
-        if unfit is not None:
-            raise ValueError(unfit)
-        strategy = "random" if use != assist else strategy or default_recall(known)
-        rng = generator(seed, "random-plans", problem.id) if strategy == "random" else None
-        recalled = recall(known, view, strategy, top_k, rng)
+        fault = scale_fault(memory, problem.scale)
+        if fault is not None:
+            raise ValueError(fault)
+        strategy = "random" if use != assist else strategy or default_recall(memory)
+        blindly = generator(seed, "random-plans", problem.id) if strategy == "random" else None
+        recalled = recall(memory, view, strategy, top_k, blindly)
     elif assist not in WITHOUT_MEMORY:
         raise ValueError(f"assist '{assist}' needs a memory")
 
     answer: Plan | None = None
     source = ""
-    spent: list[Outcome] = []
+    outcomes: list[Outcome] = []
     checks = recalled.checks
-    if known is not None and recalled.free >= 0:
-        answer, source = turned(known.plans[recalled.free], problem.start[2]), "recalled"
+    if memory is not None and recalled.free >= 0:
+        answer, source = turned(memory.plans[recalled.free], problem.start[2]), "recalled"
     else:
         rng = generator(seed, "search", problem.id, planner)
         query = Query(problem, rng, view.scene, view.workspace, limits=limits or Limits(), vehicle=vehicle)
         nearly = None
-        if known is not None and use != "closed":
-            nearly, checked = nearly_free(known, recalled.plans, view, vehicle)
-            checks += checked
+        if memory is not None and use != "closed":
+            nearly, more = nearly_free(memory, recalled.plans, view, vehicle)
+            checks += more
         if use == "repair" and nearly is not None:
-            spent.append(repair(planner, query, *nearly, view.bits))
-            answer, source = spent[0].plan, "repaired"
+            outcomes.append(repair(planner, query, *nearly, view.bits))
+            answer, source = outcomes[0].plan, "repaired"
             view.lap("repair")
         if answer is None:
             if use == "fresh" or nearly is not None:
                 prefix = free_prefix(*nearly) if nearly is not None else None
                 query = replace(query, guide=guide_along(nearly, view), prefix=prefix)
             searched = PLANNERS[planner](query)
-            spent.append(searched)
+            outcomes.append(searched)
             answer, source = searched.plan, "searched"
             view.seconds |= {"roadmap": searched.roadmap_seconds, "search": searched.search_seconds}
     planning_seconds = perf_counter() - view.began
@@ -179,17 +191,17 @@ def solve(
         problem_class=problem.class_name,
         planner=planner,
         assist=assist,
-        recall=None if known is None else strategy,
-        top_k=0 if known is None else top_k,
-        status=str(Status.SOLVED if answer is not None else spent[-1].status),
+        recall=None if memory is None else strategy,
+        top_k=0 if memory is None else top_k,
+        status=str(Status.SOLVED if answer is not None else outcomes[-1].status),
         solved=answer is not None,
         source=source if answer is not None else None,
         planning_seconds=planning_seconds,
         **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in _PARTS},
         recalled=recalled.plans,
-        collision_checks=checks + sum(each.collision_checks for each in spent),
-        expansions=sum(each.expansions for each in spent),
-        nodes=sum(each.nodes for each in spent),
+        collision_checks=checks + sum(each.collision_checks for each in outcomes),
+        expansions=sum(each.expansions for each in outcomes),
+        nodes=sum(each.nodes for each in outcomes),
         length_m=None if answer is None else answer.length_m,
         duration_s=None if answer is None else answer.duration_s,
         seed=seed,
@@ -204,11 +216,9 @@ def improved(
     vehicle: Vehicle = CAR,
     workspace: Workspace | None = None,
 ) -> Attempt:
-    """The attempt with its plan improved for that long, or with a first one; time and counts are added."""
+    """Improve an attempt's plan for some seconds, or look for a first one. Times and counts are added up."""
     more = improve(
-        attempt.planner,
-        problem,
-        attempt.plan,
+        *(attempt.planner, problem, attempt.plan),
         seconds=seconds,
         seed=attempt.seed,
         vehicle=vehicle,

@@ -81,7 +81,7 @@ def tree_layer(trace: Trace) -> str:
     """What a search drove through, as its ``trace`` says: a line from each state to the one before."""
     children = np.arange(len(trace.parents))[trace.parents >= 0]
     children = children[:: max(1, -(-len(children) // _MOST_EDGES))]
-    ends = np.stack([trace.places[trace.parents[children]], trace.places[children]], axis=1)
+    ends = np.stack([trace.positions[trace.parents[children]], trace.positions[children]], axis=1)
     return element("path", d=_segments(ends), class_="tree")
 
 

@@ -7,23 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Pose
 
 Cells = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
 class OccupancyMap:
-    """Occupied cells of a grid, and the grid's place in the map's frame (metres, x to the right, y up).
+    """Occupied cells of a grid, and the grid's pose in the map's frame (metres, x to the right, y up).
 
-    Grid coordinates are metres from the grid's lower left corner along its sides; outside of the grid all is
-    occupied.
+    Grid coordinates are metres from the grid's lower left corner along its sides. Outside the grid everything
+    is occupied.
     """
 
     name: str
     occupied: Cells  # [rows, columns]; row 0 is the lowest
     resolution: float  # metres a cell
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the lower left corner: x, y (m), turn (rad)
+    origin: Pose = (0.0, 0.0, 0.0)  # the lower left corner: x, y (m), turn (rad)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -40,21 +40,21 @@ class OccupancyMap:
         free[inside] = ~self.occupied[rows[inside], columns[inside]]
         return free
 
-    def pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
-        """A pose of grid coordinates in the map's frame: x, y (m), heading (rad)."""
+    def pose(self, x: float, y: float, heading: float) -> Pose:
+        """Transform a pose (m, m, rad) from grid coordinates into the map's frame."""
         left, bottom, turn = self.origin
         cos, sin = math.cos(turn), math.sin(turn)
         return left + cos * x - sin * y, bottom + sin * x + cos * y, heading + turn
 
-    def grid_pose(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
-        """A pose of the map's frame in grid coordinates: the inverse of ``pose``."""
+    def grid_pose(self, x: float, y: float, heading: float) -> Pose:
+        """Transform a pose (m, m, rad) from the map's frame into grid coordinates."""
         left, bottom, turn = self.origin
         cos, sin = math.cos(turn), math.sin(turn)
         right, up = x - left, y - bottom
         return cos * right + sin * up, cos * up - sin * right, heading - turn
 
     def coarser(self, cell_m: float) -> OccupancyMap:
-        """The same map in cells of about ``cell_m``, occupied where any of the cells in one is."""
+        """Return the same map in cells of about ``cell_m`` metres, each occupied if any cell in it is."""
         factor = max(1, math.floor(cell_m / self.resolution + 1e-9))
         rows, columns = self.occupied.shape
         padded = np.pad(self.occupied, ((0, -rows % factor), (0, -columns % factor)), constant_values=True)

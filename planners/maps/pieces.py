@@ -1,4 +1,4 @@
-"""What is occupied of a map as convex pieces: exact rectangles, or fewer polygons within a tolerance."""
+"""The occupied part of a map as convex pieces: exact rectangles, or fewer polygons within a tolerance."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Shapes = np.ndarray[tuple[int, ...], np.dtype[np.object_]]
 
 
 def pieces_of(world: OccupancyMap, tolerance_m: float = 0.0) -> Shapes:
-    """Convex shapely polygons ``[n]`` in grid metres that cover the occupied cells.
+    """Cover the occupied cells with convex shapely polygons ``[n]`` in grid metres.
 
-    Without tolerance the fewest rectangles, which cover exactly these. With one, the outlines are drawn with
-    few corners, none of their points farther than it from the true outline (Douglas and Peucker 1973), then
-    cut into convex pieces: for walls that run askew to the grid a fifth as many.
+    Without a tolerance they are the fewest rectangles that cover exactly these cells. With a tolerance, the
+    outlines are simplified, with no point farther than that from the true outline (Douglas and Peucker 1973),
+    and cut into convex pieces: a fifth as many for walls that run askew to the grid.
     """
     boxes = _boxes(world.occupied, world.resolution)
     if tolerance_m == 0.0:
@@ -28,11 +28,11 @@ def pieces_of(world: OccupancyMap, tolerance_m: float = 0.0) -> Shapes:
 
 
 def _boxes(occupied: Cells, resolution: float) -> Shapes:
-    found = rectangles_of(occupied)
+    rectangles = rectangles_of(occupied)
     boxes: Shapes = shapely.box(
-        resolution * found.first_columns,
-        resolution * found.first_rows,
-        resolution * found.last_columns,
-        resolution * found.last_rows,
+        resolution * rectangles.first_columns,
+        resolution * rectangles.first_rows,
+        resolution * rectangles.last_columns,
+        resolution * rectangles.last_rows,
     )
     return boxes

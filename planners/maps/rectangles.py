@@ -1,8 +1,8 @@
-"""Occupied cells as the fewest rectangles that cover them exactly, none of which overlap.
+"""Covers occupied cells exactly with the fewest rectangles that do not overlap.
 
-A region of cells needs a cut at each of its reflex corners; a cut along a chord, which joins two of them,
-saves one. The most chords that do not cross are a largest independent set of a bipartite graph (Lipski et al.
-1979, Ohtsuki 1982; the theorem of König). What else is cut is cut along the rows.
+A region of cells needs a cut at each of its reflex corners. A cut along a chord, which joins two of them,
+saves one cut. The most chords that do not cross are a largest independent set of a bipartite graph (Lipski et
+al. 1979, Ohtsuki 1982; the theorem of König). All other cuts go along the rows.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from planners.world.arrays import Indices
 
 
 class Rectangles(NamedTuple):
-    """Rectangles of cells: ``[n]`` first row and column, and the row and column after the last."""
+    """Rectangles of cells: ``[n]`` the first row and column, and the row and column after the last."""
 
     first_rows: Indices
     last_rows: Indices
@@ -27,32 +27,30 @@ class Rectangles(NamedTuple):
 
 
 class _Chords(NamedTuple):
-    """Lines of the lattice of cell corners, all along its rows or all along its columns."""
+    """Lines of the lattice of cell corners, either all along its rows or all along its columns."""
 
-    at: Indices  # [n] the row, or column, they lie on
+    at: Indices  # [n] the row or column that they lie on
     first: Indices  # [n] where they begin along it
     last: Indices  # [n] where they end
 
 
 def rectangles_of(occupied: Cells) -> Rectangles:
-    """The fewest rectangles that cover exactly the occupied cells ``[rows, columns]``, each cell once."""
+    """Return the fewest rectangles that cover exactly the occupied cells ``[rows, columns]``, each once."""
     padded = np.pad(occupied, ((0, 0), (1, 1)))
     border = padded[:, 1:] != padded[:, :-1]
     cut = _cuts(occupied)
     rows, begins = np.nonzero((border | cut) & padded[:, 1:])
     _, ends = np.nonzero((border | cut) & padded[:, :-1])
-    order = np.lexsort(
-        (rows, ends, begins)
-    )  # a run of a row joins the run above that begins and ends with it
+    order = np.lexsort((rows, ends, begins))  # a run joins the run above if both begin and end alike
     rows, begins, ends = rows[order], begins[order], ends[order]
     new = np.ones(len(rows), bool)
     new[1:] = (np.diff(begins) != 0) | (np.diff(ends) != 0) | (np.diff(rows) != 1)
-    last = np.roll(new, -1)  # the run before a new rectangle ends one; so does the last of all
+    last = np.roll(new, -1)  # the run before a new rectangle ends one, and so does the last run
     return Rectangles(rows[new], rows[last] + 1, begins[new], ends[new])
 
 
 def _cuts(occupied: Cells) -> Cells:
-    """The cuts along columns ``[rows, columns + 1]``: between a cell and the one to its left."""
+    """The cuts along columns ``[rows, columns + 1]``, between a cell and the one to its left."""
     padded = np.pad(occupied, 1).astype(np.int8)
     around = padded[:-1, :-1] + padded[:-1, 1:] + padded[1:, :-1] + padded[1:, 1:]
     reflex = around == 3  # [rows + 1, columns + 1] corners of the lattice
@@ -66,18 +64,18 @@ def _cuts(occupied: Cells) -> Cells:
 
 
 def _chords(occupied: Cells, reflex: Cells) -> _Chords:
-    """Lines along columns between reflex corners, one after the other, with occupied cells on both sides."""
+    """Lines along columns between successive reflex corners, with occupied cells on both sides."""
     rows, columns = occupied.shape
-    inside = np.zeros((rows + 1, columns + 1), np.int32)  # unit lines with cells on both sides, summed up
+    inside = np.zeros((rows + 1, columns + 1), np.int32)  # running sum of unit lines with cells on both sides
     inside[1:, 1:-1] = np.cumsum(occupied[:, 1:] & occupied[:, :-1], axis=0)
-    at, places = np.nonzero(reflex.T)
-    filled = inside[places[1:], at[1:]] - inside[places[:-1], at[:-1]]
-    chord = (np.diff(at) == 0) & (filled == np.diff(places))
-    return _Chords(at[:-1][chord], places[:-1][chord], places[1:][chord])
+    at, along = np.nonzero(reflex.T)
+    filled = inside[along[1:], at[1:]] - inside[along[:-1], at[:-1]]
+    chord = (np.diff(at) == 0) & (filled == np.diff(along))
+    return _Chords(at[:-1][chord], along[:-1][chord], along[1:][chord])
 
 
 def _uncrossed(upright: _Chords, level: _Chords, shape: tuple[int, ...]) -> Cells:
-    """Which upright chords ``[n]`` belong to a largest set of chords without a common point."""
+    """Which upright chords ``[n]`` belong to a largest set of chords that have no point in common."""
     count, others = len(upright.at), len(level.at)
     if count == 0 or others == 0:
         return np.ones(count, bool)
@@ -93,18 +91,18 @@ def _uncrossed(upright: _Chords, level: _Chords, shape: tuple[int, ...]) -> Cell
     one, other = crossing.nonzero()
     matched = partner[one] == other
     alone = np.flatnonzero(partner < 0)
-    source = count + others  # alternating ways begin here, go on to the level chords without a partner ...
+    source = count + others  # alternating paths begin here, go on to the level chords without a partner ...
     tails = np.concatenate([one[~matched], others + other[matched], np.full(len(alone), source)])
     heads = np.concatenate([others + other[~matched], one[matched], alone])
-    ways = sparse.csr_array((np.ones(len(tails)), (tails, heads)), shape=(source + 1, source + 1))
-    reached = csgraph.breadth_first_order(ways, source, return_predecessors=False)
-    kept = np.ones(count, bool)  # ... and what upright chords they reach are covered (König): not independent
-    kept[reached[(reached >= others) & (reached < source)] - others] = False
-    return kept
+    paths = sparse.csr_array((np.ones(len(tails)), (tails, heads)), shape=(source + 1, source + 1))
+    reached = csgraph.breadth_first_order(paths, source, return_predecessors=False)
+    independent = np.ones(count, bool)  # ... and cover the upright chords that they reach (König)
+    independent[reached[(reached >= others) & (reached < source)] - others] = False
+    return independent
 
 
 def _along(first: Indices, last: Indices) -> tuple[Indices, Indices]:
-    """For each range its number, repeated, and the integers from ``first`` to before ``last``."""
+    """The integers from ``first [n]`` to before ``last [n]``, and for each the number of its range."""
     lengths = last - first
     which = np.repeat(np.arange(len(lengths)), lengths)
     starts = np.cumsum(lengths) - lengths

@@ -1,4 +1,4 @@
-"""A map's blocks, in the pattern of a chequerboard: some to collect from, the others to test on."""
+"""Divides a map into blocks like a chequerboard: some to collect from, the others to test on."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from planners.world.arrays import Floats
 
 Part = Literal["train", "test"]
 
-BLOCK_WINDOWS: Final = 4.0  # the side of a block in windows: half of the places in a block hold a whole one
+BLOCK_WINDOWS: Final = 4.0  # side of a block in windows, so that half of the positions hold a whole window
 
 
 class Blocks(NamedTuple):
-    """Equal blocks of a map; those at its border go on outside."""
+    """Equal blocks of a map. Those at the border extend beyond it."""
 
     columns: int
     rows: int
@@ -24,9 +24,9 @@ class Blocks(NamedTuple):
 
 
 def blocks_of(size: tuple[float, float], window_m: float) -> Blocks:
-    """The blocks of a map of ``size`` metres from which windows of ``window_m`` are cut.
+    """Divide a map of ``size`` metres into blocks for windows of ``window_m`` metres a side.
 
-    ValueError: the map is too small for two blocks.
+    Raises ValueError if the map is too small for two blocks.
     """
     columns, rows = (_count(extent, window_m) for extent in size)
     if columns * rows < 2:

@@ -1,4 +1,4 @@
-"""Local problems of a map: what surrounds a pose, turned and moved into the canonical frame."""
+"""Makes local problems of a map: what surrounds a pose, moved into the canonical frame."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from planners.world.arrays import Floats, Indices
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
 
 WINDOW: Final = BOUNDS[2] - BOUNDS[0]  # canonical metres a side
-SPECK: Final = 1e-6  # square metres: what a window cuts off smaller than this is left out
+SPECK: Final = 1e-6  # square metres: a window leaves out what it cuts smaller than this
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """A map's pieces and where they touch each other, found quickly by place; in grid metres."""
+    """A map's pieces and where they touch each other, in search trees, in grid metres."""
 
-    pieces: Shapes  # [n] convex polygons, those around the grid included
+    pieces: Shapes  # [n] convex polygons, including four around the grid
     tree: shapely.STRtree  # of the pieces
     touching: Indices  # [m, 2] pairs of pieces
-    contacts: shapely.STRtree  # of what the pairs have in common
+    contacts: shapely.STRtree  # of the intersections of these pairs
     scale: float  # metres a canonical metre
 
     def problem(self, x: float, y: float, heading: float, identity: str, class_name: str) -> Problem:
-        """The canonical problem of a robot at a pose in grid coordinates, its goal straight ahead."""
+        """Make the canonical problem of a robot at a pose (grid coordinates), its goal straight ahead."""
         turn = heading - CANONICAL_START[2]
         along, across = self.scale * math.cos(turn), self.scale * math.sin(turn)
         to_map = np.array([[along, across], [-across, along]])
@@ -43,7 +43,7 @@ class Surroundings:
         cut[across_border] = shapely.intersection(cut[across_border], window)
         to_canonical = to_map.T / self.scale**2
         turned = shapely.transform(cut, lambda points: _rounded((points - (x, y)) @ to_canonical))
-        met = self.touching[self.contacts.query(window, predicate="intersects")]
+        touching = self.touching[self.contacts.query(window, predicate="intersects")]
         return Problem(
             identity,
             class_name,
@@ -51,20 +51,22 @@ class Surroundings:
             CANONICAL_GOAL,
             GOAL_RADIUS,
             BOUNDS,
-            _obstacles(shapely.convex_hull(turned), np.searchsorted(near, met)),
+            _obstacles(shapely.convex_hull(turned), np.searchsorted(near, touching)),
             self.scale,
         )
 
     def obstacles(self) -> Obstacles:
-        """All pieces, in grid metres, exactly."""
+        """Return all pieces in grid metres, exactly."""
         return _obstacles(self.pieces, self.touching)
 
 
 def surroundings_of(world: OccupancyMap, scale: float = 1.0, tolerance_m: float = 0.0) -> Surroundings:
-    """A map made ready to have problems cut from it.
+    """Prepare a map so that problems can be cut from it.
 
-    ``scale`` is how many metres of the map are a canonical metre: 2 for a robot twice as long and wide, whose
-    goals are twice as far. ``tolerance_m`` is how far the outline of what is occupied may move.
+    Args:
+        world: the map.
+        scale: metres of the map in a canonical metre: 2 for a robot that is twice as long and wide.
+        tolerance_m: how far the outlines of occupied regions may move.
     """
     width, height = world.size
     reach = math.sqrt(2.0) * WINDOW * scale  # no window reaches farther out of the map
@@ -83,7 +85,7 @@ def surroundings_of(world: OccupancyMap, scale: float = 1.0, tolerance_m: float 
 
 
 def _obstacles(pieces: Shapes, touching: Indices) -> Obstacles:
-    """Pieces with an area as obstacles; those that touch, by pairs ``[m, 2]``, are one."""
+    """Make obstacles of the pieces with an area; pieces that touch, by pairs ``[m, 2]``, are one obstacle."""
     one, other = touching.T
     together = sparse.csr_array((np.ones(len(one)), (one, other)), shape=(len(pieces), len(pieces)))
     _, group = csgraph.connected_components(together, directed=False)

@@ -1,1 +1,1 @@
-"""What is remembered: experiences, hallucinated problems, the encoder and recall."""
+"""The memory: experiences, hallucinated problems, the encoder and recall."""

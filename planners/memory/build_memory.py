@@ -1,4 +1,4 @@
-"""From a trained encoder and the plans to a memory."""
+"""Makes a memory of a trained encoder and its plans."""
 
 from __future__ import annotations
 
@@ -20,7 +20,15 @@ def build_memory(
     vehicle: Vehicle = CAR,
     metadata: dict[str, Any] | None = None,
 ) -> Memory:
-    """Memory of the N ``plans`` that the encoder was trained for, in the same order."""
+    """Make a memory.
+
+    Args:
+        trained: the encoder and its readout.
+        plans: the N plans that the encoder was trained for, in the same order.
+        class_name: of the problems.
+        vehicle: that drives the plans.
+        metadata: JSON values to keep with the memory.
+    """
     sweeps = sweep_plans(plans, vehicle)
     return Memory(
         class_name=class_name,

@@ -1,10 +1,10 @@
-"""Which of many solved problems to keep: greedily, those whose plans together answer the most problems.
+"""Chooses which of many solved problems to keep: greedily, those whose plans together fit most problems.
 
-What is covered are the candidates' own problems, each by the plans of the others: a plan's own problem says
-nothing of it, and a plan that answers no other is kept last. A problem that is covered already counts less
-each time it is covered again, so that a new one finds several plans. The kept plans are in the order of the
-greedy choice, so the first of them are a good choice of fewer. (The coverage is submodular: Nemhauser, Wolsey
-and Fisher 1978; gains of earlier steps are bounds that spare most of the work: Minoux 1978.)
+The problems to cover are the candidates' own, each by the plans of the others: that a plan fits its own
+problem says nothing about it, and a plan that fits no other problem is kept last. A covered problem counts
+less each time it is covered again, so that a new problem finds several plans. The kept plans are in the order
+of the greedy choice, so the first of them are a good choice of fewer. (Coverage is submodular: Nemhauser,
+Wolsey and Fisher 1978. Gains of earlier steps are bounds that spare most of the work: Minoux 1978.)
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from planners.world.geometry.occupancy import ALL_CELLS, Bits
 from planners.world.jit import jit
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
-PROBLEMS: Final = 1_000  # of the candidates, the first, to cover; 500 chose nearly as well (docs/method.md)
-AGAIN: Final = 0.35  # what a problem counts once more each time it is covered; 0.1 to 0.5 chose as well
-ALIKE: Final = 0.8  # share of common swept cells, of all that either sweeps, from which two plans are one
+PROBLEMS: Final = 1_000  # to cover: of the first candidates; 500 chose nearly as well (docs/method.md)
+AGAIN: Final = 0.35  # a problem's weight falls to this share each time it is covered; 0.1 to 0.5: as well
+ALIKE: Final = 0.8  # plans are near-duplicates from this share of common cells on, of all that either sweeps
 
 
 def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR) -> Integers:
-    """Numbers of the ``count`` candidates to keep, best first; all in their order if there are no more."""
+    """Return the numbers ``[count]`` of the candidates to keep, best first, or all if there are no more."""
     if count >= len(candidates):
         return np.arange(len(candidates), dtype=np.int32)
     sweeps = sweep_plans([candidate.plan for candidate in candidates], vehicle)
@@ -39,11 +39,18 @@ def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR)
 
 
 def choose(labels: Flags, masks: Bits, count: int) -> Integers:
-    """Numbers of ``count`` of N plans in the order of the greedy choice, near-duplicates after all others.
+    """Choose some of N plans greedily, near-duplicates after all others.
 
-    ``labels [M, N]``: which plans are free in which problem. ``masks [N, 64]``: the plans' swept cells.
+    Args:
+        labels: ``[M, N]`` which plans are free in which problem.
+        masks: ``[N, 64]`` the cells that each plan sweeps.
+        count: how many plans to choose.
 
-    Raises ValueError where there are fewer plans than asked for, or labels and masks are not of the same.
+    Returns:
+        Their numbers ``[count]`` in the order of the choice.
+
+    Raises:
+        ValueError: There are fewer than ``count`` plans, or labels and masks are of different plans.
     """
     plans = len(masks)
     if labels.shape[1:] != (plans,) or not 0 <= count <= plans:
@@ -59,16 +66,16 @@ def choose(labels: Flags, masks: Bits, count: int) -> Integers:
         best = order[step] = _most_useful(free, weights, bounds, eligible)
         weights[free[best]] *= AGAIN
         eligible[best] = False
-        same = eligible & (similarity(masks, masks[best]) >= ALIKE)
-        eligible &= ~same
-        alike |= same
+        duplicates = eligible & (similarity(masks, masks[best]) >= ALIKE)
+        eligible &= ~duplicates
+        alike |= duplicates
     return order
 
 
 def similarity(masks: Bits, mask: Bits) -> Floats:
-    """Cells that plans ``[N, 64]`` share with one ``[64]``, of all that either sweeps: ``[N]``, 0 to 1.
+    """The share ``[N]``, 0 to 1, of common cells of plans ``[N, 64]`` and a plan ``[64]``, of all they sweep.
 
-    Nothing is like a plan that leaves the window, of which all cells are set.
+    It is 0 if the one plan leaves the window and so has all cells set.
     """
     if (mask == ALL_CELLS).all():
         return np.zeros(len(masks))
@@ -79,7 +86,10 @@ def similarity(masks: Bits, mask: Bits) -> Floats:
 
 
 def coverage(labels: Flags, order: Integers) -> Floats:
-    """Share ``[len(order)]`` of the problems ``[M, N]`` in which any of the first 1, 2, ... plans is free."""
+    """The share ``[n]`` of problems in which one of the first 1, 2, ... n plans of ``order [n]`` is free.
+
+    ``labels [M, N]``: which plans are free in which problem.
+    """
     covered: Floats = np.logical_or.accumulate(labels[:, order], axis=1).mean(0)
     return covered
 
@@ -88,19 +98,19 @@ def coverage(labels: Flags, order: Integers) -> Floats:
 def _most_useful(free: Flags, weights: Floats, bounds: Floats, eligible: Flags) -> int:
     """The eligible plan whose free problems weigh most, the first of equals; ``bounds [N]`` are tightened.
 
-    Weights only fall from step to step, so what a plan gained before bounds what it gains now.
+    Weights only fall from step to step, so an earlier gain of a plan bounds its gain now.
     """
-    known = np.zeros(bounds.shape[0], np.bool_)
+    exact = np.zeros(bounds.shape[0], np.bool_)
     while True:
         best = -1
         for i in range(bounds.shape[0]):
             if eligible[i] and (best < 0 or bounds[i] > bounds[best]):
                 best = i
-        if known[best]:
+        if exact[best]:
             return best
         gain = 0.0
         for j in range(weights.shape[0]):
             if free[best, j]:
                 gain += weights[j]
         bounds[best] = gain
-        known[best] = True
+        exact[best] = True

@@ -1,8 +1,8 @@
-"""Growth: a memory of many plans whose encoder was trained on few, without training again.
+"""Growth: makes a memory of many plans with an encoder that was trained on few, without training again.
 
-The encoder stays as it is. Some problems of the class are embedded, and each plan is checked in each of them:
-from that alone follow the plan's centroid and its row of the readout, in closed form. So a plan costs its
-checks, rows of other plans stay as they were, and what was learned about obstacles serves new plans too.
+The encoder stays as it is. Some problems of the class are embedded, and each plan is checked in each of them.
+The plan's centroid and its row of the readout follow from that in closed form. So a plan costs only its
+checks, rows of other plans do not change, and what was learned about obstacles serves new plans, too.
 """
 
 from __future__ import annotations
@@ -25,25 +25,28 @@ from planners.world.geometry.occupancy import occupancy_of
 from planners.world.jit import lean
 from planners.world.problem import Plan, Problem
 
-RIDGE = 1e-3  # of the mean variance of an embedding's numbers; measured: between 1e-4 and 1e-1 all is alike
+RIDGE = 1e-3  # of the mean variance of an embedding's numbers; 1e-4 to 1e-1 measured alike
 
 
 class Moments(NamedTuple):
-    """What n problems say of N plans: row ``i + 1`` sums over the problems in which plan i is free.
-
-    Row 0 sums over the problems in which none of the plans is free.
-    """
+    """Sums over problems: row ``i + 1`` of those in which plan i is free, row 0 of those in which none is."""
 
     counts: Floats  # [N + 1] problems
-    sums: Floats  # [N + 1, D] their embeddings
-    squares: Floats  # [N + 1] the embeddings' squared lengths
+    sums: Floats  # [N + 1, D] of their embeddings
+    squares: Floats  # [N + 1] of the squared lengths of their embeddings
 
 
 def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> Memory:
-    """A memory of ``plans`` with the encoder of ``memory``, read out by what canonical ``problems`` say.
+    """Make a memory of other plans with the encoder of a memory.
 
-    Some 2,000 problems are enough (docs/growth.md); each takes a check of all plans. A memory's own plans
-    are kept only if they are among ``plans``. No problems, or no plans: ValueError.
+    Args:
+        memory: whose encoder is used; its own plans are kept only if they are among ``plans``.
+        plans: N plans to store.
+        problems: canonical problems to derive the readout from, each checked with all plans; some 2,000 are
+            enough (docs/growth.md).
+
+    Raises:
+        ValueError: There are no problems, or no plans.
     """
     if not problems or not plans:
         raise ValueError(
@@ -72,7 +75,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
 
 
 def moments_of(embeddings: Floats32, labels: Iterable[Flags], plans: int) -> Moments:
-    """Sum up n problems: ``embeddings [n, D]`` and, one after another, which of N plans are free ``[N]``."""
+    """Sum up n problems: ``embeddings [n, D]`` and, one after another, which plans are free ``[N]``."""
     width = embeddings.shape[1]
     moments = Moments(np.zeros(plans + 1), np.zeros((plans + 1, width)), np.zeros(plans + 1))
     for embedding, free in zip(embeddings.astype(np.float64), labels, strict=True):
@@ -91,18 +94,18 @@ def _add(embedding: Floats, square: float, free: Flags, none: bool, moments: Mom
 
 
 def scatter(moments: Moments, centroids: Floats32) -> float:
-    """Mean squared distance of a problem to the centroids of its free plans."""
-    met = moments.counts > 0
-    lengths = np.square(centroids[met].astype(np.float64)).sum(1)
-    spread = moments.squares[met] - moments.counts[met] * lengths
-    return float(spread.sum() / moments.counts[met].sum())
+    """The mean squared distance of problems to the centroids ``[N + 1, D]`` of their free plans."""
+    present = moments.counts > 0
+    lengths = np.square(centroids[present].astype(np.float64)).sum(1)
+    spread = moments.squares[present] - moments.counts[present] * lengths
+    return float(spread.sum() / moments.counts[present].sum())
 
 
 def ridge_readout(embeddings: Floats32, moments: Moments) -> tuple[Floats32, Floats32]:
-    """Vectors ``[N + 1, D]`` and biases: the ridge regression of "this plan is free" (1 or 0) on embeddings.
+    """Vectors ``[N + 1, D]`` and biases ``[N + 1]`` by ridge regression of "this plan is free" on embeddings.
 
-    Scores estimate probabilities. Where no plan is free in a problem, row 0 is to win only by clear odds:
-    its bias is lowered by the difference that these odds make.
+    Scores estimate probabilities. Row 0, "no plan is free", is to win only by clear odds, so its bias is
+    lowered by the difference in probability that these odds mean.
     """
     count, width = embeddings.shape
     mean = embeddings.mean(0, dtype=np.float64)

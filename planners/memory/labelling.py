@@ -1,4 +1,4 @@
-"""Occupancy grids and exact label vectors of many problems at once: what an encoder learns from."""
+"""Draws the occupancy grids and label vectors of many problems at once: an encoder learns from them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from planners.world.problem import Problem
 
 
 class Labelled(NamedTuple):
-    """What is seen of n problems, and which of N plans are free in them."""
+    """The grids of n problems, and which of N plans are free in each."""
 
-    grids: Grid  # uint8 [n, 512] occupancy 64 x 64 as bits, as ``occupancy.pack`` has them
+    grids: Grid  # uint8 [n, 512] occupancy grids, packed as by ``occupancy.pack``
     free: Flags  # [n, N]
 
 
 def label_problems(problems: Sequence[Problem], sweeps: PlanSweeps) -> Labelled:
-    """Grid and label vector of each of n canonical problems."""
+    """Draw the grid and the label vector of each of n canonical problems."""
     corners = np.cumsum([0] + [len(problem.obstacles.vertices) for problem in problems], dtype=np.int32)
     pieces = np.cumsum([0] + [len(problem.obstacles.piece_starts) for problem in problems], dtype=np.int32)
     grids = np.empty((len(problems), GRID, GRID), np.uint8)
@@ -54,7 +54,7 @@ def _label(
     grids: Grid,
     free: Flags,
 ) -> None:
-    """Fill in ``grids`` and ``free``; problem i owns vertices corners[i] : corners[i + 1], and so on."""
+    """Fill in ``grids`` and ``free``. Problem i owns vertices[corners[i] : corners[i + 1]], and so on."""
     for i in range(bounds.shape[0]):
         shape = vertices[corners[i] : corners[i + 1]]
         starts = piece_starts[pieces[i] : pieces[i + 1]]

@@ -22,38 +22,34 @@ from planners.world.vehicles.vehicle import Vehicle
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """Stored plans and what finds them: masks, encoder, centroids, readout. Plan ``i`` is row ``i + 1``."""
+    """Stored plans, and what finds them: masks, encoder, centroids, readout. Plan ``i`` has row ``i + 1``."""
 
     class_name: str
     vehicle: Vehicle
     plans: Sequence[Plan]  # N plans in the canonical frame
-    sweeps: PlanSweeps  # the same plans' swept boxes
-    masks: Bits  # [N, 64] and the cells of the occupancy grid that these meet, a bit each
-    centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of the S_0 problems
+    sweeps: PlanSweeps  # the swept boxes of these plans
+    masks: Bits  # [N, 64] the cells of the occupancy grid that each plan sweeps, a bit each
+    centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of the problems S_0
     vectors: Floats32  # [N + 1, D] readout
     biases: Floats32  # [N + 1] readout
     objective: str  # what the encoder was trained for: "triplet" or "labels"
     weights: Weights  # of the encoder
-    metadata: dict[str, Any] = field(default_factory=dict)  # JSON values only
+    metadata: dict[str, Any] = field(default_factory=dict)  # JSON values
     lists: InvertedLists | None = None  # over the readout of very many plans
 
     def __post_init__(self) -> None:
-        rows = len(self.plans) + 1
-        if len(self.masks) != len(self.plans):
-            raise ValueError(
-                f"Memory has masks of {len(self.masks)} plans, {len(self.plans)} are stored. Were they built "
-                "together?"
-            )
-        for name in ("centroids", "vectors", "biases"):
-            if len(getattr(self, name)) != rows:
+        plans = len(self.plans)
+        for name, extra in (("masks", 0), ("centroids", 1), ("vectors", 1), ("biases", 1)):
+            rows, wanted = len(getattr(self, name)), plans + extra
+            if rows != wanted:
                 raise ValueError(
-                    f"Memory has {len(getattr(self, name))} rows of {name}, {len(self.plans)} plans need "
-                    f"{rows} (row 0 is 'no plan'). Were they built together?"
+                    f"Memory has {rows} rows of {name}; {plans} plans need {wanted}. "
+                    "Were they built together?"
                 )
 
     @functools.cached_property
     def scales(self) -> tuple[float, ...]:
-        """Of the problems whose plans it holds: metres of the world outside in a canonical metre."""
+        """The scales of the problems that it was made of: real metres in a canonical metre."""
         return tuple(self.metadata.get("scales", (1.0,)))
 
     @functools.cached_property
@@ -63,7 +59,7 @@ class Memory:
 
     @functools.cached_property
     def forward(self) -> Forward:
-        """The encoder for the bits of one grid."""
+        """The encoder for the bits ``[64]`` of one grid."""
         return forward_of(self.weights)
 
     @functools.cached_property
@@ -78,11 +74,11 @@ class Memory:
 
 
 def scale_fault(memory: Memory, scale: float) -> str | None:
-    """Why a memory has nothing to say of problems of a scale, or None."""
+    """Return why a memory cannot be used for problems of a scale, or None if it can."""
     if scale in memory.scales:
         return None
-    made = " and ".join(f"{each:g}" for each in memory.scales)
+    scales = " and ".join(f"{each:g}" for each in memory.scales)
     return (
-        f"memory of {memory.class_name} was made of problems of scale {made}, asked was {scale:g}: make one "
-        "of that scale"
+        f"memory of {memory.class_name} was made of problems of scale {scales}, asked was {scale:g}: make "
+        "one of that scale"
     )

@@ -1,15 +1,15 @@
 """Recall: which stored plans to try on a problem, by one of five strategies (paper, III-C is ``centroid``).
 
-| strategy | who ranks | who decides |
+| strategy | who ranks | which plans are checked exactly |
 |---|---|---|
-| centroid | the encoder | exact checks of the first k |
-| mask | blocked cells | exact checks of the first k |
-| hybrid | the encoder some hundred, among these blocked cells | exact checks of them all |
-| exhaustive | blocked cells | exact checks of all N |
-| random | nobody | exact checks of k picked blindly |
+| centroid | the encoder | the first k |
+| mask | blocked cells | the first k |
+| hybrid | the encoder picks some hundred, blocked cells rank these | all of these |
+| exhaustive | blocked cells | all N |
+| random | nobody | k picked blindly |
 
-Of a large memory, ``hybrid`` and ``exhaustive`` try the first thousand plans before they ask for more: where
-plans are free at all, one of these mostly is, so the time to find it does not grow with the memory.
+In a large memory ``hybrid`` and ``exhaustive`` try the first thousand plans before the others. If any plan is
+free, one of these mostly is, so the time to find it does not grow with the memory.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from planners.world.geometry.occupancy import Grid, bits_of
 from planners.world.view import View
 
 RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")
-CANDIDATES: Final = 256  # plans that hybrid has the encoder choose
+CANDIDATES: Final = 256  # plans that the encoder picks for hybrid
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
-ASKED_FIRST: Final = 1_000  # plans of a large memory
-TRIED_FIRST: Final = 64  # of these, the least blocked: where these are blocked, the others mostly are
-TRIED_DRAWN: Final = 8  # plans checked from the drawing; if all are blocked, a planner will need the scene
-WORTH_CELLS: Final = 40  # blocked cells: of plans with 30 or more none was free, in no class
+TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
+CHECKED_EARLY: Final = 64  # of these, the least blocked: if they are blocked, the others mostly are, too
+CHECKED_DRAWN: Final = 8  # plans checked from the drawing; if all are blocked, a planner will need the scene
+WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
 
 
 class Recalled(NamedTuple):
     """What a memory has for a problem."""
 
     plans: tuple[int, ...]  # at most k, best first
-    free: int  # one of these that answers the problem; -1: none of all that were checked does
-    checks: int  # collision checks to know
+    free: int  # one of these that fits the problem; -1 if none of those that were checked does
+    checks: int  # collision checks that this took
 
 
 def default_recall(memory: Memory) -> str:
-    """The strategy that measures best for the size of a memory (docs/method.md)."""
+    """Return the strategy that measures best for the size of a memory (docs/method.md)."""
     return "exhaustive" if len(memory.plans) <= MOST_EXHAUSTIVE else "hybrid"
 
 
@@ -57,65 +57,77 @@ def recall(
     rng: np.random.Generator | None = None,
     candidates: int = CANDIDATES,
 ) -> Recalled:
-    """The (at most) ``k`` best plans for a problem and the first that is free, by a strategy of ``RECALLS``.
+    """Recall the best plans for a problem, and the first of them that fits it.
 
-    Few or none where the strategy holds that no plan fits: ``centroid`` where "no plan" scores best, the
-    others leave out plans with more blocked cells than ``WORTH_CELLS``. Cells hold only for plans as
-    they are stored: for a problem of another start heading the encoder ranks in their place. ``random``
-    needs an ``rng``; ``candidates`` are those of ``hybrid``. ValueError: an unknown strategy, k below 1.
+    There are fewer than k, or none, if the strategy holds that no plan fits: ``centroid`` if "no plan" scores
+    best, the others leave out plans with more blocked cells than ``WORTH_CELLS``. Cells hold only for plans
+    as they are stored, so for a problem of another start heading the encoder ranks instead.
+
+    Args:
+        memory: to recall from.
+        view: the problem.
+        strategy: one of ``RECALLS``.
+        k: how many plans to return at most.
+        rng: the source of the choices of ``random``.
+        candidates: how many plans the encoder picks for ``hybrid``.
+
+    Raises:
+        ValueError: The strategy is unknown, k is below 1, or ``random`` has no ``rng``.
     """
     if strategy not in RECALLS or k < 1:
         raise ValueError(f"recall {k} plans by '{strategy}': give 1 or more, and one of {', '.join(RECALLS)}")
     count, spent = len(memory.plans), 0
-    stored = memory.begins_with(view.problem.start[2])
-    if stored and count > ASKED_FIRST and strategy in ("exhaustive", "hybrid"):
+    as_stored = memory.begins_with(view.problem.start[2])
+    if as_stored and count > TRIED_EARLY and strategy in ("exhaustive", "hybrid"):
         early = among_the_first(memory, view, k)
         if early.free >= 0:
             return early
         spent = early.checks
-    tried = {"mask": k, "hybrid": candidates, "exhaustive": count}.get(strategy, k)
-    worth = count  # how many of these may be recalled
+    most = {"mask": k, "hybrid": candidates, "exhaustive": count}.get(strategy, k)
+    worth = count  # how many of the ranked plans may be returned
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "centroid":
         order = by_encoder(memory, view, k)
-    elif not stored:
-        order = by_encoder(memory, view, tried, never_none=True)
+    elif not as_stored:
+        order = by_encoder(memory, view, most, never_none=True)
     else:
         narrowed = strategy == "hybrid" and candidates < count
         among = by_encoder(memory, view, candidates, never_none=True) if narrowed else None
         order, worth = by_cells(memory, view, among)
-        order = order[: min(tried, worth) if strategy == "mask" else tried]
+        order = order[: min(most, worth) if strategy == "mask" else most]
     view.lap("recall")
-    free, checks = first_check(memory, view, order, stored)
+    free, checks = first_check(memory, view, order, as_stored)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
 
 
 def among_the_first(memory: Memory, view: View, k: int) -> Recalled:
-    """What the first plans of a large memory have for a problem of their heading, by blocked cells."""
-    ranking = rank_by_cells(memory.masks[:ASKED_FIRST], view.bits, view.workspace)
-    order = ranking.order[: min(TRIED_FIRST, int(ranking.places[WORTH_CELLS]))]
+    """Recall from the first plans of a large memory, by blocked cells, for a problem of their heading."""
+    ranking = rank_by_cells(memory.masks[:TRIED_EARLY], view.bits, view.workspace)
+    order = ranking.order[: min(CHECKED_EARLY, int(ranking.ends[WORTH_CELLS]))]
     view.lap("recall")
-    free, checks = first_check(memory, view, order, stored=True)
+    free, checks = first_check(memory, view, order, as_stored=True)
     return Recalled(_with(free, order[:k].tolist(), k), free, checks)
 
 
 def _with(free: int, head: list[int], k: int) -> tuple[int, ...]:
-    """The first k plans, the free one among them."""
+    """The first k plans, with the free one among them."""
     return tuple(head if free < 0 or free in head else [free, *head][:k])
 
 
 def pick_blindly(count: int, k: int, rng: np.random.Generator | None) -> Integers:
-    """(At most) ``k`` of ``count`` plans."""
+    """Pick (at most) ``k`` of ``count`` plans. Raises ValueError if there is no generator."""
     if rng is None:
         raise ValueError("plans are picked blindly, but by no generator: pass an rng")
     return rng.choice(count, min(k, count), replace=False).astype(np.int32)
 
 
 def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> Integers:
-    """The (at most) ``k`` plans that score best, best first; none where "no plan" scores better."""
-    bits = view.bits
-    embedding = memory.forward(bits)
+    """Rank the (at most) ``k`` plans that score best, best first.
+
+    If "no plan" scores better than all of them there are none, unless ``never_none``.
+    """
+    embedding = memory.forward(view.bits)
     view.lap("encode")
     if memory.lists is None:
         return best_plans(memory.vectors, memory.biases, embedding, k, never_none)
@@ -126,35 +138,35 @@ def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> 
 
 
 def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, int]:
-    """All plans, or those ``among``, the least blocked first, and how many of these are worth recalling."""
+    """Rank all plans, or those ``among [n]``, the least blocked first; and how many are worth recalling."""
     masks = memory.masks if among is None else memory.masks[among]
     ranking = rank_by_cells(masks, view.bits, view.workspace)
     order = ranking.order if among is None else among[ranking.order]
-    return order, int(ranking.places[WORTH_CELLS])
+    return order, int(ranking.ends[WORTH_CELLS])
 
 
-def first_check(memory: Memory, view: View, order: Integers, stored: bool) -> tuple[int, int]:
-    """The first plan of ``order`` that answers the problem, -1 for none, and the collision checks to know.
+def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) -> tuple[int, int]:
+    """Find the first plan of ``order [n]`` that fits the problem (-1: none), and count the collision checks.
 
-    ``stored``: it begins with the heading of the stored plans; otherwise they are turned.
+    ``as_stored`` says that the problem begins with the heading of the stored plans; else plans are turned.
     """
-    problem = view.problem
-    found, checks = -1, 0
-    if stored:
-        found, checks = first_fitting_drawn(
-            order[:TRIED_DRAWN], memory.sweeps, memory.masks, view.drawing, problem
-        )
-        order = order[TRIED_DRAWN:]
+    plan, checks = -1, 0
+    if as_stored:
+        head, order = order[:CHECKED_DRAWN], order[CHECKED_DRAWN:]
+        plan, checks = first_fitting_drawn(head, memory.sweeps, memory.masks, view.drawing, view.problem)
         view.lap("check")
-    if found < 0 and len(order):
-        found, more = first_fitting(order, memory.sweeps, ends_of(problem), view.scene)
+    if plan < 0 and len(order):
+        plan, more = first_fitting(order, memory.sweeps, ends_of(view.problem), view.scene)
         checks += more
         view.lap("check")
-    return int(found), int(checks)
+    return int(plan), int(checks)
 
 
 def rank(memory: Memory, grid: Grid) -> tuple[Integers, bool]:
-    """All plans ``[N]`` in the encoder's order, best first, and whether "no plan" scores better than each."""
+    """Rank all plans ``[N]`` by the encoder, best first, and tell whether "no plan" scores better than each.
+
+    ``grid [64, 64]`` is the problem's occupancy.
+    """
     embedding = memory.forward(bits_of(grid))
     order = best_plans(memory.vectors, memory.biases, embedding, len(memory.plans), never_none=True)
     return order, len(best_plans(memory.vectors, memory.biases, embedding, 1)) == 0

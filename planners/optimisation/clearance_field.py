@@ -1,7 +1,7 @@
-"""Signed distance to the nearest obstacle or bound: exact at the nodes of a grid, a cubic spline between.
+"""The signed distance to the nearest obstacle or bound, exact at the nodes of a grid, a cubic spline between.
 
-Positive in free space, negative inside obstacles and beyond the bounds. The spline is twice continuously
-differentiable, as an interior-point method wants its constraints; its corners are rounder than the truth.
+It is positive in free space, and negative inside obstacles and beyond the bounds. The spline is twice
+continuously differentiable, as an interior-point method needs it, but rounds off corners.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Point
 from planners.world.jit import jit
 from planners.world.problem import Problem
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import Vehicle
 
-CELL_M = 0.25  # half a thin wall: the error of the spline stays below what discs add to a footprint
-PADDING_M = 2.0  # beyond the bounds, where a trajectory may be while it is not yet feasible
+CELL_M = 0.25  # half of a thin wall: the spline's error stays below what discs add to a footprint
+PADDING_M = 2.0  # beyond the bounds, where a trajectory may be before it is feasible
 
 
 class ClearanceField(NamedTuple):
-    """A cubic spline over a grid; ``coefficients`` interpolate the distances."""
+    """A cubic spline over a grid of distances."""
 
-    corner: tuple[float, float]  # x, y in metres of node (0, 0)
+    corner: Point  # of node (0, 0)
     cell_m: float
     distances: Floats  # [columns, rows] metres, at the nodes
     coefficients: Floats  # [columns, rows] of the spline's basis functions
 
     def symbolic(self) -> ca.Function:
-        """``point [2] -> signed distance``, metres."""
+        """Return a function from a ``point [2]`` to its signed distance, in metres."""
         point = ca.MX.sym("point", 2)
         knots = [
             (low + self.cell_m * (np.arange(count + 4) - 2)).tolist()
@@ -44,7 +44,7 @@ class ClearanceField(NamedTuple):
 
 
 def clearance_field(problem: Problem, cell_m: float = CELL_M) -> ClearanceField:
-    """The clearance field of a problem, on nodes ``cell_m`` apart."""
+    """Compute the clearance field of a problem on nodes ``cell_m`` metres apart."""
     x_min, y_min, x_max, y_max = problem.bounds
     xs, ys = (
         low - PADDING_M + cell_m * np.arange(math.ceil((high - low + 2.0 * PADDING_M) / cell_m) + 1.0)
@@ -57,7 +57,7 @@ def clearance_field(problem: Problem, cell_m: float = CELL_M) -> ClearanceField:
 
 
 def least_clearance(problem: Problem, states: Floats, vehicle: Vehicle) -> float:
-    """Exact least distance, metres, of the footprints at ``states [T, S]`` to obstacles and bounds."""
+    """Compute the exact least clearance, in metres, of the footprints at ``states [T, S]``."""
     corners = footprints(states, vehicle)
     bodies = shapely.polygons(corners.reshape(-1, *corners.shape[-2:]))
     around = shapely.union(_union(problem), shapely.box(*problem.bounds).exterior)
@@ -77,9 +77,9 @@ def _outline(problem: Problem) -> Floats:
 
 @jit
 def signed_distances(xs: Floats, ys: Floats, edges: Floats, bounds: Floats) -> Floats:
-    """Distances ``[len(xs), len(ys)]`` to closed outlines ``edges [E, 4]`` and the ``bounds [4]``.
+    """Distances ``[len(xs), len(ys)]`` to closed outlines ``edges [E, 4]`` and the ``bounds [4]``, in metres.
 
-    Inside is where a ray crosses an odd number of edges.
+    A point is inside if a ray from it crosses an odd number of edges.
     """
     distances = np.empty((xs.shape[0], ys.shape[0]))
     for i in range(xs.shape[0]):

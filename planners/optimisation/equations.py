@@ -1,6 +1,6 @@
-"""The vehicles once more, as CasADi expressions: their step, their limits, and discs that cover them.
+"""The vehicles as CasADi expressions: their step, their limits, and discs that cover them.
 
-A step is the classical Runge-Kutta step of ``planners.world.vehicles.dynamics``, with a length that may vary.
+A step is the classical Runge-Kutta step of ``planners.world.vehicles.dynamics``, of variable length.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_size
 
-SMOOTH = 0.01  # m/s, rad: how far from 0 an absolute value is rounded off, always upwards
-SHY_OF_JACK_KNIFE = 1e-3  # rad: the limit itself may be passed by the solver's tolerance
+SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
+SHY_OF_JACK_KNIFE = 1e-3  # rad: the solver may pass a limit by its tolerance
 
 
-class Bounds(NamedTuple):
-    """What the vehicle allows; infinite where it allows everything."""
+class VehicleLimits(NamedTuple):
+    """The limits of a vehicle, infinite if there is none."""
 
     state_low: Floats  # [S]
     state_high: Floats  # [S]
@@ -28,7 +28,7 @@ class Bounds(NamedTuple):
 
 
 def slopes(state: ca.SX, controls: ca.SX, vehicle: Vehicle) -> ca.SX:
-    """Time derivative ``[S]`` of ``state [S]`` under ``controls [2]``."""
+    """Return the time derivative ``[S]`` of ``state [S]`` under ``controls [2]``."""
     heading, speed, turn = state[2], state[3], state[4]
     turning = [turn if isinstance(vehicle, DifferentialDrive) else speed * ca.tan(turn) / vehicle.wheelbase]
     hitches = []
@@ -44,7 +44,10 @@ def slopes(state: ca.SX, controls: ca.SX, vehicle: Vehicle) -> ca.SX:
 
 
 def step_of(vehicle: Vehicle) -> ca.Function:
-    """``(state [S], controls [2], step length in seconds) -> next state [S]``, nothing clamped."""
+    """Return a function from state ``[S]``, controls ``[2]`` and step length (s) to the next state ``[S]``.
+
+    Nothing is clamped.
+    """
     state, controls, h = ca.SX.sym("state", state_size(vehicle)), ca.SX.sym("controls", 2), ca.SX.sym("h")
     k1 = slopes(state, controls, vehicle)
     k2 = slopes(state + 0.5 * h * k1, controls, vehicle)
@@ -53,8 +56,8 @@ def step_of(vehicle: Vehicle) -> ca.Function:
     return ca.Function("step", [state, controls, h], [state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)])
 
 
-def bounds_of(vehicle: Vehicle) -> Bounds:
-    """Limits of speed, steering or turn rate, hitches and controls; position and heading are free."""
+def limits_of(vehicle: Vehicle) -> VehicleLimits:
+    """Return the limits of a vehicle. Position and heading have none."""
     if isinstance(vehicle, DifferentialDrive):
         turn, turn_control = vehicle.max_turn_rate, vehicle.max_turn_acceleration
     else:
@@ -63,7 +66,7 @@ def bounds_of(vehicle: Vehicle) -> Bounds:
     if isinstance(vehicle, CarWithTrailers):
         hitches = [vehicle.max_hitch - SHY_OF_JACK_KNIFE] * len(vehicle.hitch_lengths)
     controls = np.array([vehicle.max_acceleration, turn_control])
-    return Bounds(
+    return VehicleLimits(
         np.array([-np.inf] * 3 + [vehicle.min_speed, -turn] + [-hitch for hitch in hitches]),
         np.array([np.inf] * 3 + [vehicle.max_speed, turn, *hitches]),
         -controls,
@@ -72,10 +75,10 @@ def bounds_of(vehicle: Vehicle) -> Bounds:
 
 
 def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
-    """``state [S] -> centres [2, D], radii [D]`` in metres: ``a_body`` discs in a row over each body.
+    """Return a function from ``state [S]`` to discs over the bodies: centres ``[2, D]``, radii ``[D]`` (m).
 
-    They cover the bodies with the margins that the kernels' check adds: half of the farthest way of a body
-    point in a step into or out of the state.
+    The discs, ``a_body`` in a row over each body, cover it with the margin that the kernels add: half of the
+    longest path of a body point in a step into or out of the state.
     """
     state = ca.SX.sym("state", state_size(vehicle))
     x, y, heading = state[0], state[1], state[2]

@@ -1,4 +1,4 @@
-"""Where an optimisation may start: any sequence of states and controls, whether or not it could be driven."""
+"""Where an optimisation may start: any states and controls, even if they cannot be driven."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 
 def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
-    """Straight from start to goal, through everything: full acceleration to full speed, held to the end."""
+    """Drive straight from start to goal through everything, with full acceleration up to full speed."""
     (x, y, _), (goal_x, goal_y) = problem.start, problem.goal
     distance = math.dist((x, y), problem.goal)
     gain = vehicle.max_acceleration * vehicle.dt
     speeds = [0.0]
-    way = [0.0]
-    while way[-1] < distance:
+    driven = [0.0]
+    while driven[-1] < distance:
         speeds.append(min(speeds[-1] + gain, vehicle.max_speed))
-        way.append(way[-1] + 0.5 * vehicle.dt * (speeds[-2] + speeds[-1]))
-    share = np.minimum(np.array(way) / max(distance, 1e-9), 1.0)
-    states = np.zeros((len(way), state_size(vehicle)))
+        driven.append(driven[-1] + 0.5 * vehicle.dt * (speeds[-2] + speeds[-1]))
+    share = np.minimum(np.array(driven) / max(distance, 1e-9), 1.0)
+    states = np.zeros((len(driven), state_size(vehicle)))
     states[:, 0] = x + share * (goal_x - x)
     states[:, 1] = y + share * (goal_y - y)
     states[:, 2] = math.atan2(goal_y - y, goal_x - x)
     states[:, 3] = speeds
-    controls = np.zeros((len(way) - 1, 2))
+    controls = np.zeros((len(driven) - 1, 2))
     controls[:, 0] = np.diff(speeds) / vehicle.dt
     return Plan(states, controls, vehicle.dt)
 
 
 def nearest_to_free(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR) -> int:
-    """The number of the plan with the fewest states in collision, the first of equals.
+    """Return the number of the plan with the fewest states in collision, the first of equals.
 
-    Raises ValueError when there is no plan.
+    Raises ValueError if there is no plan.
     """
     if not plans:
         raise ValueError("There is no plan to choose from: store some first.")
@@ -47,7 +47,7 @@ def nearest_to_free(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR)
 
 @jit
 def count_blocked(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
-    """How many of ``states [T, S]`` are in collision."""
+    """Count the states that are in collision of ``states [T, S]``."""
     blocked = 0
     for i in range(states.shape[0]):
         blocked += 1 - count_free_prefix(states[i : i + 1], vehicle, scene)
@@ -55,7 +55,7 @@ def count_blocked(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
 
 
 def resampled(guess: Plan, steps: int) -> Plan:
-    """The same motion in the same time, in ``steps`` steps of another length, between states linearly."""
+    """Divide the same motion into another number of steps, linearly interpolated, in the same time."""
     old = np.linspace(0.0, 1.0, len(guess.states))
     new = np.linspace(0.0, 1.0, steps + 1)
     states = np.column_stack([np.interp(new, old, column) for column in guess.states.T])
@@ -67,7 +67,7 @@ def resampled(guess: Plan, steps: int) -> Plan:
 
 
 def begun_at(guess: Plan, problem: Problem, vehicle: Vehicle = CAR) -> Plan:
-    """The guess with its first state put to the problem's start, its headings counted from there."""
+    """Put the first state of a guess at the problem's start, and count its headings from there."""
     states = guess.states.copy()
     turns = round((problem.start[2] - states[0, 2]) / (2.0 * math.pi))
     states[:, 2] += 2.0 * math.pi * turns

@@ -1,8 +1,8 @@
-"""From a guess to a plan: a trajectory of least time near it, driven at the vehicle's own step, and judged.
+"""Optimises a guess: finds a trajectory of least time near it, drives it, and has it judged.
 
-First h is free: the guess's motion is bent out of obstacles and shortened. Then h is the vehicle's and the
-number of steps what the found time needs, which takes few iterations. What comes out is simulated from its
-controls; a plan that the kernels or the authority refuse is tried again with more clearance, or not returned.
+First the step length h is free: the motion is bent out of obstacles and shortened. Then h is the vehicle's
+step, and the time found gives the number of steps, which takes few iterations. The result is simulated from
+its controls. If the kernels or the authority refuse it, it is tried again with more clearance.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planners.optimisation.clearance_field import CELL_M, clearance_field
-from planners.optimisation.equations import bounds_of
+from planners.optimisation.equations import limits_of
 from planners.optimisation.guesses import begun_at, resampled
 from planners.optimisation.transcription import CostWeights, Solution, transcribe
 from planners.world.authority.authority import faults
@@ -29,17 +29,19 @@ FEWEST_STEPS = 4
 
 
 class OptimiseSettings(NamedTuple):
-    """How to optimise; IPOPT's settings are reasoned about in docs/optimisation.md."""
+    """Settings of an optimisation. docs/optimisation.md gives the reasons for those of IPOPT."""
 
     weights: CostWeights = CostWeights()
-    iterations: int = 300  # IPOPT's, of all programmes of an optimisation together
-    discs: int = 3  # a body: a car's swept half width of 0.66 m becomes 0.77; 0.90 with two, 0.73 with four
+    iterations: int = 300  # of IPOPT, for all programmes of an optimisation together
+    discs: int = (
+        3  # over each body: a car's swept half width of 0.66 m becomes 0.77; 0.90 with two, 0.73 with four
+    )
     cell_m: float = CELL_M
     step_low: float = 0.25  # of the vehicle's step, while h is free
     step_high: float = 2.0
-    barriers: tuple[float, ...] = (0.001, 0.1)  # while h is free: the next where one led into an obstacle
-    last_barrier: float = 0.0001  # at the vehicle's own step, begun next to the answer
-    attempts: int = 3  # at the vehicle's own step, each a step longer and, if refused, with more clearance
+    barriers: tuple[float, ...] = (0.001, 0.1)  # while h is free: tried one after another until one converges
+    last_barrier: float = 0.0001  # at the vehicle's step, beginning near the answer
+    attempts: int = 3  # at the vehicle's step, each a step longer and, after a refusal, with more clearance
     more_margin_m: float = 0.05
 
 
@@ -50,21 +52,21 @@ class Ending(StrEnum):
     """How an optimisation ended. Not to converge is data, not an error."""
 
     CONVERGED = "converged"
-    INFEASIBLE = "infeasible"  # a local minimum of the violation, inside some obstacle
+    INFEASIBLE = "infeasible"  # in a local minimum of the violation, inside some obstacle
     ITERATIONS_SPENT = "iterations-spent"
-    REFUSED = "refused"  # converged, but what can be driven of it is no plan
+    REFUSED = "refused"  # converged, but the drive is not a valid plan
     START_BLOCKED = "start-blocked"
-    FAILED = "failed"  # any other of IPOPT's endings
+    FAILED = "failed"  # IPOPT ended in another way
 
 
 class Optimised(NamedTuple):
-    """One optimisation: its plan, if it converged, and what it cost."""
+    """The result of an optimisation: its plan, if it converged, and what it cost."""
 
     status: Ending
     plan: Plan | None
     iterations: int
-    seconds: float  # everything, from the problem and the guess to the plan
-    field_seconds: float  # of that, for the clearance field
+    seconds: float  # for everything, from the problem and the guess to the plan
+    field_seconds: float  # of these, for the clearance field
 
     @property
     def converged(self) -> bool:
@@ -75,9 +77,16 @@ class Optimised(NamedTuple):
 def optimise(
     problem: Problem, guess: Plan, settings: OptimiseSettings = DEFAULT_SETTINGS, vehicle: Vehicle = CAR
 ) -> Optimised:
-    """A plan for ``problem`` near ``guess``, locally least in the objective. The guess may collide or jump.
+    """Find a plan near a guess that is a local minimum of the cost.
 
-    Raises ValueError for a guess of another vehicle's shape, or with fewer than one step or numbers missing.
+    Args:
+        problem: what to solve.
+        guess: where to begin; it may collide, and its states need not follow from its controls.
+        settings: of the optimisation.
+        vehicle: what is to be driven.
+
+    Raises:
+        ValueError: The guess is of another vehicle, has no step, or holds numbers that are not finite.
     """
     _check(guess, settings, vehicle)
     began = perf_counter()
@@ -101,39 +110,39 @@ def optimise(
     def solve(
         near: Plan, steps: int, step_s: tuple[float, float], barriers: Sequence[float], margin_m: float
     ) -> Solution:
-        """The first of the solutions, a barrier each, that converges; else the last."""
+        """Solve with one barrier after another until a solution converges; else return the last one."""
         nonlocal iterations
         programme = transcribe(problem, field, steps, settings.weights, vehicle, settings.discs, margin_m)
-        found = Solution(SPENT, 0, near)
+        solution = Solution(SPENT, 0, near)
         for barrier in barriers:
-            if iterations < settings.iterations and found.status != SOLVED:
+            if iterations < settings.iterations and solution.status != SOLVED:
                 options = _ipopt(settings.iterations - iterations, barrier)
-                found = programme.solve(resampled(near, steps), step_s, options)
-                iterations += found.iterations
-        return found
+                solution = programme.solve(resampled(near, steps), step_s, options)
+                iterations += solution.iterations
+        return solution
 
     near = begun_at(guess, problem, vehicle)
     free_step_s = (settings.step_low * vehicle.dt, settings.step_high * vehicle.dt)
-    found = solve(near, max(len(guess.controls), FEWEST_STEPS), free_step_s, settings.barriers, 0.0)
-    near, margin_m = found.trajectory, 0.0
+    solution = solve(near, max(len(guess.controls), FEWEST_STEPS), free_step_s, settings.barriers, 0.0)
+    near, margin_m = solution.trajectory, 0.0
     steps = max(math.ceil(near.duration_s / vehicle.dt - 1e-6), FEWEST_STEPS)
-    if found.status == SOLVED:
+    if solution.status == SOLVED:
         for _ in range(settings.attempts):
-            found = solve(near, steps, (vehicle.dt, vehicle.dt), [settings.last_barrier], margin_m)
-            if found.status == SOLVED:
-                plan = _driven(problem, found.trajectory, vehicle)
+            solution = solve(near, steps, (vehicle.dt, vehicle.dt), [settings.last_barrier], margin_m)
+            if solution.status == SOLVED:
+                plan = _driven(problem, solution.trajectory, vehicle)
                 free = count_free_prefix(plan.states, vehicle, scene) == len(plan.states)
                 if free and not faults(problem, plan, vehicle):
                     return ended(Ending.CONVERGED, plan)
                 margin_m += settings.more_margin_m
             steps += 1
-    return ended(_ENDINGS.get(found.status, Ending.FAILED))
+    return ended(_ENDINGS.get(solution.status, Ending.FAILED))
 
 
 def refined(
     problem: Problem, plan: Plan, settings: OptimiseSettings = DEFAULT_SETTINGS, vehicle: Vehicle = CAR
 ) -> Plan:
-    """The valid ``plan`` optimised, if that makes it better by the objective; else ``plan`` itself."""
+    """Optimise a valid plan. If that does not lower its cost, return the plan itself."""
     better = optimise(problem, plan, settings, vehicle).plan
     if better is None or len(plan.controls) == 0:
         return plan
@@ -154,7 +163,7 @@ _ENDINGS = {
 
 
 def _ipopt(iterations: int, barrier: float) -> dict[str, Any]:
-    """IPOPT's options; silent, and a linear solver that gives the same result each time."""
+    """The options of IPOPT: silent, with a linear solver that always gives the same result."""
     return {
         "print_time": False,
         "ipopt.print_level": 0,
@@ -170,8 +179,8 @@ def _ipopt(iterations: int, barrier: float) -> dict[str, Any]:
 
 
 def _driven(problem: Problem, trajectory: Plan, vehicle: Vehicle) -> Plan:
-    """What the vehicle does under the trajectory's controls, these within its limits."""
-    limits = bounds_of(vehicle)
+    """Drive the trajectory's controls, clipped to the vehicle's limits."""
+    limits = limits_of(vehicle)
     controls = np.clip(trajectory.controls, limits.control_low, limits.control_high)
     return Plan(simulate(start_state(problem, vehicle), controls, vehicle), controls, vehicle.dt)
 

@@ -1,12 +1,12 @@
-"""The nonlinear programme: all states and controls of a trajectory at once (direct multiple shooting).
+"""The nonlinear programme for all states and controls of a trajectory at once (direct multiple shooting).
 
-Unknown are the states, the controls and the common step length h; each state follows from the one before by
-the vehicle's own Runge-Kutta step, so that what is feasible here can be driven. Minimised is
+The unknowns are the states, the controls and the common step length h. Each state follows from the one before
+by the vehicle's Runge-Kutta step, so that whatever is feasible can be driven. The cost to minimise is
 
     time_weight T + effort_weight h sum (u / u_max)^2 + clearance_weight h sum max(0, wanted - clearance)^2
 
-with one summand a step and control, or a step and disc. J. T. Betts, Practical Methods for Optimal Control
-and Estimation Using Nonlinear Programming (2010); A. Waechter and L. T. Biegler, IPOPT (2006).
+with one summand for each step and control, or for each step and disc. J. T. Betts, Practical Methods for
+Optimal Control and Estimation Using Nonlinear Programming (2010); Waechter and Biegler, IPOPT (2006).
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ import casadi as ca
 import numpy as np
 
 from planners.optimisation.clearance_field import ClearanceField
-from planners.optimisation.equations import bounds_of, discs_of, step_of
+from planners.optimisation.equations import discs_of, limits_of, step_of
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
-GOAL_SHY_M = 1e-3  # inside the goal disc: states simulated again are some 1e-7 m off
-H_UNIT_S = 0.1  # the unknown step length is near 1, like the others
+GOAL_SHY_M = 1e-3  # how far inside the goal disc to end, since simulated states are some 1e-7 m off
+H_UNIT_S = 0.1  # unit of the unknown step length, so that it is near 1 like the other unknowns
 
 
 class CostWeights(NamedTuple):
-    """What a plan should be: short in time, gentle, clear of obstacles."""
+    """How much time, effort and lack of clearance cost."""
 
-    time_weight: float = 1.0  # a second
-    effort_weight: float = 0.1  # a second of full control; without any, controls that change nothing jump
-    clearance_weight: float = 0.0  # a second at which a disc lacks a metre of the wanted clearance
-    wanted_clearance_m: float = 1.0  # from a disc of the covered, inflated footprint
+    time_weight: float = 1.0  # of a second
+    effort_weight: float = 0.1  # of a second of full control; at 0 controls without an effect would jump
+    clearance_weight: float = 0.0  # of a second in which a disc lacks a metre of the wanted clearance
+    wanted_clearance_m: float = 1.0  # from a disc over the inflated footprint
 
 
 class Solution(NamedTuple):
-    """What the solver ended with, converged or not."""
+    """Where the solver ended, converged or not."""
 
-    status: str  # IPOPT's own word
+    status: str  # as IPOPT names it
     iterations: int
     trajectory: Plan  # its dt is h
 
@@ -51,27 +51,29 @@ class Programme:
     steps: int
     state_size: int
     expressions: dict[str, ca.MX]  # x [n] the unknowns, f the objective, g [m] the constraints
-    low: Floats  # [n] of the unknowns; the last, h, is set for each solution
+    low: Floats  # [n] of the unknowns; that of h, the last, is set for each solution
     high: Floats  # [n]
     constraint_low: Floats  # [m]
     constraint_high: Floats  # [m]
 
     def solve(self, guess: Plan, step_s: tuple[float, float], options: dict[str, Any]) -> Solution:
-        """From ``guess``, of ``steps`` steps, with h between the two of ``step_s`` (equal: fixed)."""
+        """Solve from a guess of ``steps`` steps, with h (seconds) between the two of ``step_s``."""
         solver = ca.nlpsol("plan", "ipopt", self.expressions, options)
-        found = solver(
+        result = solver(
             x0=_packed(guess),
             lbx=np.append(self.low[:-1], step_s[0] / H_UNIT_S),
             ubx=np.append(self.high[:-1], step_s[1] / H_UNIT_S),
             lbg=self.constraint_low,
             ubg=self.constraint_high,
         )
-        told = solver.stats()
-        unknowns = np.array(found["x"]).ravel()
-        return Solution(str(told["return_status"]), int(told["iter_count"]), self._unpacked(unknowns))
+        statistics = solver.stats()
+        unknowns = np.array(result["x"]).ravel()
+        return Solution(
+            str(statistics["return_status"]), int(statistics["iter_count"]), self._unpacked(unknowns)
+        )
 
     def cost(self, plan: Plan) -> float:
-        """The objective of a plan of ``steps`` steps."""
+        """Compute the cost of a plan with ``steps`` steps."""
         return float(ca.Function("cost", [self.expressions["x"]], [self.expressions["f"]])(_packed(plan)))
 
     def _unpacked(self, unknowns: Floats) -> Plan:
@@ -91,7 +93,10 @@ def transcribe(
     discs: int,
     margin_m: float = 0.0,
 ) -> Programme:
-    """The programme of ``steps`` steps, with ``discs`` a body that stay ``margin_m`` clear."""
+    """Write a problem as a programme of ``steps`` steps, with ``discs`` over each body.
+
+    The discs must keep ``margin_m`` metres of clearance, which is interpolated by ``field``.
+    """
     size = state_size(vehicle)
     columns = size + 2
     unknowns = ca.MX.sym("x", steps * columns + size + 1)
@@ -100,10 +105,10 @@ def transcribe(
     controls, h = body[size:, :], H_UNIT_S * unknowns[-1]
 
     following = step_of(vehicle).map(steps)(states[:, :-1], controls, ca.repmat(h, 1, steps))
-    gaps = _gaps(field, vehicle, discs).map(steps)(states[:, 1:])  # the start cannot be moved
+    gaps = _gaps(field, vehicle, discs).map(steps)(states[:, 1:])  # the start is fixed
     miss = ca.sumsqr(states[:2, -1] - ca.DM(problem.goal))
 
-    limits = bounds_of(vehicle)
+    limits = limits_of(vehicle)
     effort = ca.sumsqr(controls / ca.repmat(ca.DM(limits.control_high), 1, steps))
     cost = weights.time_weight * steps * h + weights.effort_weight * h * effort
     if weights.clearance_weight > 0.0:
@@ -132,7 +137,7 @@ def transcribe(
 
 
 def _gaps(field: ClearanceField, vehicle: Vehicle, discs: int) -> ca.Function:
-    """``state [S] -> [D]``: how far each disc is from the nearest obstacle or bound, metres."""
+    """A function from ``state [S]`` to the distances ``[D]`` (m) of the discs to obstacles and bounds."""
     state = ca.MX.sym("state", state_size(vehicle))
     centres, radii = discs_of(vehicle, discs)(state)
     distance = field.symbolic()
@@ -141,7 +146,7 @@ def _gaps(field: ClearanceField, vehicle: Vehicle, discs: int) -> ca.Function:
 
 
 def _packed(plan: Plan) -> Floats:
-    """The unknowns ``[n]`` in the order of a trajectory: state, controls, ..., last state, h."""
+    """The unknowns ``[n]`` of a trajectory: state, controls, ..., last state, h."""
     return np.concatenate(
         (np.hstack((plan.states[:-1], plan.controls)).ravel(), plan.states[-1], [plan.dt / H_UNIT_S])
     )

@@ -1,1 +1,1 @@
-"""Routes over a map: local problems one after the other, joined where the vehicle comes to rest."""
+"""Routes over a map: local problems one after another, joined where the vehicle rests."""

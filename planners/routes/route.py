@@ -1,8 +1,8 @@
-"""A route: one feasible drive from a pose to a goal far away, made of local plans that a memory may know.
+"""A route: one feasible drive from a pose to a distant goal, made of local plans that a memory may hold.
 
-Depth first: from where the vehicle rests it turns to a local goal, the local problem there is solved, and it
-brakes where the outlook is best, which need not be at the local goal. Where a local goal leads no further
-another is tried, and then the place before.
+The search is depth first. From where it rests, the vehicle turns to a local goal, the local problem is
+solved, and the vehicle brakes where the outlook is best, which need not be at the local goal. If a local goal
+leads nowhere another is tried, and then the search goes back to the stop before.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.manoeuvres import bearing, braking, is_free_drive, rolling, turn_towards
-from planners.routes.way_ahead import LocalGoal, Place, WayAhead
+from planners.routes.path_ahead import LocalGoal, PathAhead
 from planners.solve import Attempt
-from planners.world.arrays import Floats
-from planners.world.geometry.collision import box_is_free, count_free_prefix, scene_of
+from planners.world.arrays import Floats, Point, Pose
+from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
@@ -35,32 +35,32 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
-CANONICAL_TRIED: Final = 4  # local goals at the canonical distance, from one place
-STOPS_TRIED: Final = 2  # places to brake at, of one plan
+CANONICAL_TRIED: Final = 4  # local goals at the canonical distance to try from one stop
+STOPS_TRIED: Final = 2  # points of a plan to try to stop at
 STOPS_APART_M: Final = 8.0
-PROGRESS_M: Final = 3.0  # of the way to the goal, that a leg has to bring
+PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
-ATTEMPTS_A_METRE: Final = 0.1  # ... as many more
-FACED: Final = 0.01  # radians: a final goal at the canonical distance may lie so far aside
+ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
+FACED: Final = 0.01  # radians by which a final goal at the canonical distance may lie aside
 
 Solve = Callable[[Problem], Attempt]
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """From rest to rest: turn, drive a local plan as far as it serves, brake."""
+    """A drive from rest to rest: turn, follow a local plan as far as it is of use, brake."""
 
     begin: Floats  # [S] at rest
     end: Floats  # [S] at rest
     controls: Floats  # [n, 2]
-    turning: int  # the first so many controls turn and roll
-    driving: int  # so many follow the plan; the others brake
+    turning: int  # how many controls turn and roll
+    driving: int  # how many follow the plan; the others brake
     attempt: Attempt  # how the local problem was solved
     problem: Problem  # in the canonical frame
-    goal: Place  # local or final, metres
+    goal: Point  # local or final, metres
 
     def states(self, vehicle: Vehicle) -> Floats:
-        """``[n + 1, S]``, from ``begin`` to ``end``."""
+        """Simulate the states ``[n + 1, S]`` from ``begin`` to ``end``."""
         return simulate(self.begin, self.controls, vehicle)
 
     @property
@@ -72,27 +72,27 @@ class Leg:
 class Stuck(NamedTuple):
     """Why there is no route."""
 
-    place: Place  # where; of a search the place nearest to the goal that was reached, metres
-    why: str  # a clause that goes on after "at (x, y)"
-    attempts: int  # local problems that were tried; 0: what was asked cannot be
+    place: Point  # metres; after a search the stop that was nearest to the goal
+    why: str  # a clause that follows "at (x, y)"
+    attempts: int  # local problems that were tried; 0 if there was nothing to try
 
 
 @dataclass(frozen=True, eq=False)
 class Route:
     """Legs from a start to the last of some goals."""
 
-    problem: Problem  # the whole: start, last goal, everything that is occupied
+    problem: Problem  # the whole one: start, last goal, everything that is occupied
     legs: list[Leg]
-    paths: list[Floats]  # to each goal the shortest way over the cells, [n, 2] metres
+    paths: list[Floats]  # to each goal the shortest path over the cells, [n, 2] metres
 
     def plan(self, vehicle: Vehicle) -> Plan:
-        """All legs as one plan."""
+        """Join all legs to one plan."""
         controls = np.concatenate([np.empty((0, 2)), *(leg.controls for leg in self.legs)])
         return Plan(simulate(start_state(self.problem, vehicle), controls, vehicle), controls, vehicle.dt)
 
 
 class Router:
-    """Finds routes over one map for one vehicle; all lengths are canonical metres, in grid coordinates."""
+    """Finds routes over one map for one vehicle. Lengths are canonical metres in grid coordinates."""
 
     def __init__(
         self,
@@ -102,7 +102,15 @@ class Router:
         vehicle: Vehicle = CAR,
         tolerance_m: float = 0.0,
     ) -> None:
-        """``recalled`` solves canonical problems, ``searched`` those whose goal may be nearer or aside."""
+        """Prepare the map.
+
+        Args:
+            world: the map.
+            recalled: solves canonical problems.
+            searched: solves problems whose goal may be nearer or aside.
+            vehicle: what is to be driven.
+            tolerance_m: how far the outlines of occupied regions may move.
+        """
         self._name, self._vehicle = world.name, vehicle
         self._recalled, self._searched = recalled, searched
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
@@ -116,23 +124,23 @@ class Router:
         self._attempts = self._most_attempts = 0
         self._workspace = Workspace()
 
-    def route(self, start: tuple[float, float, float], goals: list[Place]) -> Route | Stuck:
-        """A route through all ``goals``, at rest in the disc around each."""
+    def route(self, start: Pose, goals: list[Point]) -> Route | Stuck:
+        """Find a route from a pose (m, m, rad) through all ``goals``, with a stop in the disc around each."""
         whole = replace(self._whole, start=start, goal=goals[-1])
         state = start_state(whole, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             return Stuck(start[:2], "the vehicle stands in an obstacle, or out of the map", 0)
         for x, y in goals:
-            if not box_is_free(x, y, 1.0, 0.0, 0.0, 0.0, self._scene):
+            if not point_is_free(x, y, self._scene):
                 return Stuck((x, y), "the goal is occupied, or out of the map", 0)
         legs: list[Leg] = []
         paths = []
         self._attempts = 0
         for goal in goals:
-            ahead = WayAhead(self._paths, goal)
+            ahead = PathAhead(self._paths, goal)
             path = ahead.path(state)
             if path is None:
-                return Stuck(goal, "no way over the map leads to the goal", 0)
+                return Stuck(goal, "no path over the map leads to the goal", 0)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
                 return more
@@ -141,8 +149,8 @@ class Router:
             state = legs[-1].end if legs else state
         return Route(whole, legs, paths)
 
-    def _legs_to(self, ahead: WayAhead, state: Floats) -> list[Leg] | Stuck:
-        """The legs from a state to one goal, depth first."""
+    def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
+        """Search the legs from a state to one goal, depth first."""
         legs: list[Leg] = []
         options = [self._legs_from(ahead, state)]
         begun = self._attempts
@@ -165,8 +173,8 @@ class Router:
             nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
         return legs
 
-    def _legs_from(self, ahead: WayAhead, state: Floats) -> Iterator[Leg]:
-        """Legs from a state at rest, best first, each found when it is asked for."""
+    def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
+        """Yield legs from a state at rest, best first, each searched when it is needed."""
         for goal in ahead.local_goals(state, CANONICAL_TRIED):
             if self._attempts == self._most_attempts:
                 return
@@ -175,8 +183,8 @@ class Router:
                 ahead.give_up(state)
             yield from legs
 
-    def _legs_towards(self, ahead: WayAhead, state: Floats, goal: LocalGoal) -> list[Leg]:
-        """Legs by the plan for one local goal, which differ in where they brake; none without a plan."""
+    def _legs_towards(self, ahead: PathAhead, state: Floats, goal: LocalGoal) -> list[Leg]:
+        """Make legs of the plan for one local goal, with different stops; none if there is no plan."""
         turn = self._made_ready(state, goal)
         if turn is None:
             return []
@@ -197,7 +205,7 @@ class Router:
         return legs
 
     def _made_ready(self, state: Floats, goal: LocalGoal) -> Floats | None:
-        """Controls that turn to a canonical goal, and roll to the distance of the final one."""
+        """The controls that turn to a canonical goal, and roll to the distance of the final one."""
         if not goal.canonical:
             return np.empty((0, 2))
         turn = turn_towards(state, goal.place, self._vehicle, self._scene)
@@ -211,7 +219,7 @@ class Router:
     def _problem(self, state: Floats, goal: LocalGoal) -> Problem:
         """The local problem of a vehicle at rest, in the canonical frame.
 
-        Facing a local goal, it is straight ahead at the canonical distance. The final goal is where it is.
+        A canonical goal is straight ahead at the canonical distance. The final goal is where it is.
         """
         x, y, heading = state[:3].tolist()
         identity = f"{self._name}-route-{self._attempts}"
@@ -228,18 +236,18 @@ class Router:
             goal=(distance * math.cos(angle), distance * math.sin(angle)),
         )
 
-    def _stops(self, ahead: WayAhead, driven: Floats, to_go: float) -> list[tuple[int, Floats]]:
-        """The best places of a drive ``[T, S]`` to brake: after how many steps, and the controls that do it.
+    def _stops(self, ahead: PathAhead, driven: Floats, to_go: float) -> list[tuple[int, Floats]]:
+        """The best points of a drive ``[T, S]`` to stop at: after how many steps to brake, and the controls.
 
-        Best is a place in the goal disc, nearest to its middle, then the best outlook.
+        A stop in the goal disc is best, the nearer to its centre the better; then the outlook counts.
         """
         free = count_free_prefix(driven, self._vehicle, self._scene)
         braked = [(steps, braking(driven[steps], self._vehicle)) for steps in range(1, free)]
-        ways = [(steps, brake, simulate(driven[steps], brake, self._vehicle)) for steps, brake in braked]
-        free_ways = [way for way in ways if is_free_drive(way[2], self._vehicle, self._scene)]
-        if not free_ways:
+        stops = [(steps, brake, simulate(driven[steps], brake, self._vehicle)) for steps, brake in braked]
+        stops = [stop for stop in stops if is_free_drive(stop[2], self._vehicle, self._scene)]
+        if not stops:
             return []
-        rests = np.array([states[-1] for _, _, states in free_ways])
+        rests = np.array([states[-1] for _, _, states in stops])
         outlook = ahead.outlook(rests)
         further = (ahead.to_go(rests) <= to_go - PROGRESS_M) | ahead.arrived(rests)
         chosen: list[int] = []
@@ -247,4 +255,4 @@ class Router:
             apart = all(np.hypot(*(rests[i, :2] - rests[j, :2])) >= STOPS_APART_M for j in chosen)
             if further[i] and apart and len(chosen) < STOPS_TRIED and outlook[i] < math.inf:
                 chosen.append(i)
-        return [free_ways[i][:2] for i in chosen]
+        return [stops[i][:2] for i in chosen]

@@ -1,1 +1,1 @@
-"""Planners from scratch: each a plain function `(problem, settings, rng, guide, scene) -> Outcome`."""
+"""Planners from scratch: each is a plain function `(query, settings) -> Outcome`."""

@@ -1,7 +1,7 @@
-"""Keep improving a plan: search again and again for one that takes less time than the best so far.
+"""Improves a plan: searches again and again for a plan that takes less time than the best so far.
 
-Each search has a cost bound below which nothing but a better plan fits, and a random stream of its own
-(AO-x, Hauser and Zhou, T-RO 2016, with any of the planners as x).
+Each search has a bound on driving time that only a better plan keeps, and random numbers of its own (AO-x,
+Hauser and Zhou, T-RO 2016, with any of the planners as x).
 """
 
 from __future__ import annotations
@@ -21,25 +21,25 @@ from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
-FIRST_EXPANSIONS = 250  # of the first search; a few times what a planner mostly needs for a plan
-GROWTH = 1.5  # a search in vain may mean that it was too short: the next is this much longer
-LEAST_GAIN = 0.01  # share of the duration that a new plan must save
+FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner mostly needs
+GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer
+LEAST_GAIN = 0.01  # share of the driving time that a new plan must save
 
 
 class Improvement(NamedTuple):
-    """One better plan: after how much work, and how long it takes to drive."""
+    """One better plan: after how much work it came, and how long it takes to drive."""
 
-    seconds: float  # since improving began
+    seconds: float  # since the first search began
     expansions: int
     duration_s: float
 
 
 @dataclass(frozen=True, eq=False)
 class Improved:
-    """The best plan that was found, and how it came about."""
+    """The best plan, and how it came about."""
 
     plan: Plan | None
-    history: Sequence[Improvement]  # durations strictly decrease; begins with the plan that was there, if any
+    history: Sequence[Improvement]  # driving times strictly decrease; it begins with the given plan, if any
     seconds: float
     collision_checks: int
     expansions: int
@@ -49,7 +49,7 @@ class Improved:
 def improve(
     name: str,
     problem: Problem,
-    known: Plan | None = None,
+    given: Plan | None = None,
     *,
     seconds: float = math.inf,
     expansions: int | None = None,
@@ -58,19 +58,33 @@ def improve(
     vehicle: Vehicle = CAR,
     workspace: Workspace | None = None,
 ) -> Improved:
-    """Improve a ``known`` plan (or find one) with the planner called ``name`` until a limit is reached.
+    """Improve a plan, or find a first one, until a limit is reached.
 
-    A limit in ``expansions`` gives the same result for the same seed on any machine, one in ``seconds`` does
-    not. Each second search is guided along the best plan. Raises ValueError where there is no limit.
+    A limit in expansions gives the same result for the same seed on any machine; a limit in seconds does not.
+    Every second search is guided along the best plan.
+
+    Args:
+        name: of the planner that searches.
+        problem: what to solve.
+        given: a plan for the problem to begin with, if there is one.
+        seconds: when to end.
+        expansions: after how many expansions of all searches together to end.
+        seed: of all random choices.
+        scene: ``scene_of(problem)``, if the caller has it already.
+        vehicle: what is to be driven.
+        workspace: the caller's buffers; by default new ones.
+
+    Raises:
+        ValueError: There is no limit.
     """
     if not math.isfinite(seconds) and expansions is None:
-        raise ValueError("improving never ends by itself: give it seconds or expansions")
+        raise ValueError("improving a plan never ends by itself: give seconds or expansions")
     began = perf_counter()
-    ready = scene_of(problem) if scene is None else scene
-    buffers = workspace or Workspace()
+    scene = scene_of(problem) if scene is None else scene
+    workspace = workspace or Workspace()
     most = math.inf if expansions is None else expansions
-    best = known
-    history = [] if known is None else [Improvement(0.0, 0, known.duration_s)]
+    best = given
+    history = [] if given is None else [Improvement(0.0, 0, given.duration_s)]
     spent = searches = checks = nodes = 0
     budget = float(FIRST_EXPANSIONS)
     while spent < most and (left := seconds - (perf_counter() - began)) > 0.0:
@@ -81,13 +95,13 @@ def improve(
         )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
-        found = PLANNERS[name](Query(problem, rng, ready, buffers, guide, limits, vehicle))
+        outcome = PLANNERS[name](Query(problem, rng, scene, workspace, guide, limits, vehicle))
         searches += 1
-        checks += found.collision_checks
-        nodes += found.nodes
-        spent += max(found.expansions, 1)  # a blocked end costs no expansion, and must end as well
-        if found.plan is not None:
-            best = found.plan
+        checks += outcome.collision_checks
+        nodes += outcome.nodes
+        spent += max(outcome.expansions, 1)  # a search from a blocked start costs none, and must end as well
+        if outcome.plan is not None:
+            best = outcome.plan
             history.append(Improvement(perf_counter() - began, spent, best.duration_s))
         else:
             budget *= GROWTH

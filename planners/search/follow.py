@@ -1,4 +1,4 @@
-"""Follow (Plaku, Plaku and Simari, Robotica 2018): the tree follows a lead path over the roadmap closely."""
+"""Follow (Plaku, Plaku and Simari, Robotica 2018): the tree closely follows a lead path over a roadmap."""
 
 from __future__ import annotations
 
@@ -8,30 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import BitGenerator
 
+from planners.search import gust
 from planners.search.guides.sampling import in_disc, uniform
-from planners.search.gust import (
-    SAMPLE,
-    Groups,
-    GustSettings,
-    allocate_groups,
-    begin_gust,
-    choose_member,
-    grow_gust,
-    heaviest,
-    join_groups,
-    keep,
-    larger,
-)
+from planners.search.gust import GustSettings
 from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
-from planners.search.structures.roadmap import (
-    Roadmap,
-    RoadmapSettings,
-    allocate_roadmap,
-    resample_way,
-)
+from planners.search.structures.roadmap import Roadmap, RoadmapSettings, allocate_roadmap, resample_path
 from planners.search.structures.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
@@ -39,33 +23,33 @@ from planners.world.jit import lean
 from planners.world.vehicles.vehicle import Vehicle
 
 LONGEST_LEAD = 256  # waypoints
-# places in Lead.marks
+# indices into Lead.marks
 LENGTH, SINCE_FOLLOW, SINCE_GROUP = range(3)
 
 
 class FollowSettings(NamedTuple):
-    """docs/planners.md, Follow; edges of the roadmap cost length / clearance.
+    """Defaults of docs/planners.md, Follow. An edge of the roadmap costs length / clearance.
 
-    Distances, patience and penalty are published for a car of 2.25 m/s (3 m, 2 m, 150, 100, 0.95); at 4 m/s
-    these take half the time.
+    Distances, patience and penalty are published for a car of 2.25 m/s (3 m, 2 m, 150, 100, 0.95). At 4 m/s
+    the values here take half the time.
     """
 
     gust: GustSettings = GustSettings(
         roadmap=RoadmapSettings(batch=60, neighbours=12, clearance_exponent=1.0)
     )
     spacing_m: float = 5.0  # R: between waypoints, and the radius of the tube around the lead
-    passing_m: float = 5.0  # a waypoint is passed within this distance
-    near_radius_m: float = 2.0  # targets: around the next waypoint, one radius or the other
-    far_radius_m: float = 3.0
-    progress_base: float = 4.0  # a group's weight is this to the power of its waypoint
+    passing_m: float = 5.0  # within this distance a waypoint counts as passed
+    near_radius_m: float = 2.0  # targets lie around the next waypoint, within this radius ...
+    far_radius_m: float = 3.0  # ... or, as often, within this one
+    progress_base: float = 4.0  # the weight of a group is this to the power of its waypoint
     selection_penalty: float = 0.9
-    patience: int = 100  # iterations without a new follow group before a new lead may be drawn
-    group_patience: int = 100  # iterations without a new GUST group before exploring ...
-    explorations: int = 20  # ... for this many
+    patience: int = 100  # iterations without a new follow group, after which a new lead may be drawn
+    group_patience: int = 100  # iterations without a new GUST group, after which GUST explores ...
+    explorations: int = 20  # ... for so many expansions
 
 
 class Lead(NamedTuple):
-    """The path that is followed and the groups of vertices by next waypoint."""
+    """The path that is followed, and the groups of vertices by their next waypoint."""
 
     points: Floats  # [LONGEST_LEAD, 2] metres
     weights: Floats  # [LONGEST_LEAD] logarithms
@@ -80,7 +64,7 @@ def allocate_lead() -> Lead:
         np.empty((LONGEST_LEAD, 2)),
         np.empty(LONGEST_LEAD),
         np.empty(LONGEST_LEAD, np.int64),
-        np.empty((LONGEST_LEAD, SAMPLE), np.int64),
+        np.empty((LONGEST_LEAD, gust.SAMPLE), np.int64),
         np.zeros(3, np.int64),
     )
 
@@ -91,7 +75,7 @@ def _join_lead(tree: Tree, vertex: int, lead: Lead, progress_base: float, rng: B
     if lead.counts[waypoint] == 0:
         lead.weights[waypoint] = waypoint * math.log(progress_base)
         lead.marks[SINCE_FOLLOW] = 0
-    keep(lead.members[waypoint], lead.counts[waypoint], vertex, rng)
+    gust.keep(lead.members[waypoint], lead.counts[waypoint], vertex, rng)
     lead.counts[waypoint] += 1
 
 
@@ -100,15 +84,15 @@ def _new_lead(
     tree: Tree,
     node: int,
     roadmap: Roadmap,
-    groups: Groups,
+    groups: gust.Groups,
     lead: Lead,
     settings: FollowSettings,
     rng: BitGenerator,
 ) -> None:
-    """Follow the way of ``node``'s group from now on; its vertices are where to begin."""
-    lead.marks[LENGTH] = resample_way(roadmap, node, settings.spacing_m, lead.points)
+    """Follow the roadmap's path from ``node`` from now on, beginning with the vertices of its group."""
+    lead.marks[LENGTH] = resample_path(roadmap, node, settings.spacing_m, lead.points)
     lead.counts.fill(0)
-    for k in range(min(groups.counts[node], SAMPLE)):
+    for k in range(min(groups.counts[node], gust.SAMPLE)):
         vertex = groups.members[node, k]
         tree.waypoints[vertex] = 0
         _join_lead(tree, vertex, lead, settings.progress_base, rng)
@@ -121,7 +105,7 @@ def _grow(
     goal: Floats,
     until: int,
     roadmap: Roadmap,
-    groups: Groups,
+    groups: gust.Groups,
     lead: Lead,
     settings: FollowSettings,
     exploring: GustSettings,
@@ -131,20 +115,20 @@ def _grow(
 ) -> None:
     counts = tree.counts
     marks = lead.marks
-    gust = settings.gust
+    base = settings.gust
     while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
-        known = groups.size[0]
+        groups_before = groups.size[0]
         if marks[SINCE_GROUP] >= settings.group_patience:
             last = min(counts[EXPANSIONS] + settings.explorations, until)
-            grow_gust(tree, goal, last, roadmap, groups, exploring, vehicle, scene, rng)
+            gust.grow_gust(tree, goal, last, roadmap, groups, exploring, vehicle, scene, rng)
             if counts[GOAL_VERTEX] >= 0:
                 return
             marks[SINCE_GROUP] = 0
             continue
         stuck = marks[SINCE_FOLLOW]
         if stuck > settings.patience and uniform(rng) < 0.5 * 2.0 ** (stuck / settings.patience - 1.0):
-            node = heaviest(groups)
-            groups.weights[node] += math.log(gust.selection_penalty)
+            node = gust.heaviest(groups)
+            groups.weights[node] += math.log(base.selection_penalty)
             _new_lead(tree, node, roadmap, groups, lead, settings, rng)
         waypoint = 0
         best = -math.inf
@@ -155,7 +139,7 @@ def _grow(
         lead.weights[waypoint] += math.log(settings.selection_penalty)
         radius = settings.near_radius_m if uniform(rng) < 0.5 else settings.far_radius_m
         x, y = in_disc(lead.points[waypoint, 0], lead.points[waypoint, 1], radius, rng)
-        vertex = choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, vehicle, rng)
+        vertex = gust.choose_member(tree, lead.members[waypoint], lead.counts[waypoint], x, y, vehicle, rng)
         first = counts[SIZE]
         marks[SINCE_FOLLOW] += 1
         marks[SINCE_GROUP] += 1
@@ -168,7 +152,7 @@ def _grow(
             lead.points[: marks[LENGTH]],
             settings.spacing_m,
             settings.passing_m,
-            gust.extension,
+            base.extension,
             vehicle,
             scene,
             rng,
@@ -177,8 +161,8 @@ def _grow(
             return
         for new in range(first, first + added):
             _join_lead(tree, new, lead, settings.progress_base, rng)
-        join_groups(tree, first, added, roadmap, groups, gust.distance_exponent, rng)
-        if groups.size[0] > known:
+        gust.join_groups(tree, first, added, roadmap, groups, base.distance_exponent, rng)
+        if groups.size[0] > groups_before:
             marks[SINCE_GROUP] = 0
 
 
@@ -187,30 +171,30 @@ def _begin(
     tree: Tree,
     goal: Floats,
     roadmap: Roadmap,
-    groups: Groups,
+    groups: gust.Groups,
     lead: Lead,
     settings: FollowSettings,
     vehicle: Vehicle,
     scene: Scene,
     rng: BitGenerator,
 ) -> None:
-    """As GUST begins, and a first lead."""
-    begin_gust(tree, goal, roadmap, groups, settings.gust, vehicle, scene, rng)
+    """Begin as GUST does, and choose a first lead."""
+    gust.begin_gust(tree, goal, roadmap, groups, settings.gust, vehicle, scene, rng)
     lead.marks.fill(0)
-    _new_lead(tree, heaviest(groups), roadmap, groups, lead, settings, rng)
+    _new_lead(tree, gust.heaviest(groups), roadmap, groups, lead, settings, rng)
 
 
 def follow(query: Query, settings: FollowSettings) -> Outcome:
     """Plan from the problem's start to its goal disc; with a guide, along it first."""
     on_roadmap = settings.gust.roadmap
     roadmap = query.workspace.buffers(allocate_roadmap, on_roadmap.most_nodes, on_roadmap.neighbours)
-    groups = query.workspace.buffers(allocate_groups, on_roadmap.most_nodes)
+    groups = query.workspace.buffers(gust.allocate_groups, on_roadmap.most_nodes)
     lead = query.workspace.buffers(allocate_lead)
     vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
     exploring = settings.gust._replace(guide_probability=0.0)
 
     def prepare(tree: Tree, goal: Floats, trial: int) -> None:
-        begun = settings._replace(gust=larger(settings.gust, trial))
+        begun = settings._replace(gust=gust.larger(settings.gust, trial))
         _begin(tree, goal, roadmap, groups, lead, begun, vehicle, scene, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:

@@ -1,4 +1,4 @@
-"""GUST (Plaku, T-RO 2015): a roadmap groups the tree's vertices and says which group is worth extending."""
+"""GUST (Plaku, T-RO 2015): a roadmap groups the tree's vertices and tells which group to extend."""
 
 from __future__ import annotations
 
@@ -13,26 +13,15 @@ from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
+from planners.search.structures import tree as trees
 from planners.search.structures.neighbours import nearest_for
-from planners.search.structures.roadmap import (
-    CHECKS as ROADMAP_CHECKS,
-)
+from planners.search.structures.roadmap import CHECKS as ROADMAP_CHECKS
 from planners.search.structures.roadmap import (
     Roadmap,
     RoadmapSettings,
     allocate_roadmap,
     build_roadmap,
-    resample_way,
-)
-from planners.search.structures.tree import (
-    CHECKS,
-    EXPANSIONS,
-    EXTENSION,
-    GOAL_VERTEX,
-    SIZE,
-    Extension,
-    Tree,
-    extend,
+    resample_path,
 )
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
@@ -40,32 +29,32 @@ from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
 from planners.world.vehicles.vehicle import Vehicle
 
-SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all it ever had
+SAMPLE = 32  # vertices of a group that may be chosen: a uniform sample of all that it ever had
 
 
 class GustSettings(NamedTuple):
     """Defaults of docs/planners.md, GUST."""
 
     roadmap: RoadmapSettings = RoadmapSettings()
-    distance_exponent: float = 8.0  # delta: how much nearer groups are preferred
+    distance_exponent: float = 8.0  # delta: how strongly groups near the goal are preferred
     selection_penalty: float = 0.9  # alpha
-    guide_probability: float = 0.9  # else the target is uniform
+    guide_probability: float = 0.9  # that a target lies on the path ahead; else it is uniform
     guide_spacing_m: float = 5.0
-    guide_steps: int = 6  # U{1 .. this} points ahead
+    guide_steps: int = 6  # a target is U{1 .. this} points ahead
     guide_radius_m: float = 2.0
-    restart_after: int = 500  # expansions; each second trial is RRT's
-    extension: Extension = EXTENSION
+    restart_after: int = 500  # expansions; every second trial is grown by RRT
+    extension: trees.Extension = trees.EXTENSION
 
 
 class Groups(NamedTuple):
-    """Groups of tree vertices by nearest roadmap node; weights are logarithms, so none underflows."""
+    """The tree's vertices grouped by their nearest roadmap node. Weights are logarithms: none underflows."""
 
-    weights: Floats  # [C] log weight by node
+    weights: Floats  # [C] logarithm of the weight of each node's group
     counts: Indices  # [C] vertices ever put into each group
     members: Indices  # [C, SAMPLE] a uniform sample of them
     active: Indices  # [C] nodes that have a group, in the order in which they got it
     size: Indices  # [1] how many those are
-    way: Floats  # [8, 2] points ahead of a group, metres
+    ahead: Floats  # [8, 2] scratch: points on the path ahead of a group, metres
 
 
 def allocate_groups(capacity: int) -> Groups:
@@ -89,17 +78,17 @@ def clear_groups(groups: Groups) -> None:
 
 @inlined
 def keep(members: Indices, count: int, vertex: int, rng: BitGenerator) -> None:
-    """Keep a uniform sample of all vertices ever put, ``count`` of them before this one (algorithm R)."""
-    place = count
+    """Keep a uniform sample of all vertices so far: ``count``, and this one (algorithm R)."""
+    index = count
     if count >= members.shape[0]:
-        place = int(uniform(rng) * (count + 1))
-    if place < members.shape[0]:
-        members[place] = vertex
+        index = int(uniform(rng) * (count + 1))
+    if index < members.shape[0]:
+        members[index] = vertex
 
 
 @lean
 def join_groups(
-    tree: Tree,
+    tree: trees.Tree,
     first: int,
     count: int,
     roadmap: Roadmap,
@@ -107,9 +96,9 @@ def join_groups(
     distance_exponent: float,
     rng: BitGenerator,
 ) -> None:
-    """Put vertices ``first ..`` into the groups of their nearest roadmap nodes."""
+    """Put ``count`` vertices from ``first`` on into the groups of their nearest roadmap nodes."""
     node = -1
-    far_m = 0.0  # how far from (here_x, here_y) the node is the nearest for certain
+    far_m = 0.0  # up to here from (here_x, here_y) the node is certainly the nearest
     here_x = 0.0
     here_y = 0.0
     for vertex in range(first, first + count):
@@ -139,22 +128,16 @@ def heaviest(groups: Groups) -> int:
 
 @lean
 def choose_member(
-    tree: Tree,
-    members: Indices,
-    count: int,
-    x: float,
-    y: float,
-    vehicle: Vehicle,
-    rng: BitGenerator,
+    tree: trees.Tree, members: Indices, count: int, x: float, y: float, vehicle: Vehicle, rng: BitGenerator
 ) -> int:
-    """A vertex, the likelier the sooner it was reached and the sooner it could reach (x, y).
+    """Choose a vertex, preferably one that was reached soon and can reach (x, y) soon.
 
-    Probability in proportion to 1 / (time from the root + distance / max(0.01 v_max, v)).
+    Its probability is proportional to 1 / (time from the root + distance / max(0.01 v_max, v)).
     """
-    looked_at = min(count, members.shape[0])
+    candidates = min(count, members.shape[0])
     total = 0.0
     chosen = members[0]
-    for k in range(looked_at):
+    for k in range(candidates):
         vertex = members[k]
         if tree.spent[vertex]:
             continue
@@ -162,14 +145,14 @@ def choose_member(
         speed = max(0.01 * vehicle.max_speed, tree.states[vertex, 3])
         weight = 1.0 / (tree.depths[vertex] * vehicle.dt + distance / speed + 1e-9)
         total += weight
-        if uniform(rng) * total < weight:  # each stays with its share, without a second pass
+        if uniform(rng) * total < weight:  # so each is kept in proportion to its weight, in one pass
             chosen = vertex
     return int(chosen)
 
 
 @lean
 def grow_gust(
-    tree: Tree,
+    tree: trees.Tree,
     goal: Floats,
     until: int,
     roadmap: Roadmap,
@@ -180,29 +163,31 @@ def grow_gust(
     rng: BitGenerator,
 ) -> None:
     """Extend the heaviest group until solved or ``until`` expansions."""
-    no_lead = groups.way[:0]
+    no_lead = groups.ahead[:0]
     counts = tree.counts
-    while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
+    while counts[trees.EXPANSIONS] < until and counts[trees.SIZE] < tree.states.shape[0]:
         node = heaviest(groups)
         groups.weights[node] += math.log(settings.selection_penalty)
         if uniform(rng) < settings.guide_probability:
             ahead = 1 + int(uniform(rng) * settings.guide_steps)
-            filled = resample_way(roadmap, node, settings.guide_spacing_m, groups.way[: ahead + 2])
-            point = groups.way[min(ahead, filled - 1)]
+            filled = resample_path(roadmap, node, settings.guide_spacing_m, groups.ahead[: ahead + 2])
+            point = groups.ahead[min(ahead, filled - 1)]
             x, y = in_disc(point[0], point[1], settings.guide_radius_m, rng)
         else:
             x, y = in_bounds(scene.bounds, rng)
         vertex = choose_member(tree, groups.members[node], groups.counts[node], x, y, vehicle, rng)
-        first = counts[SIZE]
-        added = extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
-        if counts[GOAL_VERTEX] >= 0:
+        first = counts[trees.SIZE]
+        added = trees.extend(
+            tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng
+        )
+        if counts[trees.GOAL_VERTEX] >= 0:
             return
         join_groups(tree, first, added, roadmap, groups, settings.distance_exponent, rng)
 
 
 @lean
 def begin_gust(
-    tree: Tree,
+    tree: trees.Tree,
     goal: Floats,
     roadmap: Roadmap,
     groups: Groups,
@@ -211,15 +196,15 @@ def begin_gust(
     scene: Scene,
     rng: BitGenerator,
 ) -> None:
-    """Build the roadmap and put the vertices that are there into their groups."""
+    """Build the roadmap and group the vertices that the tree has already."""
     build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, scene, rng)
-    tree.counts[CHECKS] += roadmap.counts[ROADMAP_CHECKS]
+    tree.counts[trees.CHECKS] += roadmap.counts[ROADMAP_CHECKS]
     clear_groups(groups)
-    join_groups(tree, 0, tree.counts[SIZE], roadmap, groups, settings.distance_exponent, rng)
+    join_groups(tree, 0, tree.counts[trees.SIZE], roadmap, groups, settings.distance_exponent, rng)
 
 
 def larger(settings: GustSettings, trial: int) -> GustSettings:
-    """Settings with a roadmap that doubles with each ``trial``: the last one did not show the way."""
+    """Double the roadmap with each ``trial``, because the last one did not lead to the goal."""
     roadmap = settings.roadmap
     batch = min(roadmap.batch * 2**trial, roadmap.most_nodes)
     return settings._replace(roadmap=roadmap._replace(batch=batch)) if trial else settings
@@ -232,10 +217,10 @@ def gust(query: Query, settings: GustSettings) -> Outcome:
     groups = query.workspace.buffers(allocate_groups, settings.roadmap.most_nodes)
     vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
 
-    def prepare(tree: Tree, goal: Floats, trial: int) -> None:
+    def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
         begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, scene, rng)
 
-    def grow(tree: Tree, goal: Floats, until: int) -> None:
+    def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, scene, rng)
 
     explore, along = towards_anywhere(query), along_guide(query)

@@ -37,17 +37,7 @@ def plan(
 ) -> Outcome:
     """Solve a problem with one of the ``PLANNERS`` and its default settings.
 
-    Args:
-        name: of the planner.
-        problem: what to solve.
-        rng: the source of all random choices.
-        guide: paths that the search is to look along first.
-        scene: ``scene_of(problem)``, if the caller has it already.
-        limits: when to give up; by default those of ``Limits``.
-        vehicle: what is to be driven.
-        prefix: a free drive from the problem's start, from which the search goes on.
-        workspace: the caller's buffers; by default new ones.
-
+    The arguments are the fields of ``Query``. Scene, limits and workspace are made if they are not given.
     """
     ready = scene_of(problem) if scene is None else scene
     query = Query(problem, rng, ready, workspace or Workspace(), guide, limits or Limits(), vehicle, prefix)

@@ -1,8 +1,8 @@
-"""Repair of a plan that is blocked in places (paper, III-D): only these are planned anew.
+"""Repairs a plan that is blocked in places: only these places are planned anew (paper, III-D).
 
-What is free before the first collision stays as it is and becomes the tree's first branch; the planner
-searches from there to a place where the plan is free again; a tracking controller follows the plan from
-there, every state simulated and checked. Where that meets the next collision, the same begins again.
+What is free before the first collision stays as it is and becomes the first branch of a tree. The planner
+searches from there to a point where the plan is free again. A tracking controller follows the plan from that
+point on, with every state simulated and checked. At the next collision the same begins again.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
-TOO_LATE_STEPS = 10  # before a collision: a second, too late to turn away
-LONGEST = 4096  # states of a repaired plan: a stored one has some 250
+TOO_LATE_STEPS = 10  # before a collision: a second, in which it is too late to turn away
+LONGEST = 4096  # states of a repaired plan; a stored plan has some 250
 
 
 @dataclass(frozen=True)
 class RepairSettings:
-    """How much a repair may cost before it is given up, and where the plan is joined again."""
+    """How much a repair may cost before it is given up, and where it joins the plan again."""
 
-    expansions: int = 150  # of each local search; from scratch a planner needs some hundreds
+    expansions: int = 150  # of each local search; from scratch a planner needs several hundred
     rounds: int = 4  # local searches
     rejoin_radius_m: float = 2.0
-    rejoin_beyond_m: float = 5.0  # from the end of what is free before; twice as far after each failure
-    free_steps: int = 5  # for which the plan must be free where it is joined
+    rejoin_beyond_m: float = 5.0  # from the end of the free part; twice as far after each failure
+    free_steps: int = 5  # steps for which the plan must be free where it is joined
     tracking: Tracking = TRACKING
 
 
@@ -53,38 +53,38 @@ def _fill_blocked(states: Floats, vehicle: Vehicle, scene: Scene, blocked: Flags
 
 
 def blocked_states(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[Flags, int]:
-    """Which of a plan's states are not free, ``[T]``, and how many were checked."""
+    """Return which of a plan's states are not free ``[T]``, and how many were checked."""
     blocked = np.empty(len(stored.states), np.bool_)
     _fill_blocked(np.ascontiguousarray(stored.states), vehicle, scene, blocked)
     return blocked, len(blocked)
 
 
 def free_prefix(stored: Plan, blocked: Flags) -> Plan | None:
-    """The plan until shortly before its first blocked state; None where that is the very first."""
+    """Return the plan until shortly before its first blocked state; None if that is the very first."""
     free = int(blocked.argmax()) if blocked.any() else len(blocked)
     return shortened(stored, free) if free else None
 
 
 def shortened(drive: Plan, free: int) -> Plan:
-    """The first ``free`` states of a drive but ``TOO_LATE_STEPS``."""
+    """Return the first ``free`` states of a drive, less ``TOO_LATE_STEPS``."""
     kept = max(free - TOO_LATE_STEPS, 1)
     return Plan(drive.states[:kept], drive.controls[: kept - 1], drive.dt)
 
 
 @lean
 def rejoin_at(
-    way: Floats, blocked: Flags, after: int, x: float, y: float, beyond_m: float, steps: int
+    states: Floats, blocked: Flags, after: int, x: float, y: float, beyond_m: float, steps: int
 ) -> int:
-    """The first state from ``after`` on that is ``beyond_m`` away from (x, y) and begins ``steps`` free ones.
+    """The first of ``states [T, S]`` from ``after`` on that begins ``steps`` free ones far from (x, y).
 
-    The last state of ``way [T, S]`` where there is none.
+    It is at least ``beyond_m`` metres away, or the last state if there is none.
     """
-    last = way.shape[0] - 1
+    last = states.shape[0] - 1
     free = 0
     for i in range(after, last):
         free = 0 if blocked[i] else free + 1
         begin = i - steps + 1
-        if free >= steps and length(way[begin, 0] - x, way[begin, 1] - y) >= beyond_m:
+        if free >= steps and length(states[begin, 0] - x, states[begin, 1] - y) >= beyond_m:
             return begin
     return last
 
@@ -109,39 +109,41 @@ def repair(
 
     Returns:
         The repaired plan with status ``SOLVED``, or no plan with ``BUDGET_SPENT``.
-
     """
     began = perf_counter()
     problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
-    way = np.ascontiguousarray(stored.states)
+    reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
     goal = np.array([*problem.goal, problem.goal_radius])
     drive = free_prefix(stored, blocked)
-    at = 0 if drive is None else len(drive.states)  # of the way: where to look for the next free place
+    at = 0 if drive is None else len(drive.states)  # the reference state from which to look for a free part
     beyond_m = settings.rejoin_beyond_m
     searches: list[Outcome] = []
     tracked = 0
     solved = False
     while drive is not None and not solved and len(searches) < settings.rounds:
         x, y = drive.states[-1, :2].tolist()
-        at = int(rejoin_at(way, blocked, min(at, len(way) - 1), x, y, beyond_m, settings.free_steps))
-        to_goal = at == len(way) - 1
-        disc = goal if to_goal else np.array([way[at, 0], way[at, 1], settings.rejoin_radius_m])
+        after = min(at, len(reference) - 1)
+        at = int(rejoin_at(reference, blocked, after, x, y, beyond_m, settings.free_steps))
+        to_goal = at == len(reference) - 1
+        disc = goal if to_goal else np.array([*reference[at, :2], settings.rejoin_radius_m])
         target = (float(disc[0]), float(disc[1]))
         around = grid_path(occupied, (x, y), target, float(disc[2]), workspace)
         guide = guidance([drive.states] if around is None else [around, drive.states])
         local = replace(problem, goal=target, goal_radius=float(disc[2]))
         limits = Limits(expansions=settings.expansions)
-        found = PLANNERS[name](replace(query, problem=local, guide=guide, limits=limits, prefix=drive))
-        searches.append(found)
-        if found.plan is None:
+        outcome = PLANNERS[name](replace(query, problem=local, guide=guide, limits=limits, prefix=drive))
+        searches.append(outcome)
+        if outcome.plan is None:
             beyond_m *= 2.0
             continue
-        drive, solved = found.plan, to_goal
+        drive, solved = outcome.plan, to_goal
         if not solved:
             last = len(drive.states) - 1
             states[: last + 1], controls[:last] = drive.states, drive.controls
-            ended, end, at = track(states, controls, last, way, at, goal, settings.tracking, vehicle, scene)
+            ended, end, at = track(
+                *(states, controls, last, reference, at, goal, settings.tracking, vehicle, scene)
+            )
             tracked += end - last
             solved = ended == ARRIVED
             drive = Plan(states[: end + 1].copy(), controls[:end].copy(), vehicle.dt)

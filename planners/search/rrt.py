@@ -1,4 +1,4 @@
-"""Kinodynamic RRT (LaValle and Kuffner 2001): the vertex nearest to a random target is extended to it."""
+"""Kinodynamic RRT (LaValle and Kuffner 2001) extends the vertex nearest to a random target towards it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,8 @@ from planners.search.guides.sampling import guided
 from planners.search.outcome import Outcome
 from planners.search.query import NO_GUIDE, Guide, Query
 from planners.search.search_loop import Grow, attempt
+from planners.search.structures import tree as trees
 from planners.search.structures.neighbours import nearest
-from planners.search.structures.tree import (
-    EXPANSIONS,
-    EXTENSION,
-    GOAL_VERTEX,
-    NO_LEAD,
-    SIZE,
-    Extension,
-    Tree,
-    extend,
-)
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
@@ -28,13 +19,13 @@ from planners.world.vehicles.vehicle import Vehicle
 
 
 class RrtSettings(NamedTuple):
-    """docs/planners.md; without a guide the goal is drawn with ``NO_GUIDE.goal_probability``."""
+    """Defaults of docs/planners.md. Without a guide the goal is drawn with ``NO_GUIDE.goal_probability``."""
 
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0
-    guide_lead: int = 16  # points of the guide, a metre apart: how far ahead the target lies
+    guide_lead: int = 16  # points, a metre apart, that a target lies ahead on the guide at most
     restart_after: int = 1000  # expansions
-    extension: Extension = EXTENSION
+    extension: trees.Extension = trees.EXTENSION
 
 
 RRT = RrtSettings()
@@ -42,7 +33,7 @@ RRT = RrtSettings()
 
 @lean
 def grow_rrt(
-    tree: Tree,
+    tree: trees.Tree,
     goal: Floats,
     until: int,
     guide: Guide,
@@ -52,15 +43,15 @@ def grow_rrt(
     scene: Scene,
     rng: BitGenerator,
 ) -> None:
-    """Extend along the guide, or towards anywhere, until solved or ``until`` expansions."""
+    """Extend along the guide, or towards anywhere, until it is solved or there are ``until`` expansions."""
     counts = tree.counts
-    while counts[EXPANSIONS] < until and counts[SIZE] < tree.states.shape[0]:
+    while counts[trees.EXPANSIONS] < until and counts[trees.SIZE] < tree.states.shape[0]:
         from_x, from_y, x, y = guided(
             guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, settings.guide_lead, rng
         )
-        vertex = max(nearest(tree.buckets, from_x, from_y), 0)  # the root, where all others are dead ends
-        extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
-        if counts[GOAL_VERTEX] >= 0:
+        vertex = max(nearest(tree.buckets, from_x, from_y), 0)  # the root if all others are dead ends
+        trees.extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
+        if counts[trees.GOAL_VERTEX] >= 0:
             return
 
 
@@ -68,7 +59,7 @@ def towards_anywhere(query: Query, guide: Guide = NO_GUIDE, settings: RrtSetting
     """How RRT grows a tree: along a guide, or towards anywhere. Other planners use it for a while, too."""
     bits = query.rng.bit_generator
     return lambda tree, goal, until: grow_rrt(
-        tree, goal, until, guide, NO_LEAD, settings, query.vehicle, query.scene, bits
+        tree, goal, until, guide, trees.NO_LEAD, settings, query.vehicle, query.scene, bits
     )
 
 

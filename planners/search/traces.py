@@ -19,7 +19,7 @@ from planners.world.workspace import Workspace
 class Trace(NamedTuple):
     """A tree of states."""
 
-    places: Floats  # [n, 2] metres
+    positions: Floats  # [n, 2] metres
     parents: Indices  # [n] -1: the root
 
 
@@ -27,12 +27,12 @@ class Roads(NamedTuple):
     """A roadmap."""
 
     nodes: Floats  # [n, 2] metres
-    free: Indices  # [e, 2] ends of strips that were found free
-    unknown: Indices  # [u, 2] of strips that no search wanted to use
+    free: Indices  # [e, 2] ends of the strips that are known to be free
+    unknown: Indices  # [u, 2] ends of the strips that were never checked
 
 
 def last_tree(workspace: Workspace, limits: Limits, vehicle: Vehicle) -> Trace:
-    """The tree of the last search with a workspace, these limits and this vehicle.
+    """Copy the tree of the last search in a workspace with these limits and this vehicle.
 
     After restarts it is the tree of the last trial.
     """
@@ -44,7 +44,7 @@ def last_tree(workspace: Workspace, limits: Limits, vehicle: Vehicle) -> Trace:
 
 
 def last_roadmap(workspace: Workspace, planner: str) -> Roads | None:
-    """The roadmap of the last search with a workspace by a planner; None for a planner without roadmaps."""
+    """Copy the roadmap of the last search in a workspace by a planner; None if it makes no roadmaps."""
     settings = {"gust": GustSettings().roadmap, "follow": FollowSettings().gust.roadmap}.get(planner)
     if settings is None:
         return None

@@ -1,4 +1,4 @@
-"""A tracking controller: drive on along a plan from a state that is not quite on it."""
+"""A tracking controller: drives along a plan from a state that is not quite on it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ ARRIVED, BLOCKED, LOST = range(3)
 
 
 class Tracking(NamedTuple):
-    """Pure pursuit: steer towards a point ahead on the plan, at the plan's speed there."""
+    """Pure pursuit: steer towards a point ahead on the plan, at the speed that the plan has there."""
 
-    ahead_m: float = 2.0  # the point looked at is the first farther away than this ...
-    ahead_s: float = 0.3  # ... plus the way driven in this time
-    lost_m: float = 4.0  # farther from the plan than this, it is not followed any more
-    slowest_share: float = 0.25  # of the maximal speed: where a plan stands still, it is driven on
+    ahead_m: float = 2.0  # the point ahead is the first that is farther away than this ...
+    ahead_s: float = 0.3  # ... plus the distance driven in this time
+    lost_m: float = 4.0  # farther from the plan than this the plan is lost
+    slowest_share: float = 0.25  # of the maximal speed, so that the drive goes on where the plan stands still
     gains: Gains = Gains()
 
 
@@ -33,33 +33,36 @@ def track(
     states: Floats,
     controls: Floats,
     first: int,
-    way: Floats,
+    reference: Floats,
     beginning: int,
     goal: Floats,
     settings: Tracking,
     vehicle: Vehicle,
     scene: Scene,
 ) -> tuple[int, int, int]:
-    """Follow ``way [T, S]`` from its state ``beginning`` on, starting in ``states[first]``.
+    """Follow a plan's states ``reference [T, S]`` from number ``beginning`` on, from ``states[first]``.
 
-    Fills ``states [C, S]`` and ``controls [C, 2]`` (from each state to the next) behind ``first``, every
-    state checked; ``goal [3]`` is x, y, radius in metres. Returns how it ended, the last state that was
-    filled, and the state of ``way`` that was looked at then.
+    It fills in ``states [C, S]`` and ``controls [C, 2]`` (from each state to the next) behind ``first`` and
+    checks every state. ``goal [3]`` is x, y and radius in metres. Returns ``ARRIVED``, ``BLOCKED`` or
+    ``LOST``, the last state that was filled in, and the reference state that was steered to last.
     """
     state = load(states, first, vehicle)
     errors = NO_ERRORS
     at = beginning
     filled = first
-    most = min(states.shape[0] - 1, first + 2 * (way.shape[0] - beginning) + 50)
+    most = min(states.shape[0] - 1, first + 2 * (reference.shape[0] - beginning) + 50)
     while filled < most:
         ahead = settings.ahead_m + settings.ahead_s * abs(state[3])
-        while at < way.shape[0] - 1 and length(way[at, 0] - state[0], way[at, 1] - state[1]) < ahead:
+        while (
+            at < reference.shape[0] - 1
+            and length(reference[at, 0] - state[0], reference[at, 1] - state[1]) < ahead
+        ):
             at += 1
-        if length(way[at, 0] - state[0], way[at, 1] - state[1]) > ahead + settings.lost_m:
+        if length(reference[at, 0] - state[0], reference[at, 1] - state[1]) > ahead + settings.lost_m:
             return LOST, filled, at
-        speed = max(way[at, 3], settings.slowest_share * vehicle.max_speed)
+        speed = max(reference[at, 3], settings.slowest_share * vehicle.max_speed)
         control_1, control_2, errors = steer(
-            state, way[at, 0], way[at, 1], speed, errors, filled == first, settings.gains, vehicle
+            state, reference[at, 0], reference[at, 1], speed, errors, filled == first, settings.gains, vehicle
         )
         driven_1, driven_2 = admissible(state, control_1, control_2, vehicle)
         state = step(state, driven_1, driven_2, vehicle)

@@ -1,4 +1,4 @@
-"""Any problem brought to the canonical frame by a rotation and a translation, and plans brought back."""
+"""Moves problems into the canonical frame by a rotation and a translation, and plans back out of it."""
 
 from __future__ import annotations
 
@@ -9,26 +9,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Point
 from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Plan, Problem, obstacles_of
 
-SAME_ANGLE = 1e-9  # radians: less turn than this moves nothing by as much as a float32's last digit
-SLIVER = 1e-4  # metres: thinner than this a triangle is left out, float32 would turn it inside out
+SAME_ANGLE = 1e-9  # radians: a smaller turn moves nothing by as much as the last digit of a float32
+SLIVER = 1e-4  # metres: thinner triangles are left out, since float32 would turn them inside out
 
 
 class Alignment(NamedTuple):
-    """The motion from a problem's own frame to the canonical one: a turn around ``origin``, moved to 0."""
+    """The motion from a problem's own frame to the canonical one: turn about ``origin``, move it to 0."""
 
-    origin: tuple[float, float]  # metres, own frame: where the canonical start is
+    origin: Point  # metres, own frame: the canonical start
     turn: float  # radians
 
 
 def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
-    """The same problem with its start at (0, 0) and its goal on the diagonal, and the motion that does it.
+    """Move a problem so that its start is at (0, 0) and its goal on the diagonal.
 
-    Bounds that come to lie askew get a box around them, and what it holds besides them becomes obstacles.
-    ValueError where start and goal are not
-    50 sqrt(2) m apart within the goal radius. Obstacles are rounded to float32, as everywhere.
+    If the turned bounds lie askew, the new bounds are the box around them, and the rest of the box becomes
+    obstacles. Obstacles are rounded to float32, as everywhere.
+
+    Args:
+        problem: in any frame.
+
+    Returns:
+        The problem in the canonical frame, and the motion that brought it there.
+
+    Raises:
+        ValueError: Start and goal are not 50 sqrt(2) m apart, within the goal radius.
     """
     (x, y, heading), goal = problem.start, problem.goal
     distance = math.dist((x, y), goal)
@@ -60,7 +68,7 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
 
 
 def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
-    """The plan in the frame that its problem came in; controls know no frame."""
+    """Move a plan back into the frame of its problem. Controls are the same in every frame."""
     cos, sin = math.cos(-alignment.turn), math.sin(-alignment.turn)
     states = plan.states.copy()
     states[:, 0] = alignment.origin[0] + cos * plan.states[:, 0] - sin * plan.states[:, 1]
@@ -70,7 +78,7 @@ def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
 
 
 def scaled(plan: Plan, scale: float) -> Plan:
-    """A plan with its lengths multiplied; a vehicle as much larger drives it in the same time."""
+    """Multiply a plan's lengths by ``scale``: a vehicle that is as much larger drives it in the same time."""
     if scale == 1.0:
         return plan
     states, controls = plan.states.copy(), plan.controls.copy()
@@ -80,26 +88,26 @@ def scaled(plan: Plan, scale: float) -> Plan:
 
 
 def _turned(points: Floats, alignment: Alignment) -> Floats:
-    """Points ``[n, 2]`` of the own frame in the canonical one."""
+    """Turn points ``[n, 2]`` (metres) of the problem's own frame into the canonical frame."""
     cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
     turned: Floats = (points - alignment.origin) @ np.array([[cos, sin], [-sin, cos]])
     return turned
 
 
 def _groups(problem: Problem) -> list[list[Floats]]:
-    """The obstacles, each a list of convex pieces ``[n, 2]``."""
+    """List the obstacles, each as convex pieces ``[n, 2]``."""
     pieces = problem.obstacles.pieces()
     starts = problem.obstacles.obstacle_starts
     return [pieces[first:last] for first, last in pairwise(starts)]
 
 
 def _cut_off(corners: Floats, low: Floats, high: Floats) -> list[Floats]:
-    """What the box from ``low`` to ``high`` holds besides the turned rectangle: triangles ``[3, 2]``."""
+    """Cover the box from ``low`` to ``high`` around the turned rectangle with triangles ``[3, 2]``."""
     triangles = []
     for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        way = end - begin
-        outward = np.array([way[1], -way[0]])
+        edge = end - begin
+        outward = np.array([edge[1], -edge[0]])
         triangle = np.array([begin, np.where(outward > 0.0, high, low), end])
-        if np.abs(way).min() > SLIVER:
+        if np.abs(edge).min() > SLIVER:
             triangles.append(triangle)
     return triangles

@@ -1,4 +1,4 @@
-"""Numba's flags, in one place."""
+"""How kernels are compiled: Numba's flags, where compiled kernels are kept, and kernels by vehicle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _digest_of_sources() -> str:
     digest = hashlib.sha256()
     for source in sorted(_SOURCES.rglob("*.py")):
         text = source.read_bytes()
-        if b"planners.world.jit" in text:  # the others hold no kernel
+        if b"planners.world.jit" in text:  # other files hold no kernel
             digest.update(text)
     return digest.hexdigest()[:16]
 
@@ -53,7 +53,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-# fastmath stays off: the same seed must give the same tree everywhere
+# fastmath stays off: the same seed must give the same tree on every machine
 _FLAGS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _LEAN: dict[str, Any] = _FLAGS | {"_nrt": False}
 _INLINED: dict[str, Any] = _LEAN | {"forceinline": True}
@@ -67,20 +67,20 @@ def _compiled(function: Callable[_P, _R], flags: dict[str, Any]) -> Callable[_P,
 
 
 def jit(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a kernel: cached on disk, without the interpreter lock."""
+    """Compile a kernel that runs without the interpreter lock and is kept on disk."""
     return _compiled(function, _FLAGS)
 
 
 def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a kernel that allocates nothing, without counting references to arrays.
+    """Compile a kernel that allocates nothing, without reference counts for arrays.
 
-    Numba otherwise counts each array of each tuple that is passed on, which costs more than a check.
+    Counting a reference to each array of each tuple that is passed on would cost more than a collision check.
     """
     return _compiled(function, _LEAN)
 
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a small ``lean`` kernel into each of its callers: calling it costs more than its work."""
+    """Compile a small ``lean`` kernel into its callers, because a call would cost more than its work."""
     return _compiled(function, _INLINED)
 
 
@@ -88,29 +88,29 @@ _implementations: dict[Callable[..., Any], dict[type, Callable[..., Any]]] = {}
 
 
 def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Declare a kernel that each kind of vehicle implements; which one is meant is settled when compiling."""
-    known: dict[type, Callable[..., _R]] = {}
+    """Declare a kernel that each kind of vehicle implements; the compiler picks the implementation."""
+    by_kind: dict[type, Callable[..., _R]] = {}
 
     @functools.wraps(function)
     def interpreted(*arguments: Any) -> _R:
-        return next(known[type(value)] for value in arguments if type(value) in known)(*arguments)
+        return next(by_kind[type(value)] for value in arguments if type(value) in by_kind)(*arguments)
 
     def compiled(*arguments: types.Type) -> Callable[..., _R] | None:
         kinds = (getattr(argument, "instance_class", None) for argument in arguments)
-        return next((known[kind] for kind in kinds if kind in known), None)
+        return next((by_kind[kind] for kind in kinds if kind in by_kind), None)
 
     options: Any = {name: on for name, on in _INLINED.items() if name != "no_cfunc_wrapper"}
     overload(interpreted, jit_options=options, strict=False)(compiled)
-    _implementations[interpreted] = known
+    _implementations[interpreted] = by_kind
     declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]
     return declared
 
 
 def implements(declared: Callable[..., _R], *kinds: type) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
-    """Take the decorated function as what ``declared`` does for these kinds of vehicle."""
+    """Make the decorated function the implementation of ``declared`` for these kinds of vehicle."""
 
-    def take(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    def implementation(function: Callable[_P, _R]) -> Callable[_P, _R]:
         _implementations[declared].update(dict.fromkeys(kinds, function))
         return function
 
-    return take
+    return implementation

@@ -1,4 +1,4 @@
-"""What is asked (a Problem) and what is answered (a Plan)."""
+"""A planning problem, and a plan that solves it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats, Integers
+from planners.world.arrays import Bounds, Floats, Integers, Point, Pose
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 CANONICAL_START = (0.0, 0.0, math.pi / 4)  # metres, metres, radians: facing the goal
@@ -19,7 +19,7 @@ BOUNDS = (-7.0, -7.0, 57.0, 57.0)  # x_min, y_min, x_max, y_max in metres
 
 
 class Obstacles(NamedTuple):
-    """Obstacles as groups of convex pieces; coordinates are exact in float32, so shards keep them exactly."""
+    """Obstacles as groups of convex pieces. Coordinates are exact in float32, so files keep them exactly."""
 
     vertices: Floats  # [V, 2] metres, counter-clockwise within each piece
     piece_starts: Integers  # [P + 1] piece p owns vertices[piece_starts[p] : piece_starts[p + 1]]
@@ -36,25 +36,25 @@ class Problem:
 
     id: str
     class_name: str
-    start: tuple[float, float, float]  # x, y in metres, heading in radians
-    goal: tuple[float, float]  # metres
+    start: Pose
+    goal: Point
     goal_radius: float  # metres
-    bounds: tuple[float, float, float, float]  # x_min, y_min, x_max, y_max in metres
+    bounds: Bounds
     obstacles: Obstacles
-    scale: float = 1.0  # metres of the world outside in one metre here; files are in the former
+    scale: float = 1.0  # real metres in one metre of this problem; files hold real metres
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """States and the controls between them at a fixed time step (docs/method.md: ``P``)."""
 
-    states: Floats  # [T, S] x m, y m, heading rad, speed m/s, then what else the vehicle's state holds
-    controls: Floats  # [T - 1, 2] for a car acceleration m/s^2, steering rate rad/s
+    states: Floats  # [T, S] x (m), y (m), heading (rad), speed (m/s), then the rest of the vehicle's state
+    controls: Floats  # [T - 1, 2] for a car acceleration (m/s^2) and steering rate (rad/s)
     dt: float = CAR.dt  # seconds
 
     @property
     def length_m(self) -> float:
-        """Length of the rear axle's way, in metres."""
+        """Length of the path of the reference point, in metres."""
         return float(np.hypot(*np.diff(self.states[:, :2], axis=0).T).sum())
 
     @property
@@ -64,7 +64,7 @@ class Plan:
 
 
 def obstacles_of(groups: list[list[Floats]]) -> Obstacles:
-    """Pack obstacles, each a list of convex pieces ``[n, 2]``, turning pieces counter-clockwise."""
+    """Pack obstacles, each a list of convex pieces ``[n, 2]`` (metres) in any orientation."""
     pieces = [counter_clockwise(piece) for group in groups for piece in group]
     vertices = np.concatenate(pieces) if pieces else np.empty((0, 2))
     return Obstacles(
@@ -75,31 +75,14 @@ def obstacles_of(groups: list[list[Floats]]) -> Obstacles:
 
 
 def counter_clockwise(polygon: Floats) -> Floats:
-    """The same polygon ``[n, 2]`` with its vertices in counter-clockwise order."""
+    """Return a polygon ``[n, 2]`` with its vertices in counter-clockwise order."""
     x, y = polygon[:, 0], polygon[:, 1]
     area = float(x[:-1] @ y[1:] - y[:-1] @ x[1:] + x[-1] * y[0] - y[-1] * x[0])
     return polygon if area >= 0.0 else polygon[::-1]
 
 
 def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
-    """The state ``[S]`` at the problem's start: at rest, wheels straight, trailers straight behind."""
+    """Return the state ``[S]`` at the start: at rest, wheels straight, trailers straight behind."""
     state = np.zeros(state_size(vehicle))
     state[:3] = problem.start
     return state
-
-
-__all__ = [
-    "BOUNDS",
-    "CANONICAL_DISTANCE",
-    "CANONICAL_GOAL",
-    "CANONICAL_START",
-    "CAR",
-    "GOAL_RADIUS",
-    "Obstacles",
-    "Plan",
-    "Problem",
-    "Vehicle",
-    "counter_clockwise",
-    "obstacles_of",
-    "start_state",
-]

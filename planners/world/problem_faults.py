@@ -1,4 +1,4 @@
-"""Whether a problem makes sense to a planner, said in one line where it does not."""
+"""Says in one line why a problem makes no sense to a planner."""
 
 from __future__ import annotations
 
@@ -7,20 +7,21 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.geometry.collision import CELL_M, REACH_M, box_is_free, count_free_prefix, scene_of
+from planners.world.geometry.collision import CELL_M, REACH_M, count_free_prefix, point_is_free, scene_of
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
-WIDEST_BOUNDS_M: Final = 1_000.0  # the cell look-up of collision checks grows with the bounds' area
-MOST_LISTED: Final = 4_000_000  # pieces in cells of that look-up, 64 MB; city maps have some thousand
+WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
+MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
 
 
 def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
-    """What is wrong with a problem whose obstacles are well formed and what to do, or None.
+    """Return what is wrong with a problem and what to do about it, or None if it makes sense.
 
-    In this order: numbers finite and near, bounds, goal radius, distance, start footprint (trailers straight
-    behind), goal centre.
+    The obstacles must be well formed. Checked are, in this order: the numbers are finite and not too large,
+    the bounds, the goal radius, the distance from start to goal, and whether the footprint at the start (with
+    trailers straight behind) and the goal's centre are free.
     """
     numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds)
     if not all(math.isfinite(number) for number in numbers):
@@ -44,19 +45,19 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
             f"start and goal are {distance:.2f} m apart, wanted was {CANONICAL_DISTANCE:.2f} m within the "
             f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
         )
-    if _listed(problem) > MOST_LISTED:
+    if _entries(problem) > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"
     scene = scene_of(problem)
     if count_free_prefix(start_state(problem, vehicle)[np.newaxis], vehicle, scene) == 0:
-        return f"start footprint at {_place(problem.start)} is not free or leaves the bounds; move the start"
+        return f"start footprint at {_point(problem.start)} is not free or leaves the bounds; move the start"
     x, y = problem.goal
-    if not box_is_free(x, y, 1.0, 0.0, 0.0, 0.0, scene):
-        return f"goal centre {_place(problem.goal)} lies in an obstacle or out of bounds; move the goal"
+    if not point_is_free(x, y, scene):
+        return f"goal centre {_point(problem.goal)} lies in an obstacle or out of bounds; move the goal"
     return None
 
 
-def _listed(problem: Problem) -> float:
-    """In about how many cells of the look-up pieces will be listed, all together."""
+def _entries(problem: Problem) -> float:
+    """Estimate how many entries the cell lists of the problem's scene will have."""
     vertices, starts = problem.obstacles.vertices, problem.obstacles.piece_starts[:-1]
     if len(vertices) == 0:
         return 0.0
@@ -65,5 +66,5 @@ def _listed(problem: Problem) -> float:
     return float((np.maximum(high - low, 0.0) / CELL_M + 1.0).prod(axis=1).sum())
 
 
-def _place(coordinates: tuple[float, ...]) -> str:
+def _point(coordinates: tuple[float, ...]) -> str:
     return f"({', '.join(f'{coordinate:g}' for coordinate in coordinates)})"

@@ -1,4 +1,7 @@
-"""Sine, cosine and tangent as polynomials: faster than the C library's, and the same bits everywhere."""
+"""Geometry in the plane: sine, cosine and tangent as polynomials, lengths, the nearest point of a segment.
+
+The polynomials are faster than the C library's functions, and give the same bits on every machine.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from planners.world.jit import inlined
 
 @inlined
 def _within_an_eighth(r: float) -> tuple[float, float]:
-    """Sine and cosine within an eighth of a turn, by fdlibm's polynomials."""
+    """Sine and cosine of an angle within an eighth of a turn, by the polynomials of fdlibm."""
     z = r * r
     sin = 2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)
     sin = -1.66666666666666324348e-01 + z * (
@@ -24,9 +27,9 @@ def _within_an_eighth(r: float) -> tuple[float, float]:
 
 @inlined
 def sincos(angle: float) -> tuple[float, float]:
-    """Sine and cosine to 2e-16 for angles (radians) up to some thousand turns.
+    """Sine and cosine of an angle (radians) to 2e-16, for angles of up to some thousand turns.
 
-    Quarter turns are subtracted in three parts (Cody and Waite 1980) until an eighth is left at most.
+    Quarter turns are subtracted in three parts (Cody and Waite 1980) until at most an eighth is left.
     """
     turns = math.floor(angle * (2.0 / math.pi) + 0.5)
     r = angle - turns * 1.57079632673412561417e00
@@ -43,7 +46,7 @@ def sincos(angle: float) -> tuple[float, float]:
 
 @inlined
 def sincos_small(angle: float) -> tuple[float, float]:
-    """The same, faster where the angle is most often within an eighth of a turn."""
+    """Like ``sincos``, but faster if the angle (radians) is mostly within an eighth of a turn."""
     if abs(angle) <= 0.25 * math.pi:
         return _within_an_eighth(angle)
     return sincos(angle)
@@ -51,14 +54,14 @@ def sincos_small(angle: float) -> tuple[float, float]:
 
 @inlined
 def turned_by(sin: float, cos: float, angle: float) -> tuple[float, float]:
-    """Sine and cosine of a direction that is turned on by a small ``angle`` (radians)."""
+    """Sine and cosine of a direction after a turn by a small ``angle`` (radians)."""
     s, c = sincos_small(angle)
     return sin * c + cos * s, cos * c - sin * s
 
 
 @inlined
 def tan(angle: float) -> float:
-    """Tangent of a steering angle in radians."""
+    """Tangent of a steering angle (radians)."""
     sin, cos = sincos_small(angle)
     return sin / cos
 
@@ -67,7 +70,7 @@ def tan(angle: float) -> float:
 def angle_to(x: float, y: float) -> float:
     """Direction of a vector in radians, -pi to pi, to 2e-8: enough for a controller, and faster than atan2.
 
-    An odd polynomial, fitted to the arc tangent on [0, 1] with nearly equal ripples.
+    It is an odd polynomial, fitted to the arc tangent on [0, 1] with nearly equal ripples.
     """
     long = max(abs(x), abs(y))
     z = min(abs(x), abs(y)) / long if long > 0.0 else 0.0
@@ -85,11 +88,23 @@ def angle_to(x: float, y: float) -> float:
 
 @inlined
 def wrapped(angle: float) -> float:
-    """The same angle between -pi and pi, radians."""
+    """The same angle (radians) between -pi and pi."""
     return angle - 2.0 * math.pi * math.floor(angle * (0.5 / math.pi) + 0.5)
 
 
 @inlined
 def length(x: float, y: float) -> float:
-    """Length of a vector; without the care for overflow that makes ``math.hypot`` seven times slower."""
+    """Length of a vector, without the care for overflow that makes ``math.hypot`` seven times slower."""
     return math.sqrt(x * x + y * y)
+
+
+@inlined
+def gap_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
+    """The vector from the nearest point of the segment from a to b to the point (x, y)."""
+    ex = bx - ax
+    ey = by - ay
+    dx = x - ax
+    dy = y - ay
+    squared = ex * ex + ey * ey
+    share = min(max((dx * ex + dy * ey) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
+    return dx - share * ex, dy - share * ey

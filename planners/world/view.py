@@ -1,4 +1,4 @@
-"""A problem as one attempt sees it: each structure made when first wanted, and how long each part took."""
+"""A problem as one attempt sees it: its structures, each made when first needed, and how long that took."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ class View:
     def __init__(self, problem: Problem, workspace: Workspace | None = None) -> None:
         self.problem = problem
         self.workspace = workspace or Workspace()
-        self.seconds: dict[str, float] = {}  # by part
+        self.seconds: dict[str, float] = {}  # spent so far, by part of the attempt
         self.began = self._last = perf_counter()
         self._drawing: Drawing | None = None
         self._scene: Scene | None = None
 
     def lap(self, part: str) -> None:
-        """Count the time since the last lap to ``part``."""
+        """Add the time since the last lap to ``part``."""
         now = perf_counter()
         self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
         self._last = now
 
     @property
     def drawing(self) -> Drawing:
-        """The cells that obstacles meet, of each convex piece too."""
+        """The cells that the obstacles meet."""
         if self._drawing is None:
             self._drawing = drawing_of(self.problem, self.workspace)
             self.lap("occupancy")
@@ -40,12 +40,12 @@ class View:
 
     @property
     def bits(self) -> Bits:
-        """Bits ``[64]`` of the cells that are not free."""
+        """The cells ``[64]`` that are not free, as bits."""
         return self.drawing.occupied
 
     @property
     def scene(self) -> Scene:
-        """The obstacles, ready for collision checks."""
+        """The obstacles ready for collision checks."""
         if self._scene is None:
             self._scene = scene_of(self.problem)
             self.lap("scene")

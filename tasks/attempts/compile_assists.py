@@ -12,7 +12,7 @@ from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import RECALLS, TRIED_DRAWN
+from planners.memory.recall import CHECKED_DRAWN, RECALLS
 from planners.solve import solve
 from planners.world.problem import (
     BOUNDS,
@@ -45,7 +45,7 @@ def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequ
     plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan
     if plan is None:
         return
-    plans = [plan] * (TRIED_DRAWN + 1)  # so that the last is checked with the scene
+    plans = [plan] * (CHECKED_DRAWN + 1)  # so that the last is checked with the scene
     sweeps = sweep_plans(plans, vehicle)
     architecture = Architecture()
     readout = np.zeros((len(plans) + 1, architecture.dimensions), np.float32)

@@ -1,4 +1,4 @@
-"""AdamW over one flat vector, and its learning rate; torch's own optimisers take two seconds to import."""
+"""AdamW over one flat vector, and its learning rate. Torch's optimisers take seconds to import."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from planners.world.arrays import Floats32
 BETAS: Final = (0.9, 0.999)  # decay of the gradient's and of its square's running means
 EPSILON: Final = 1e-8
 WARM_UP: Final = 0.3  # share of the steps in which the learning rate rises
-FIRST_SHARE: Final = 1 / 25  # of the highest rate, to begin with
+FIRST_SHARE: Final = 1 / 25  # the first rate, as a share of the highest
 
 
 class FlatParameters:
-    """Named arrays as views of one vector, so that a step of the optimiser is a handful of operations."""
+    """Named arrays as views of one vector, so that a step of the optimiser takes a handful of operations."""
 
     def __init__(self, arrays: Mapping[str, Floats32], device: torch.device) -> None:
         self._shapes = {name: array.shape for name, array in arrays.items()}
@@ -27,7 +27,7 @@ class FlatParameters:
         self.values = torch.from_numpy(flat).to(device).requires_grad_(True)
 
     def named(self, values: Tensor | None = None) -> dict[str, Tensor]:
-        """The parameters by name: these, or others of the same shapes."""
+        """Return the parameters by name: these, or others ``values [P]`` of the same shapes."""
         sizes = [math.prod(shape) for shape in self._shapes.values()]
         parts = torch.split(self.values if values is None else values, sizes)
         return {
@@ -36,7 +36,7 @@ class FlatParameters:
 
 
 class AdamW:
-    """Adam with decoupled weight decay (Loshchilov and Hutter 2019), one state for all parameters."""
+    """Adam with decoupled weight decay (Loshchilov and Hutter 2019), for all parameters at once."""
 
     def __init__(self, values: Tensor, weight_decay: float) -> None:
         self.values = values
@@ -57,7 +57,7 @@ class AdamW:
 
 
 def one_cycle(step: int, steps: int, highest: float) -> float:
-    """Learning rate of step 0 .. steps - 1: up to ``highest`` along a cosine, then down to 0 (Smith 2018)."""
+    """Return the rate of step 0 .. steps - 1: along cosines up to ``highest`` and down to 0 (Smith 2018)."""
     rising = WARM_UP * steps
     if step < rising:
         lowest = FIRST_SHARE * highest

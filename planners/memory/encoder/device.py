@@ -1,4 +1,4 @@
-"""Where training runs, and how: deterministic; on a GPU, if there is one, compiled and in mixed precision."""
+"""Where and how training runs: deterministically, and on a GPU compiled and in mixed precision."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Embedder = Callable[[dict[str, Tensor], Tensor], Tensor]
 
 @contextmanager
 def deterministic(threads: int) -> Iterator[torch.device]:
-    """The device to train on, with that many threads and deterministic kernels; torch is left as it was."""
+    """Make torch deterministic, with so many threads, and give the device to train on; undo it at the end."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS is not deterministic
     before, was_deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(threads)
@@ -29,7 +29,7 @@ def deterministic(threads: int) -> Iterator[torch.device]:
 
 
 def forward_on(device: torch.device) -> Embedder:
-    """The encoder (``network.embed``) as training runs it on a device."""
+    """Return the encoder (``torch_network.embed``) as training runs it on a device."""
     if device.type == "cpu":
         return embed
     compiled = torch.compile(embed)

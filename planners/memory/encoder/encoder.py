@@ -1,8 +1,8 @@
-"""The encoder: occupancy grid to embedding, and its runtime, which needs no torch.
+"""The encoder, from occupancy grid to embedding, and its runtime, which needs no torch.
 
-Convolutions with PReLU, then fully connected layers, no normalisation, as published. In place
-of max-pooling the first convolution takes patches of 4x4 cells with stride 4: where exactly an obstacle lies
-decides whether a plan is free, and pooling loses it. On fresh problems of class random the first plan was
+It has convolutions with PReLU, then fully connected layers, and no normalisation, as published. Instead of
+max-pooling, the first convolution takes patches of 4x4 cells with stride 4: whether a plan is free depends on
+where exactly an obstacle lies, and pooling loses that. On fresh problems of class random the first plan was
 free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of training).
 """
 
@@ -20,10 +20,10 @@ from planners.world.geometry.occupancy import GRID, Grid
 
 Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ..., "linear.0.weight", ...
 
-PATCH = 4  # cells a side that the first convolution takes, and its stride; the others are 3x3
-PRELU_SLOPE = 0.25  # what a PReLU begins with (He et al. 2015)
+PATCH = 4  # cells a side, and stride, of the first convolution; the others are 3x3
+PRELU_SLOPE = 0.25  # initial (He et al. 2015)
 OPSET = 17
-IR_VERSION = 9  # the oldest that has the opset: readable by old runtimes
+IR_VERSION = 9  # the oldest that has the opset, so that old runtimes can read it
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Architecture:
 
 
 def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
-    """Names and shapes of the weights, layer by layer."""
+    """Return the names and shapes of the weights, layer by layer."""
     shapes: dict[str, tuple[int, ...]] = {}
     inputs = 1
     for i, outputs in enumerate(architecture.channels):
@@ -63,7 +63,7 @@ def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
 
 
 def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Weights:
-    """Weights to begin training with: normal, scaled for PReLU (He et al. 2015); biases zero."""
+    """Draw weights to begin training with: normal, scaled for PReLU (He et al. 2015). Biases are zero."""
     last = f"linear.{len(architecture.hidden)}.weight"
     weights: Weights = {}
     for name, shape in weight_shapes(architecture).items():
@@ -77,7 +77,10 @@ def initial_weights(architecture: Architecture, rng: np.random.Generator) -> Wei
 
 
 def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
-    """The sizes of the network that has these weights; ValueError where they are none."""
+    """Return the sizes of the network with these weights.
+
+    Raises ValueError if they are not the weights of an encoder.
+    """
     try:
         convolutions, linears = layer_counts(weights)
         widths = [len(weights[f"linear.{i}.bias"]) for i in range(linears)]
@@ -87,14 +90,14 @@ def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
             widths[-1],
         )
     except (KeyError, IndexError, TypeError, ValueError):
-        raise ValueError("these are no weights of an encoder: a layer is missing") from None
+        raise ValueError("these are not the weights of an encoder: a layer is missing") from None
     if {name: tensor.shape for name, tensor in weights.items()} != weight_shapes(architecture):
-        raise ValueError("these are no weights of an encoder: its layers do not fit each other")
+        raise ValueError("these are not the weights of an encoder: the layers do not fit together")
     return architecture
 
 
 def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
-    """How many convolutions and how many fully connected layers ``weights`` has."""
+    """Count the convolutions and the fully connected layers of a network."""
     names = {name.rsplit(".", 1)[0] for name in weights}
     convolutions, linears = (
         sum(name.startswith(kind) for name in names) for kind in ("convolution.", "linear.")
@@ -103,7 +106,7 @@ def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
 
 
 def to_onnx(weights: Weights) -> bytes:
-    """The network as a serialised ONNX model: ``grid`` uint8 [n, 64, 64] to ``embedding`` float32 [n, D]."""
+    """Serialise the network as an ONNX model: ``grid`` uint8 [n, 64, 64] to ``embedding`` float32 [n, D]."""
     from onnx import TensorProto, helper, numpy_helper
 
     convolutions, linears = layer_counts(weights)
@@ -148,7 +151,7 @@ def to_onnx(weights: Weights) -> bytes:
 
 @dataclass(frozen=True)
 class Encoder:
-    """Runs a serialised ONNX encoder on one thread; pickled as its bytes, its session made at first use."""
+    """Runs a serialised ONNX encoder on one thread. Only the model's bytes are pickled."""
 
     model: bytes
 
@@ -168,7 +171,10 @@ class Encoder:
         return {"model": self.model}
 
     def __call__(self, grids: Grid) -> Floats32:
-        """Embedding ``[D]`` of one grid ``[64, 64]``, or ``[n, D]`` of ``[n, 64, 64]``; cells are 0 or 1."""
+        """Embed one grid ``[64, 64]`` as ``[D]``, or grids ``[n, 64, 64]`` as ``[n, D]``; cells are 0 or 1.
+
+        Raises ValueError for grids of another type or shape.
+        """
         if grids.dtype != np.uint8 or grids.ndim not in (2, 3) or grids.shape[-2:] != (GRID, GRID):
             raise ValueError(
                 f"grid is {grids.dtype} {list(grids.shape)}, the encoder needs uint8 [{GRID}, {GRID}] "

@@ -1,9 +1,9 @@
-"""The encoder's forward pass for one grid, straight from its bits, some times faster than a general runtime.
+"""The encoder's forward pass for the bits of one grid, several times faster than a general runtime.
 
-It knows one shape: a single convolution, whose patches do not overlap, then fully connected layers. Patches
-without an obstacle, and those wholly covered, all look alike: what they bring is summed up beforehand. So
-only patches in which an obstacle begins or ends are multiplied. What that takes is time to read the weights,
-so they lie in the order of reading, as 16-bit numbers. Other shapes go through ONNX Runtime.
+It handles one shape of network: a single convolution, whose patches do not overlap, then fully connected
+layers. Empty patches all contribute the same, and so do full ones, so these contributions are summed up
+beforehand, and only patches in which an obstacle begins or ends are multiplied. Most of the time goes into
+reading the weights, so they lie in the order of reading, as 16-bit numbers. ONNX Runtime runs other networks.
 """
 
 from __future__ import annotations
@@ -22,25 +22,23 @@ Shorts = np.ndarray[tuple[int, ...], np.dtype[np.int16]]
 Forward = Callable[[Bits], Floats32]  # bits [64] of a grid to its embedding [D]
 
 SIDE = GRID // PATCH  # patches a side
-_TOGETHER = 8  # channels added in one go: fewer passes over the hidden units
+_TOGETHER = 8  # channels that are added at once, for fewer passes over the hidden units
 _PATCH_BITS = np.uint64((1 << PATCH) - 1)
 _FULL = (1 << PATCH * PATCH) - 1
 
 
 class Tables(NamedTuple):
-    """The weights laid out for ``_embed``; C channels, zeros added up to a multiple of 8; H hidden units."""
+    """The weights laid out for ``_embed``, for C channels, padded to a multiple of 8, and H hidden units."""
 
-    rows: Floats32  # [PATCH, 2^PATCH, C] what four cells in a row of a patch bring to the convolution
+    rows: Floats32  # [PATCH, 2^PATCH, C] contribution of the four cells in a row of a patch
     bias: Floats32  # [C] of the convolution
     slope: Floats32  # [C] of its PReLU
     empty: Floats32  # [C] activations of a patch without an obstacle
     weights: Shorts  # [SIDE^2, C, H] of the first fully connected layer, in units of ...
     scale: Floats32  # [H] of each hidden unit
-    base: Floats32  # [H] its sums where every patch is empty
-    full: Floats32  # [SIDE^2, H] what is added to these where a patch is wholly covered
-    later: (
-        Floats32  # all that comes behind, end to end: of each layer slopes before, weights [in, out], biases
-    )
+    base: Floats32  # [H] its sums if every patch is empty
+    full: Floats32  # [SIDE^2, H] what a full patch adds to these
+    later: Floats32  # the later layers, end to end: of each the slopes before, weights [in, out], biases
     widths: Integers  # [L + 1] H, and the widths of the later layers
 
 
@@ -127,7 +125,7 @@ def _prelu(values: Floats32, slope: Floats32) -> Floats32:
 
 
 def tables_of(weights: Weights) -> Tables:
-    """Tables of a network with one convolution."""
+    """Lay out the weights of a network with one convolution."""
     linears = layer_counts(weights)[1]
     channels = len(weights["convolution.0.bias"])
     padding = [(0, -channels % _TOGETHER)]
@@ -169,7 +167,7 @@ def tables_of(weights: Weights) -> Tables:
 
 
 def forward_of(weights: Weights) -> Forward:
-    """What runs the encoder on one grid's bits; what it returns is the caller's own."""
+    """Return a function that embeds the bits ``[64]`` of one grid in a new array ``[D]``."""
     if layer_counts(weights)[0] > 1:
         encoder = Encoder(to_onnx(weights))
         return lambda bits: encoder(grid_of(bits))

@@ -1,4 +1,4 @@
-"""An encoder that learns: parameters, optimiser and objective over a set of problems, an epoch at a time."""
+"""Trains an encoder on a set of problems, an epoch at a time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Learner:
         weight_decay: float,
         device: torch.device,
     ) -> None:
-        """``weights`` of the encoder and an objective's ``own`` parameters are what it begins with."""
+        """Begin with ``weights`` of the encoder and the ``own`` parameters of an objective."""
         grids, rows, free = problems
         self._bits = torch.from_numpy(np.ascontiguousarray(grids)).to(device)
         self._rows = torch.from_numpy(rows.astype(np.int64)).to(device)
@@ -39,9 +39,9 @@ class Learner:
         self._best = self._parameters.values.detach().clone()
 
     def epoch(self, objective: Objective, order: Integers, batch: int, steps: int, rate: float) -> float:
-        """Learn from the problems ``order`` in batches; the mean loss.
+        """Learn from the problems ``order [n]`` in batches, and return the mean loss.
 
-        ``rate`` is the highest of a schedule over ``steps`` in all.
+        ``rate`` is the highest learning rate of a schedule over ``steps`` in all.
         """
         losses = []
         for part in torch.split(torch.from_numpy(order).to(self._bits.device), batch):
@@ -54,44 +54,47 @@ class Learner:
         return float(torch.stack(losses).mean())
 
     @torch.no_grad()
-    def scores(self, objective: Objective, asked: Integers, sample: Integers) -> Floats32:
-        """Scores ``[len(asked), N]`` of all plans; ``sample``: problems that a readout may be made from."""
+    def scores(self, objective: Objective, problems: Integers, sample: Integers) -> Floats32:
+        """Score all plans ``[m, N]`` for ``problems [m]``. A readout may be made from those of ``sample``."""
         named = self._parameters.named()
         embeddings = embed_all(named, self._bits[sample])
         rows = self._rows[sample]
         vectors, biases = objective.readout(named, embeddings, rows, self._free.shape[1])
-        return _array((embed_all(named, self._bits[asked]) @ vectors.T + biases)[:, 1:])
+        return _array((embed_all(named, self._bits[problems]) @ vectors.T + biases)[:, 1:])
 
     def keep(self) -> None:
-        """Remember the parameters as the best so far."""
+        """Keep the present parameters as the best so far."""
         self._best = self._parameters.values.detach().clone()
 
     def best(self) -> Weights:
-        """The parameters that were kept, the objective's own among them."""
+        """Return the parameters that were kept, with those of the objective."""
         return {name: _array(value) for name, value in self._parameters.named(self._best).items()}
 
-    def best_embeddings(self, asked: Integers) -> Floats32:
-        """Embeddings ``[len(asked), D]`` by the parameters that were kept."""
-        return _array(embed_all(self._parameters.named(self._best), self._bits[asked]))
+    def best_embeddings(self, problems: Integers) -> Floats32:
+        """Embed ``problems [m]`` with the parameters that were kept: ``[m, D]``."""
+        return _array(embed_all(self._parameters.named(self._best), self._bits[problems]))
 
     def state(self) -> LearnerState:
-        """All that changes while learning, ``[P]`` each: parameters, the optimiser's two means, the best."""
-        values, mean, square, best = map(_array, self._places())
+        """Copy all that changes while learning, ``[P]`` each: parameters, the optimiser's means, the best."""
+        values, mean, square, best = map(_array, self._state())
         return values, mean, square, best
 
     def restore(self, state: LearnerState, steps: int) -> None:
-        """Take a ``state`` back, reached after so many steps; ValueError where it is another network's."""
+        """Restore a ``state`` that was reached after so many steps.
+
+        Raises ValueError if it is of another network.
+        """
         if any(kept.shape != self._best.shape for kept in state):
             raise ValueError(
                 f"checkpoint has {[len(kept) for kept in state]} parameters, wanted were {len(self._best)}: "
                 "was it made with the same settings?"
             )
         with torch.no_grad():
-            for place, kept in zip(self._places(), state, strict=True):
-                place.copy_(torch.from_numpy(kept))
+            for tensor, kept in zip(self._state(), state, strict=True):
+                tensor.copy_(torch.from_numpy(kept))
         self._optimiser.steps = steps
 
-    def _places(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def _state(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         return self._parameters.values, self._optimiser.mean, self._optimiser.square, self._best
 
 

@@ -1,4 +1,4 @@
-"""Which problems training sees, which it is chosen by, and which it is measured with."""
+"""Splits problems: some to train with, some to choose the best epoch with, some to measure recall with."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planners.world.randomness import generator
 
 
 class Splits(NamedTuple):
-    """Indices of problems, each in ascending order."""
+    """Numbers of problems in ascending order."""
 
     training: Integers
     validation: Integers  # to choose the best epoch and the best seed with
@@ -19,10 +19,16 @@ class Splits(NamedTuple):
 
 
 def split(plan_index: Integers, labels: Flags, validation_share: float, held_out_share: float) -> Splits:
-    """Split n problems at random, alike for every training seed.
+    """Split n problems at random, in the same way for every training seed.
 
-    ``plan_index [n]``: the plan a problem was made for, or -1; ``labels [n, N]``. ValueError: fewer than
-    three problems, or none for some plan.
+    Args:
+        plan_index: ``[n]`` the plan that each problem was made for, -1 for none.
+        labels: ``[n, N]`` which plans are free.
+        validation_share: share of the problems to choose the best epoch with.
+        held_out_share: share of the problems to measure recall with.
+
+    Raises:
+        ValueError: There are fewer than three problems, or none that was made for some plan.
     """
     count, plans = labels.shape
     if count < 3:
@@ -41,7 +47,7 @@ def split(plan_index: Integers, labels: Flags, validation_share: float, held_out
 
 
 def first_of_each(values: Integers, count: int) -> Integers:
-    """Indices of the first ``count`` occurrences of each value from 0, in order."""
+    """Return, in order, where the first ``count`` occurrences of each value that is not negative are."""
     order = np.argsort(values, kind="stable")
     order = order[values[order] >= 0]
     begins = np.flatnonzero(np.diff(values[order], prepend=-1))

@@ -1,4 +1,4 @@
-"""The encoder in torch, for training; ``encoder.to_onnx`` writes the same network for recall."""
+"""The encoder in torch, for training. ``encoder.to_onnx`` writes the same network for recall."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ Parameters = dict[str, Tensor]
 
 
 def unpacked(bits: Tensor) -> Tensor:
-    """Images float32 ``[n, 1, 64, 64]`` of packed grids uint8 ``[n, 512]``."""
+    """Unpack grids uint8 ``[n, 512]`` into images float32 ``[n, 1, 64, 64]``."""
     shifts = torch.arange(7, -1, -1, dtype=torch.uint8, device=bits.device)
     return ((bits[:, :, None] >> shifts) & 1).to(torch.float32).view(-1, 1, GRID, GRID)
 
 
 def prelu(value: Tensor, slope: Tensor) -> Tensor:
-    """``value`` where it is positive, else ``slope`` times it; torch's own takes twice as long backwards."""
+    """Multiply negative values by ``slope``; torch's own PReLU takes twice as long backwards."""
     positive = functional.relu(value)
     return torch.addcmul(positive, slope, value - positive)
 
 
 def embed(parameters: Parameters, bits: Tensor) -> Tensor:
-    """Embeddings ``[n, D]`` of packed grids uint8 ``[n, 512]``."""
+    """Embed packed grids uint8 ``[n, 512]`` as ``[n, D]``."""
     convolutions, linears = layer_counts(parameters)
     value = unpacked(bits)
     for i in range(convolutions):

@@ -1,4 +1,4 @@
-"""Training the encoder, deterministic for a seed, from any checkpoint; torch is imported when it begins."""
+"""Trains the encoder, deterministically for a seed and from any checkpoint; torch is imported when needed."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
     from planners.memory.encoder.objectives import Objective
 
 OBJECTIVES: Final = ("labels", "triplet")
-CENTROID_SAMPLE = 50  # training problems a plan, for the centroids of an epoch's metrics
-ORIGIN_LEFT: Final = 0.1  # share of the origin's weight in the last epoch
+CENTROID_SAMPLE = 50  # training problems of each plan, for the centroids of an epoch's metrics
+ORIGIN_LEFT: Final = 0.1  # share of the origin's weight that is left in the last epoch
 
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """How to train."""
+    """Settings of a training."""
 
     objective: str = "labels"
     epochs: int = 12  # at most
-    patience: int = 4  # epochs without a better hit@1 on the validation problems, then training ends
+    patience: int = 4  # training ends after so many epochs without a better hit@1 on validation problems
     batch: int = 128  # problems
     learning_rate: float = 3e-3  # the highest of a one-cycle schedule
     weight_decay: float = 0.1  # decoupled, AdamW
-    first_weight: float = 1.0  # of the label objective: that a free plan comes first
-    origin_weight: float = 40.0  # of the label objective, at first: that the plan a problem was made for does
-    margin: float = 1.0  # of the triplet objective
-    semi_hard: bool = False  # of the triplet objective: which triplets count
+    first_weight: float = 1.0  # label objective: how much it counts that a free plan comes first
+    origin_weight: float = 40.0  # label objective: how much it counts, at first, that the origin comes first
+    margin: float = 1.0  # triplet objective
+    semi_hard: bool = False  # triplet objective: count only semi-hard triplets
     architecture: Architecture = field(default_factory=Architecture)
-    held_out_share: float = 0.1  # of the problems, to measure recall with: training never sees them
+    held_out_share: float = 0.1  # of the problems, to measure recall with; training never sees them
     validation_share: float = 0.05  # of the problems, to choose the best epoch and the best seed with
     seed: int = 0
-    threads: int = 1  # results are the same for the same number
+    threads: int = 1  # results depend on this number
 
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
@@ -66,42 +66,42 @@ class TrainingSettings:
 
 
 class Epoch(NamedTuple):
-    """Metrics after one epoch, on the validation problems; hit@k: one of the first k plans is free."""
+    """Metrics of an epoch on the validation problems; hit@k says that one of the first k plans is free."""
 
     epoch: int  # from 1
     loss: float  # mean over the epoch's batches
     hit_1: float
     hit_5: float
     oracle: float  # share of validation problems in which any stored plan is free
-    seconds: float  # of training until then
+    seconds: float  # of training so far
 
 
 class Checkpoint(NamedTuple):
-    """Where training stands after an epoch: what it takes to go on as if it had never stopped."""
+    """Where training stands after an epoch: enough to go on as if it had never stopped."""
 
     history: tuple[Epoch, ...]
     values: Floats32  # [P] all parameters, the objective's own after the encoder's
-    mean: Floats32  # [P] of the gradients (``optimiser.AdamW``)
+    mean: Floats32  # [P] of the gradients (``adamw.AdamW``)
     square: Floats32  # [P] of the gradients' squares
     best: Floats32  # [P] the parameters after the best epoch so far
 
 
 @dataclass(frozen=True, eq=False)
 class TrainedEncoder:
-    """What training leaves: the parameters after the best epoch, and what they say of the problems."""
+    """The result of a training: the parameters after the best epoch, and what follows from them."""
 
     settings: TrainingSettings
     weights: Weights
     centroids: Floats32  # [N + 1, D] mean embedding of each plan's problems; row 0: of those no plan solves
     vectors: Floats32  # [N + 1, D] readout
-    biases: Floats32  # [N + 1] readout; row 0 says when to recall nothing (``readout.py``)
+    biases: Floats32  # [N + 1] readout; row 0 decides when nothing is recalled (``readout.py``)
     popularity: Floats32  # [N] share of the training problems in which each plan is free
     history: tuple[Epoch, ...]
-    held_out: Integers  # [h] indices of the problems that training did not see
+    held_out: Integers  # [h] numbers of the problems that training did not see
 
     @property
     def score(self) -> float:
-        """What trainings are compared by: the best epoch's hit@1 on the validation problems."""
+        """By what trainings are compared: the best epoch's hit@1 on the validation problems."""
         return max(epoch.hit_1 for epoch in self.history)
 
 
@@ -114,12 +114,20 @@ def train(
     checkpoint: Checkpoint | None = None,
     warm: Weights | None = None,
 ) -> TrainedEncoder:
-    """Train on n problems: grids as bits uint8 ``[n, 512]``, and which of N plans are free bool ``[n, N]``.
+    """Train an encoder on n problems, on a GPU if torch sees one.
 
-    ``plan_index [n]`` is the plan that each problem was made for, -1 where it was made for none. Calls
-    ``on_epoch`` after each epoch; given what that got, training goes on from there to the same end. Uses a
-    GPU where torch sees one. ``warm``: the encoder begins with these weights instead of random ones.
-    ValueError: not one of each for every problem, a plan without problems, weights of another architecture.
+    Args:
+        grids_packed: uint8 ``[n, 512]`` their occupancy grids, packed.
+        plan_index: ``[n]`` the plan that each was made for, -1 for none.
+        labels: bool ``[n, N]`` which plans are free in each.
+        settings: of the training.
+        on_epoch: is called with a checkpoint after each epoch.
+        checkpoint: of an earlier training, which goes on from there to the same end.
+        warm: weights for the encoder to begin with instead of random ones.
+
+    Raises:
+        ValueError: There is not one of each for every problem, some plan has no problems, or ``warm`` is of
+            another architecture.
     """
     from planners.memory.encoder.device import deterministic
     from planners.memory.encoder.learner import Learner
@@ -142,7 +150,7 @@ def train(
     objective = _objective(settings, 0)
     weights = initial_weights(settings.architecture, generator(settings.seed, "weights"))
     if warm is not None:
-        weights = {name: warm[name] for name in weights}  # in the same order, whoever kept them
+        weights = {name: warm[name] for name in weights}  # in the order of the initial ones
     dimensions = settings.architecture.dimensions
     own = objective.initial(free.shape[1], dimensions, generator(settings.seed, "readout"))
     history = list(checkpoint.history) if checkpoint else []
@@ -159,8 +167,9 @@ def train(
                 objective, order, settings.batch, settings.epochs * steps, settings.learning_rate
             )
             scores = learner.scores(objective, parts.validation, sample)
-            known = labels[parts.validation]
-            hits = (hit_rate(scores, known, 1), hit_rate(scores, known, 5), float(known.any(1).mean()))
+            free_plans = labels[parts.validation]
+            oracle = float(free_plans.any(1).mean())
+            hits = (hit_rate(scores, free_plans, 1), hit_rate(scores, free_plans, 5), oracle)
             if hits[0] >= max((epoch.hit_1 for epoch in history), default=0.0):
                 learner.keep()
             history.append(Epoch(len(history) + 1, loss, *hits, time.perf_counter() - began))
@@ -185,13 +194,16 @@ def train(
 
 
 def hit_rate(plan_scores: Floats32, labels: Flags, k: int) -> float:
-    """Share of n problems in which one of the k best plans is free: scores ``[n, N]``, labels ``[n, N]``."""
+    """Return the share of n problems in which one of the k best plans is free.
+
+    ``plan_scores [n, N]`` ranks the plans, ``labels [n, N]`` says which are free.
+    """
     best = np.argsort(-plan_scores, axis=1, kind="stable")[:, :k]
     return float(np.take_along_axis(labels, best, axis=1).any(1).mean())
 
 
 def _objective(settings: TrainingSettings, epoch: int) -> Objective:
-    """What an epoch, counted from 0, minimises: the origin's weight falls in a straight line."""
+    """The objective of an epoch, counted from 0. The weight of the origin falls linearly."""
     from planners.memory.encoder.objectives import Labels, Triplet
 
     if settings.objective == "labels":
@@ -201,6 +213,6 @@ def _objective(settings: TrainingSettings, epoch: int) -> Objective:
 
 
 def _is_tired(history: list[Epoch], patience: int) -> bool:
-    """Whether the last ``patience`` epochs brought nothing better than those before."""
+    """Whether the last ``patience`` epochs were no better than the best one before."""
     hits = [epoch.hit_1 for epoch in history]
     return len(hits) > patience and max(hits[-patience:]) < max(hits[:-patience])

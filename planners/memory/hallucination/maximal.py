@@ -1,4 +1,4 @@
-"""Maximal: everything that the plan leaves free is an obstacle, so that only this plan's way is left."""
+"""Maximal: everything that the plan leaves free is an obstacle, so that only this plan's corridor is left."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.hallucination.method import DrawObstacles, Sampler
+from planners.memory.hallucination.method import DrawObstacles, Range, Sampler
 from planners.memory.plans.experience import Experience
 from planners.world.arrays import Floats, Integers
 from planners.world.geometry.occupancy import CELL, GRID, Grid, draw_occupancy
@@ -15,19 +15,18 @@ from planners.world.jit import jit
 from planners.world.problem import BOUNDS, Obstacles
 from planners.world.vehicles.bodies import box_corners
 
-SEAM_M: Final = 1e-3  # between two filled rectangles: a cell that they only touch is not filled
+SEAM_M: Final = 1e-3  # between two rectangles, so that they do not fill cells that they only touch
 DISC_SIDES: Final = 16
 _EVERYWHERE: Final = np.array([-np.inf, -np.inf, np.inf, np.inf])
-
-Range = tuple[float, float]  # drawn evenly from it, anew for each problem
 
 
 @dataclass(frozen=True)
 class Maximal:
     """Fill all cells of the occupancy grid that the dilated sweep does not meet (LfH, Xiao et al. 2021).
 
-    The sweep is the plan's footprints, scaled and then widened on every side, and a disc at either end. Cells
-    are 1 m wide, so a wall stands up to 1.4 m farther away than asked.
+    The sweep consists of the plan's footprints, scaled and then widened on every side, and of a disc at each
+    end. All four are drawn anew for each problem. Cells are 1 m wide, so walls may stand up to 1.4 m farther
+    away.
     """
 
     clearance_m: Range = (0.0, 2.0)
@@ -36,7 +35,7 @@ class Maximal:
     goal_radius_m: Range = (0.0, 5.0)  # beyond the goal disc's own
 
     def around(self, experience: Experience, rng: np.random.Generator) -> Sampler:
-        """Remember the plan's sweep."""
+        """Prepare the plan's sweep."""
         boxes, problem = experience.boxes.reshape(-1, 6), experience.problem
 
         def sample(draw: DrawObstacles, rng: np.random.Generator) -> Obstacles:
@@ -54,7 +53,7 @@ class Maximal:
 
 
 def _disc(x: float, y: float, radius: float) -> Floats:
-    """A polygon ``[16, 2]`` around the disc."""
+    """A polygon ``[16, 2]`` around a disc."""
     angles = 2.0 * np.pi * np.arange(DISC_SIDES) / DISC_SIDES
     reach = radius / np.cos(np.pi / DISC_SIDES)
     return np.column_stack((x + reach * np.cos(angles), y + reach * np.sin(angles)))
@@ -62,7 +61,7 @@ def _disc(x: float, y: float, radius: float) -> Floats:
 
 @jit
 def filled(free: Grid) -> Obstacles:
-    """Rectangles over the cells of ``free [64, 64]`` that are 0: runs of a row, as high as they go on."""
+    """Cover the cells of ``free [64, 64]`` that are 0 with rectangles: runs of a row, extended upwards."""
     vertices = np.empty((4 * GRID * GRID, 2))
     done = free.copy()
     count = 0

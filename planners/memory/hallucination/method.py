@@ -1,4 +1,4 @@
-"""What a method of hallucination is: prepared once for a plan, then asked for obstacles many times."""
+"""What a hallucination method is: it prepares once for a plan, and then makes obstacles many times."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ import numpy as np
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Obstacles
 
-DrawObstacles = Callable[[np.random.Generator], Obstacles]  # a fresh set of obstacles of the class
-Sampler = Callable[[DrawObstacles, np.random.Generator], Obstacles]  # obstacles of one new problem
+DrawObstacles = Callable[[np.random.Generator], Obstacles]  # draws new obstacles of the class
+Sampler = Callable[[DrawObstacles, np.random.Generator], Obstacles]  # makes the obstacles of one problem
+Range = tuple[float, float]  # a number is drawn evenly from it
 
 
 class Method(Protocol):
-    """One way to hallucinate; its settings are its fields."""
+    """A method, whose settings are its fields."""
 
     def around(self, experience: Experience, rng: np.random.Generator) -> Sampler:
-        """Prepare for an experience: a sampler of obstacles among which its plan stays free."""
+        """Return a sampler of obstacles among which the plan of an experience stays free."""

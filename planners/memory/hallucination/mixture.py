@@ -1,4 +1,4 @@
-"""The methods by name, and problems made by a mix of them."""
+"""The methods by name, and problems that a mix of them makes."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 
 METHODS: Final = ("rearrange", "maximal", "minimal", "learned")
-LEARNED: Final = "learned"  # the one that needs weights
+LEARNED: Final = "learned"  # the method that needs weights
 
 
 class Hallucination(NamedTuple):
-    """A problem that was made for a plan."""
+    """A problem that was made for a plan, and the method that made it."""
 
     problem: Problem
     method: str
 
 
 def method_named(name: str, weights: Weights | None = None) -> Method:
-    """A method with its default settings; ``weights`` are those of ``learned``, which the others ignore.
+    """Return one of the ``METHODS`` with its default settings; only ``learned`` uses ``weights``.
 
-    ValueError: it is not known, or its weights are missing.
+    Raises ValueError if there is no such method, or ``learned`` has no weights.
     """
     if name == LEARNED:
         if weights is None:
-            raise ValueError("Learned hallucination needs weights: train some with learned_training.")
+            raise ValueError("Learned hallucination needs weights: train some with train_learned.")
         return Learned(weights)
     plain: dict[str, Method] = {"rearrange": Rearrange(), "maximal": Maximal(), "minimal": Minimal()}
     if name not in plain:
@@ -51,10 +51,17 @@ def hallucinate(
     rng: np.random.Generator,
     weights: Weights | None = None,
 ) -> Iterator[Hallucination]:
-    """Problems without end for an experience's plan, each by a method drawn with its share of ``mixture``.
+    """Make problems for an experience's plan, without end.
 
-    ``draw`` gives fresh obstacles of the class, ``weights`` are those of ``learned``.
-    RuntimeError: the plan does not solve its own problem.
+    Args:
+        experience: whose plan the problems are made for.
+        mixture: the share of each method.
+        draw: draws new obstacles of the class.
+        rng: the source of all random choices.
+        weights: of the network of ``learned``, if the mixture has it.
+
+    Raises:
+        RuntimeError: The plan does not solve its own problem.
     """
     origin = experience.problem
     if not plan_fits(experience.sweep, 0, ends_of(origin), scene_of(origin))[0]:

@@ -1,4 +1,4 @@
-"""``S_0``: problems that no stored plan solves, so that recall learns when there is nothing to recall."""
+"""Makes ``S_0``: problems that no stored plan solves, from which recall learns when to recall nothing."""
 
 from __future__ import annotations
 
@@ -8,20 +8,16 @@ from typing import Final
 import numpy as np
 
 from planners.memory.hallucination.method import DrawObstacles
-from planners.memory.hallucination.placing import (
-    first_obstacles,
-    new_obstacles,
-    obstacle_meets,
-    take_obstacle,
-)
+from planners.memory.hallucination.placing import obstacle_meets
 from planners.memory.plans.fit import free_plans, sweep_is_free
 from planners.memory.plans.sweeps import PlanSweeps
-from planners.world.arrays import Flags, Floats
+from planners.world.arrays import Bounds, Flags, Floats
 from planners.world.geometry.collision import build_scene
 from planners.world.jit import jit
+from planners.world.obstacle_sets import first_obstacles, new_obstacles, take_obstacle
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
 
-DRAWS: Final = 1000  # a class whose obstacles miss a plan this often can never block it
+DRAWS: Final = 1000  # a class whose obstacles miss a plan so often can never block it
 
 
 def no_plan(
@@ -30,11 +26,20 @@ def no_plan(
     rng: np.random.Generator,
     class_name: str,
     index: int,
-    bounds: tuple[float, float, float, float] = BOUNDS,
+    bounds: Bounds = BOUNDS,
 ) -> Problem:
-    """Problem number ``index`` of ``S_0``: a class draw, and of more draws what it takes to block every plan.
+    """Make problem number ``index`` of ``S_0``: a draw of the class, and more obstacles to block every plan.
 
-    Raises RuntimeError when the class's obstacles never block some plan.
+    Args:
+        sweeps: the swept boxes of the stored plans.
+        draw: draws obstacles of the class.
+        rng: the source of all random choices.
+        class_name: of the problem.
+        index: the problem's number, for its id.
+        bounds: x_min, y_min, x_max, y_max in metres.
+
+    Raises:
+        RuntimeError: The obstacles of the class never block some plan.
     """
     obstacles = draw(rng)
     everywhere = np.array(bounds)
@@ -61,7 +66,7 @@ def no_plan(
 def _with_blocking(
     obstacles: Obstacles, extra: Obstacles, sweeps: PlanSweeps, free: Flags, bounds: Floats
 ) -> Obstacles:
-    """``obstacles``, and for each plan that is ``free`` one of ``extra`` that blocks it, if any does."""
+    """Add to ``obstacles``, for each plan that is ``free [N]``, one of ``extra`` that blocks it, if any."""
     scene = build_scene(extra.vertices, extra.piece_starts, bounds)
     extras = extra.obstacle_starts.shape[0] - 1
     taken = np.zeros(extras, np.bool_)

@@ -1,4 +1,4 @@
-"""The paper's method: obstacles near the plan move a little, all others are drawn afresh."""
+"""The paper's method: obstacles near the plan move a little, all others are drawn anew."""
 
 from __future__ import annotations
 
@@ -6,41 +6,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planners.memory.hallucination import placing
 from planners.memory.hallucination.method import DrawObstacles, Sampler
-from planners.memory.hallucination.placing import (
-    Corridor,
-    add_clear,
-    corridor_of,
-    first_obstacles,
-    meets_corridor,
-    moved_obstacle,
-    new_obstacles,
-    obstacles_near,
-    take_obstacle,
-)
 from planners.memory.plans.experience import Experience
 from planners.world.jit import jit
+from planners.world.obstacle_sets import first_obstacles, moved_obstacle, new_obstacles, take_obstacle
 from planners.world.problem import Obstacles
 
 
 @dataclass(frozen=True)
 class Rearrange:
-    """Keep the plan's surroundings, but for a jitter (Das et al., section III-B).
+    """Keep the plan's surroundings apart from a jitter (Das et al., section III-B).
 
-    An obstacle is near when it meets the plan's swept footprints widened by ``near_m`` on every side. The
-    wider that is, the better the origin can be told from the other plans that are free (docs/training.md);
-    what new problems look like an encoder has to learn from draws of the class beside these.
+    An obstacle is near if it meets the plan's swept footprints widened by ``near_m`` on every side. The wider
+    that is, the better an encoder can tell the origin from the other free plans (docs/training.md). What new
+    problems look like it has to learn from draws of the class.
     """
 
     near_m: float = 8.0  # metres
     position_std_m: float = 0.3  # metres, in x and in y
     heading_std_rad: float = 0.05  # radians, about the obstacle's centre
-    attempts: int = 20  # moves tried until one is clear of the plan; then the obstacle stays where it was
+    attempts: int = 20  # moves to try; if none is clear of the plan, the obstacle stays where it was
 
     def around(self, experience: Experience, rng: np.random.Generator) -> Sampler:
-        """Keep the obstacles near the plan."""
-        corridor = corridor_of(experience)
-        near = obstacles_near(experience.problem.obstacles, corridor, self.near_m)
+        """Find the obstacles near the plan."""
+        corridor = placing.corridor_of(experience)
+        near = placing.obstacles_near(experience.problem.obstacles, corridor, self.near_m)
 
         def sample(draw: DrawObstacles, rng: np.random.Generator) -> Obstacles:
             return _rearranged(
@@ -61,15 +52,15 @@ class Rearrange:
 def _rearranged(
     near: Obstacles,
     fresh: Obstacles,
-    corridor: Corridor,
+    corridor: placing.Corridor,
     near_m: float,
     position_std_m: float,
     heading_std_rad: float,
     attempts: int,
     rng: np.random.Generator,
 ) -> Obstacles:
-    # An obstacle that sits in the goal disc is not drawn anew: the class keeps the disc free by itself, but a
-    # folder of worlds need not, and there the disc is only ever made emptier.
+    # An obstacle in the goal disc is never drawn anew: classes keep the disc free, but a folder of worlds may
+    # not, and then the disc only ever gets emptier.
     result = new_obstacles(near, fresh)
     kept = near.obstacle_starts.shape[0] - 1
     for o in range(kept):
@@ -77,8 +68,8 @@ def _rearranged(
             dx = position_std_m * rng.standard_normal()
             dy = position_std_m * rng.standard_normal()
             moved_obstacle(near, o, dx, dy, heading_std_rad * rng.standard_normal(), result, o)
-            if not meets_corridor(result, o, corridor, 0.0):
+            if not placing.meets_corridor(result, o, corridor, 0.0):
                 break
         else:
             take_obstacle(near, o, result, o)
-    return first_obstacles(result, add_clear(fresh, corridor, near_m, result, kept))
+    return first_obstacles(result, placing.add_clear(fresh, corridor, near_m, result, kept))

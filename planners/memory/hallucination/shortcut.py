@@ -1,8 +1,8 @@
-"""The shortest way of a disc among obstacles, by A* on a lattice.
+"""The shortest path of a disc among obstacles, by A* on a lattice.
 
-A lattice point is closed where an obstacle comes nearer than ``inflated_radius``: then no way along open
-points ever touches one, since no point of a step is farther than half a diagonal from an open point. So a
-way that is found is real; a gap that is hardly wider than the disc may go unseen.
+A lattice point is closed if an obstacle is nearer than ``inflated_radius``. No point of a step is farther
+than half a diagonal from an open point, so no path along open points touches an obstacle: every path is real,
+but a gap that is hardly wider than the disc may be missed.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats, Indices
+from planners.world.arrays import Bounds, Floats, Indices, Point
 from planners.world.classes.shapes import distance_to_piece
 from planners.world.jit import inlined, jit
 from planners.world.problem import BOUNDS, Obstacles
 
 Closed = Indices  # [SIDE * SIDE] bit k of a point: closed by obstacle k
 
-STEP_M: Final = 0.5  # between lattice points; start and goal of the canonical frame are such points
+STEP_M: Final = 0.5  # between lattice points; the canonical start and goal are lattice points
 SIDE: Final = 1 + int((BOUNDS[2] - BOUNDS[0]) / STEP_M)
 MOST: Final = 62  # obstacles, one bit each
-OUTSIDE: Final = 62  # the bit of points that are too near to the bounds, or beyond
+OUTSIDE: Final = 62  # the bit of points that are too near to the bounds or outside
 
 
 def _moves() -> Indices:
-    """Steps ``[16, 4]``: columns and rows on, then those of two points that a knight's move passes between.
+    """Steps ``[16, 4]``: columns and rows, and those to one of the points a knight's move passes between.
 
-    Ways of 16 directions are at most 2.7 % longer than straight ones.
+    Paths with 16 directions are at most 2.7 % longer than straight ones.
     """
     moves = []
     for c in range(-2, 3):
@@ -45,25 +45,25 @@ _MOVES: Final = _moves()
 
 
 class LatticePath(NamedTuple):
-    """A shortest way over the lattice."""
+    """A shortest path over the lattice."""
 
-    length_m: float  # infinite where there is none within the limit
+    length_m: float  # infinite if there is no path within the limit
     points: Indices  # lattice points from the goal back to the start
 
 
 def inflated_radius(width_m: float) -> float:
-    """How far a lattice point must be from obstacles for a disc of that width."""
+    """Return how far, in metres, a lattice point must be from obstacles for a disc of this width."""
     return 0.5 * width_m + STEP_M * math.sqrt(0.5)
 
 
 @inlined
-def place(point: int) -> tuple[float, float]:
-    """Where a lattice point is, in metres."""
+def position(point: int) -> Point:
+    """The position of a lattice point in metres."""
     return BOUNDS[0] + STEP_M * (point % SIDE), BOUNDS[1] + STEP_M * (point // SIDE)
 
 
-def lattice(bounds: tuple[float, float, float, float], width_m: float) -> Closed:
-    """All points of the lattice, closed where a disc of that width would leave the bounds."""
+def lattice(bounds: Bounds, width_m: float) -> Closed:
+    """Make a lattice whose points are closed if a disc of this width would leave the bounds there."""
     x, y = BOUNDS[0] + STEP_M * np.arange(SIDE), BOUNDS[1] + STEP_M * np.arange(SIDE)
     half = 0.5 * width_m
     inside_x = (x >= bounds[0] + half) & (x <= bounds[2] - half)
@@ -74,7 +74,7 @@ def lattice(bounds: tuple[float, float, float, float], width_m: float) -> Closed
 
 @jit
 def close_around(obstacles: Obstacles, o: int, radius: float, bit: int, closed: Closed) -> None:
-    """Set bit number ``bit`` of the lattice points nearer than ``radius`` to obstacle ``o``."""
+    """Set bit number ``bit`` of the lattice points nearer than ``radius`` (metres) to obstacle ``o``."""
     for p in range(obstacles.obstacle_starts[o], obstacles.obstacle_starts[o + 1]):
         first = obstacles.piece_starts[p]
         last = obstacles.piece_starts[p + 1]
@@ -87,26 +87,24 @@ def close_around(obstacles: Obstacles, o: int, radius: float, bit: int, closed: 
         for row in range(row_0, row_1 + 1):
             for column in range(column_0, column_1 + 1):
                 point = row * SIDE + column
-                px, py = place(point)
+                px, py = position(point)
                 if distance_to_piece(obstacles.vertices, first, last, px, py) < radius:
                     closed[point] |= np.int64(1) << np.int64(bit)
 
 
-def ways_left(goal: tuple[float, float], goal_radius: float) -> Floats:
-    """Straight way in metres from each lattice point to the goal disc, ``[SIDE * SIDE]``."""
+def distances_left(goal: Point, goal_radius: float) -> Floats:
+    """Return the distance ``[SIDE * SIDE]`` in metres from each lattice point to the goal disc."""
     x, y = BOUNDS[0] + STEP_M * np.arange(SIDE), BOUNDS[1] + STEP_M * np.arange(SIDE)
     left = np.hypot(goal[0] - x, (goal[1] - y)[:, np.newaxis]) - goal_radius
-    ways: Floats = np.maximum(left, 0.0).ravel()
-    return ways
+    distances: Floats = np.maximum(left, 0.0).ravel()
+    return distances
 
 
 @jit
-def shortest_way(
-    closed: Closed, ignored: int, start: tuple[float, float], left: Floats, limit_m: float
-) -> LatticePath:
-    """The shortest way from the point next to ``start`` into the goal disc, if below ``limit_m``.
+def shortest_path(closed: Closed, ignored: int, start: Point, left: Floats, limit_m: float) -> LatticePath:
+    """Find the shortest path from the point nearest to ``start`` into the goal disc, if below ``limit_m``.
 
-    Obstacles whose bits are set in ``ignored`` are not there. ``left`` is what ``ways_left`` gives.
+    Obstacles whose bits are set in ``ignored`` do not count. ``left`` comes from ``distances_left``.
     """
     begin = round((start[1] - BOUNDS[1]) / STEP_M) * SIDE + round((start[0] - BOUNDS[0]) / STEP_M)
     came_from = np.full(SIDE * SIDE, -1, np.int64)

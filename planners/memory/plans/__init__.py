@@ -1,1 +1,1 @@
-"""Stored plans: their sweeps, their cells, and whether they are free in a problem."""
+"""Stored plans: their sweeps, their cells, and whether they fit a problem."""

@@ -1,7 +1,7 @@
-"""The cells that a plan sweeps, one bit each: ranking by counting bits, and proof that a plan is free.
+"""The cells that a plan sweeps, one bit each. Counting bits ranks plans, and may prove that a plan is free.
 
-A cell is set where any swept box of the plan meets it, as a cell of the occupancy grid is set where any
-obstacle meets it. Where the two share no cell, the plan is free: no check is needed.
+A cell is set if a swept box of the plan meets it, as a cell of the occupancy grid is set if an obstacle meets
+it. If the two share no cell, the plan is free without a check.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
 from planners.world.workspace import Workspace
 
-ROUNDING_M = 1e-6  # boxes are drawn that much larger, so that rounding never loses a cell
-MOST_CELLS = 511  # a plan sweeps some 200: beyond this, one is as blocked as another
+ROUNDING_M = 1e-6  # boxes are drawn larger by this, so that rounding never loses a cell
+MOST_CELLS = 511  # a plan sweeps some 200; with more blocked cells plans count as equally blocked
 _PAIRS = np.uint64(0x5555555555555555)
 _NIBBLES = np.uint64(0x3333333333333333)
 _BYTES = np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -52,10 +52,9 @@ def _draw_sweeps(sweeps: PlanSweeps, corners: Floats, words: Bits, spans: Floats
 
 
 def masks_of(sweeps: PlanSweeps) -> Bits:
-    """The swept cells ``[N, 64]`` of N plans, as bits (``planners.world.geometry.occupancy``).
+    """Draw the swept cells ``[N, 64]`` of N plans as bits (``planners.world.geometry.occupancy``).
 
-    A plan that leaves the window of the grid, where nothing is drawn, has all cells set: nothing is proved
-    of it.
+    A plan that leaves the window of the grid gets all cells set, so that they prove nothing about it.
     """
     masks = np.empty((len(sweeps.starts) - 1, GRID), np.uint64)
     _draw_sweeps(sweeps, np.empty((4, 2)), np.empty(GRID, np.uint64), np.empty((2, GRID)), masks)
@@ -64,7 +63,7 @@ def masks_of(sweeps: PlanSweeps) -> Bits:
 
 @inlined
 def count_bits(word: np.uint64) -> np.uint64:
-    """How many bits are set; LLVM knows the idiom, and counts eight words an instruction."""
+    """Count the bits that are set. LLVM knows this idiom and counts the bits of eight words at a time."""
     one = np.uint64(1)
     word = word - ((word >> one) & _PAIRS)
     word = (word & _NIBBLES) + ((word >> np.uint64(2)) & _NIBBLES)
@@ -76,35 +75,35 @@ class Ranking(NamedTuple):
     """N plans by the number of their swept cells that are not free."""
 
     cells: Integers  # [N] blocked cells of each plan, at most MOST_CELLS
-    order: Integers  # [N] the plans, the least blocked first; equal ones in order of storing
-    places: Integers  # [MOST_CELLS + 2] where plans with that many blocked cells begin: scratch
+    order: Integers  # [N] the plans, the least blocked first; equal ones in the order of the memory
+    ends: Integers  # [MOST_CELLS + 2] how many plans have at most so many blocked cells
 
 
 def allocate_ranking(count: int) -> Ranking:
-    """Buffers for that many plans."""
+    """Buffers for ``count`` plans."""
     return Ranking(np.empty(count, np.int32), np.empty(count, np.int32), np.empty(MOST_CELLS + 2, np.int32))
 
 
 @lean
 def _rank(masks: Bits, occupied: Bits, ranking: Ranking) -> None:
     cells = ranking.cells
-    places = ranking.places
-    places.fill(0)
+    ends = ranking.ends
+    ends.fill(0)
     for i in range(masks.shape[0]):
         count = np.uint64(0)
         for row in range(GRID):
             count += count_bits(masks[i, row] & occupied[row])
-        blocked = min(int(np.int64(count)), MOST_CELLS)  # an unsigned one would make floats
-        if masks[i, 0] == ALL_CELLS:  # it leaves the window
+        blocked = min(int(np.int64(count)), MOST_CELLS)  # with an unsigned number Numba would make floats
+        if masks[i, 0] == ALL_CELLS:  # the plan leaves the window
             blocked = MOST_CELLS
         cells[i] = blocked
-        places[blocked + 1] += 1
+        ends[blocked + 1] += 1
     for blocked in range(MOST_CELLS + 1):
-        places[blocked + 1] += places[blocked]
+        ends[blocked + 1] += ends[blocked]
     for i in range(masks.shape[0]):
         blocked = cells[i]
-        ranking.order[places[blocked]] = i
-        places[blocked] += 1
+        ranking.order[ends[blocked]] = i
+        ends[blocked] += 1
 
 
 def rank_by_cells(masks: Bits, occupied: Bits, workspace: Workspace | None = None) -> Ranking:
@@ -114,7 +113,6 @@ def rank_by_cells(masks: Bits, occupied: Bits, workspace: Workspace | None = Non
         masks: ``[N, 64]`` the cells that each plan sweeps.
         occupied: ``[64]`` the cells that are not free.
         workspace: the caller's buffers, which the next ranking of N plans overwrites; by default new ones.
-
     """
     ranking = (workspace or Workspace()).buffers(allocate_ranking, len(masks))
     _rank(masks, occupied, ranking)

@@ -1,4 +1,4 @@
-"""What is kept of a solved problem."""
+"""A solved problem as it is kept."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 
 @dataclass(frozen=True, eq=False)
 class Experience:
-    """One solved problem: the pair ``(S_i, P_i)`` of docs/method.md, in the canonical frame."""
+    """A solved problem and its plan in the canonical frame: the pair ``(S_i, P_i)`` of docs/method.md."""
 
     problem: Problem
     plan: Plan
@@ -28,5 +28,5 @@ class Experience:
 
     @functools.cached_property
     def sweep(self) -> PlanSweeps:
-        """The plan, ready to be checked against many problems."""
+        """The plan ready to be checked in many problems."""
         return sweep_plans([self.plan], self.vehicle)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.memory.plans.sweeps import PlanSweeps
-from planners.world.arrays import Flags, Floats, Integers
+from planners.world.arrays import Bounds, Flags, Floats, Integers, Point, Pose
 from planners.world.geometry.collision import (
     REACH_M,
     Scene,
@@ -32,13 +32,13 @@ SHARE = 4  # ``least_blocked`` tries one box in so many; coarse steps come first
 class Ends(NamedTuple):
     """Where plans for a problem begin and end."""
 
-    start: tuple[float, float, float]  # x, y in metres, heading in radians
-    goal: tuple[float, float]  # metres
+    start: Pose
+    goal: Point
     goal_radius: float  # metres
 
 
 def ends_of(problem: Problem) -> Ends:
-    """Start and goal of a problem."""
+    """Return the ends of a problem."""
     return Ends(problem.start, problem.goal, problem.goal_radius)
 
 
@@ -71,9 +71,7 @@ def turn_to_start(sweeps: PlanSweeps, i: int, ends: Ends) -> tuple[bool, float, 
 
 
 @inlined
-def _turned_point(
-    sweeps: PlanSweeps, i: int, x: float, y: float, cos: float, sin: float
-) -> tuple[float, float]:
+def _turned_point(sweeps: PlanSweeps, i: int, x: float, y: float, cos: float, sin: float) -> Point:
     """Where a point (x, y) of plan ``i`` lies after the plan's turn."""
     if sin == 0.0:
         return x, y
@@ -98,7 +96,7 @@ def _turned_box_is_free(sweeps: PlanSweeps, i: int, j: int, cos: float, sin: flo
     box_sin = boxes[j, 3]
     if sin != 0.0:
         box_cos, box_sin = cos * box_cos - sin * box_sin, sin * box_cos + cos * box_sin
-    return box_is_free(x, y, box_cos, box_sin, boxes[j, 4], boxes[j, 5], scene)
+    return box_is_free((x, y, box_cos, box_sin, boxes[j, 4], boxes[j, 5]), scene)
 
 
 @inlined
@@ -169,7 +167,7 @@ def least_blocked(order: Integers, sweeps: PlanSweeps, ends: Ends, scene: Scene)
 
 
 @inlined
-def _inside(boxes: Floats, first: int, last: int, bounds: tuple[float, float, float, float]) -> bool:
+def _inside(boxes: Floats, first: int, last: int, bounds: Bounds) -> bool:
     for j in range(first, last):
         cos = abs(boxes[j, 2])
         sin = abs(boxes[j, 3])
@@ -204,7 +202,8 @@ def _piece_meets(
         if checks == 0:
             make_edges(vertices, first, last, edges, 0)
         checks += 1
-        if box_meets_piece(x, y, boxes[j, 2], boxes[j, 3], boxes[j, 4], boxes[j, 5], 0, last - first, edges):
+        box = (x, y, boxes[j, 2], boxes[j, 3], boxes[j, 4], boxes[j, 5])
+        if box_meets_piece(box, 0, last - first, edges):
             return True, checks
     return False, checks
 
@@ -218,7 +217,7 @@ def _first_fitting_drawn(
     vertices: Floats,
     piece_starts: Integers,
     edges: Floats,
-    bounds: tuple[float, float, float, float],
+    bounds: Bounds,
     ends: Ends,
 ) -> tuple[int, int]:
     narrow = bounds[0] > BOUNDS[0] or bounds[1] > BOUNDS[1] or bounds[2] < BOUNDS[2] or bounds[3] < BOUNDS[3]
@@ -264,7 +263,6 @@ def first_fitting_drawn(
 
     Returns:
         The plan, -1 if none fits, and how many times a box was tried on an obstacle.
-
     """
     vertices, piece_starts, _ = problem.obstacles
     edges = np.empty((len(vertices), 5))

@@ -1,4 +1,4 @@
-"""Many plans end to end in a few flat arrays, which may lie on disk; each is made when it is asked for."""
+"""Many plans end to end in a few flat arrays, which may lie on disk."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from planners.world.problem import Plan
 
 @dataclass(frozen=True, eq=False)
 class StoredPlans(Sequence[Plan]):
-    """A sequence of N plans. A plan is a view of these arrays: nothing is copied, nor read before it is used.
+    """A sequence of N plans, each a view of the arrays, so that nothing is copied or read before it is used.
 
-    Raises ValueError where the arrays do not fit each other.
+    Raises ValueError if the arrays do not fit together.
     """
 
     states: Floats  # [T_0 + ... + T_{N-1}, S] of all plans, one after another
@@ -54,13 +54,13 @@ class StoredPlans(Sequence[Plan]):
                 starts - starts[0],
                 self.dt[first:last],
             )
-        i = range(len(self))[index]  # counts from the end, and refuses what is beyond
+        i = range(len(self))[index]  # resolves negative numbers, and raises IndexError beyond the ends
         first, last = int(self.starts[i]), int(self.starts[i + 1])
         return Plan(self.states[first:last], self.controls[first - i : last - i - 1], float(self.dt[i]))
 
 
 def store_plans(plans: Iterable[Plan], state_size: int) -> StoredPlans:
-    """Copy plans of ``state_size`` numbers a state into flat arrays."""
+    """Copy plans with ``state_size`` numbers a state into flat arrays."""
     if isinstance(plans, StoredPlans):
         return plans
     listed = list(plans)

@@ -1,7 +1,7 @@
-"""Which stored plans are free in a problem: exact, and stopped at a plan's first collision.
+"""The swept boxes of stored plans.
 
-A plan's inflated footprints do not depend on the problem, so they are made once (``PlanSweeps``); a check
-only moves through them. They are exactly the boxes that ``collision.state_is_free`` tests.
+A plan's inflated footprints do not depend on the problem, so they are made once. They are exactly the boxes
+that ``collision.state_is_free`` tests.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from planners.world.vehicles.bodies import body_count
 from planners.world.vehicles.dynamics import load, swept_bodies
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
-COARSEST_STRIDE = 64  # first states visited are 64 steps apart: some 20 m of driving
+COARSEST_STRIDE = 64  # steps between the states that are checked first: some 20 m of driving
 
 
 class PlanSweeps(NamedTuple):
@@ -33,7 +33,7 @@ class PlanSweeps(NamedTuple):
 
 @jit
 def coarse_to_fine(count: int) -> Integers:
-    """A permutation of ``0 .. count - 1``: every 64th first, then those half way between, and so on.
+    """Order ``0 .. count - 1``: every 64th first, then those half-way between, and so on.
 
     Neighbouring states collide together, so states far apart find a collision sooner.
     """
@@ -63,7 +63,7 @@ def _fill_sweeps(states: Floats, starts: Indices, vehicle: Vehicle, boxes: Float
 
 
 def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
-    """Pack the swept boxes of ``plans``."""
+    """Make the swept boxes of plans."""
     stored = store_plans(plans, state_size(vehicle))
     boxes = np.empty((body_count(vehicle) * len(stored.states), 6))
     _fill_sweeps(stored.states, stored.starts, vehicle, boxes)
@@ -71,10 +71,13 @@ def sweep_plans(plans: Sequence[Plan], vehicle: Vehicle = CAR) -> PlanSweeps:
 
 
 def sweeps_with(boxes: Floats, plans: StoredPlans) -> PlanSweeps:
-    """The sweeps of ``plans`` whose boxes were made before; ValueError where there are too few or many."""
+    """Make the sweeps of plans from boxes ``[S, 6]`` that were made before.
+
+    Raises ValueError if there are too few or too many boxes.
+    """
     bodies, rest = divmod(len(boxes), max(1, len(plans.states)))
     if rest or (len(boxes) > 0) != (bodies > 0):
-        raise ValueError(f"{len(boxes)} swept boxes are none of {len(plans.states)} states")
+        raise ValueError(f"{len(boxes)} swept boxes do not belong to {len(plans.states)} states")
     first, last = plans.states[plans.starts[:-1]], plans.states[plans.starts[1:] - 1]
     starts = (bodies * plans.starts).astype(np.int32)
     return PlanSweeps(boxes, starts, first[:, :3].copy(), last[:, :2].copy())

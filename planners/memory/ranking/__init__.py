@@ -1,1 +1,1 @@
-"""How stored plans are scored for an embedding, and the best of them found."""
+"""How stored plans are scored for an embedding, and how the best ones are found."""

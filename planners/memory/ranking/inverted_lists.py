@@ -1,8 +1,8 @@
-"""Inverted lists over the readout: the plans that score best for an embedding, without scoring them all.
+"""Inverted lists over the readout: they find the plans that score best without scoring all of them.
 
-Rows ``(w, b)`` that are near each other stand in one list; of a problem only the lists whose centres score
-best are looked through (Sivic and Zisserman 2003; Jegou, Douze and Schmid 2011, IVF). Approximate: a plan in
-another list may score better. docs/growth.md says where that pays, and what libraries do for the same.
+Rows ``(w, b)`` that are near each other stand in one list, and only the lists whose centres score best for an
+embedding are searched (Sivic and Zisserman 2003; Jegou, Douze and Schmid 2011, IVF). This is approximate: a
+plan in another list may score better. docs/growth.md says when it pays, and compares libraries.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from planners.world.arrays import Floats32, Indices, Integers
 from planners.world.jit import inlined, lean
 from planners.world.randomness import generator
 
-FROM_PLANS: Final = 20_000  # with fewer, scoring them all is as fast
-PROBES: Final = 32  # lists looked through: hit rates are within 1 % of those of scoring all
-ROUNDS: Final = 10  # of k-means; lists need not be the best ones
-SAMPLE: Final = 64  # rows a list that k-means looks at
-_BLOCK: Final = 4096  # rows whose lists are found at once
+FROM_PLANS: Final = 20_000  # with fewer plans, scoring all is as fast
+PROBES: Final = 32  # lists searched: hit rates are within 1 % of those of scoring all plans
+ROUNDS: Final = 10  # of k-means; the lists need not be optimal
+SAMPLE: Final = 64  # rows for each list that k-means uses
+_BLOCK: Final = 4096  # rows that are assigned to lists at once
 
 
 class InvertedLists(NamedTuple):
@@ -28,14 +28,17 @@ class InvertedLists(NamedTuple):
 
     centres: Floats32  # [L, D + 1] mean row of each list
     starts: Integers  # [L + 1] list l owns rows[starts[l] : starts[l + 1]]
-    plans: Integers  # [N] whose row each is
+    plans: Integers  # [N] the plan that each row belongs to
     rows: Floats32  # [N, D + 1] vector and bias
 
 
 def list_readout(vectors: Floats32, biases: Floats32) -> InvertedLists:
-    """Lists of a readout, ``vectors [N + 1, D]`` and ``biases [N + 1]``; the same readout gives the same."""
+    """Make the lists of a readout, ``vectors [N + 1, D]`` and ``biases [N + 1]``, by k-means.
+
+    The same readout always gives the same lists.
+    """
     rows = _rows(vectors, biases)
-    count = min(len(rows), int(4 * np.sqrt(len(rows))))  # so that centres cost about what their lists cost
+    count = min(len(rows), int(4 * np.sqrt(len(rows))))  # scoring centres then costs as much as their lists
     rng = generator(0, "inverted-lists")
     sample = rows[np.sort(rng.choice(len(rows), min(len(rows), SAMPLE * count), replace=False))]
     centres = sample[rng.choice(len(sample), count, replace=False)]
@@ -55,7 +58,7 @@ def list_readout(vectors: Floats32, biases: Floats32) -> InvertedLists:
 def lists_with(
     centres: Floats32, starts: Integers, plans: Integers, vectors: Floats32, biases: Floats32
 ) -> InvertedLists:
-    """Lists that were made before, of the same readout; ValueError where they do not fit it."""
+    """Make lists of a readout from parts that were made before. Raises ValueError if they do not fit it."""
     rows = _rows(vectors, biases)
     fitting = (
         [each.dtype.str for each in (centres, starts, plans)] == ["<f4", "<i4", "<i4"]
@@ -66,7 +69,7 @@ def lists_with(
         and bool((np.diff(starts) >= 0).all())
     )
     if not fitting:
-        raise ValueError(f"inverted lists are none of {len(rows)} plans")
+        raise ValueError(f"inverted lists do not belong to {len(rows)} plans")
     return InvertedLists(centres, starts, plans, rows[plans])
 
 
@@ -75,7 +78,7 @@ def _rows(vectors: Floats32, biases: Floats32) -> Floats32:
 
 
 def _nearest(rows: Floats32, centres: Floats32) -> Indices:
-    """The centre ``[n]`` nearest to each row."""
+    """The number ``[n]`` of the centre nearest to each row."""
     halves = 0.5 * np.square(centres).sum(1)
     blocks = [rows[i : i + _BLOCK] @ centres.T - halves for i in range(0, len(rows), _BLOCK)]
     return np.concatenate([np.argmax(block, axis=1) for block in blocks])
@@ -101,16 +104,19 @@ def _search(
     probes = 0
     for i in range(lists.centres.shape[0]):
         probes = insert(i, _score(lists.centres[i], embedding), probes, probed, list_scores)
-    found = 0
+    count = 0
     for i in range(probes):
         for r in range(lists.starts[probed[i]], lists.starts[probed[i] + 1]):
-            found = insert(lists.plans[r], _score(lists.rows[r], embedding), found, best, scores)
-    return found
+            count = insert(lists.plans[r], _score(lists.rows[r], embedding), count, best, scores)
+    return count
 
 
 def best_listed(lists: InvertedLists, embedding: Floats32, k: int, probes: int = PROBES) -> Integers:
-    """(Nearly) the ``k`` plans that score best for an embedding ``[D]``, best first; fewer in small lists."""
+    """Find (nearly) the ``k`` plans that score best for an embedding ``[D]``, best first.
+
+    There are fewer if the searched lists hold fewer.
+    """
     best, scores = np.empty(k, np.int32), np.empty(k, np.float32)
     probes = min(probes, len(lists.centres))
-    found = _search(lists, embedding, np.empty(probes, np.int32), np.empty(probes, np.float32), best, scores)
-    return best[:found]
+    count = _search(lists, embedding, np.empty(probes, np.int32), np.empty(probes, np.float32), best, scores)
+    return best[:count]

@@ -1,1 +1,1 @@
-"""Ways to follow, and how a planner samples along them."""
+"""Paths that guide a search, and how planners sample along them."""

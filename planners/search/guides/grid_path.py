@@ -1,7 +1,7 @@
-"""A fresh guide: the shortest way over the occupancy grid, found breadth first, 64 cells an operation.
+"""The shortest path over the occupancy grid, by breadth-first search on 64 cells at a time.
 
-A cell counts as free when its whole 1 m square is, so a way between centres of free cells keeps half a metre
-clear: a little more than half the car's width. It knows nothing of how a vehicle moves.
+A cell is free if its whole 1 m square is. So a path between the centres of free cells keeps half a metre of
+clearance, a little more than half the car's width. It ignores how a vehicle moves.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Point
 from planners.world.geometry.occupancy import CELL, GRID, Bits
 from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
@@ -26,10 +26,10 @@ _NONE: Final = np.uint64(0)
 class Flood(NamedTuple):
     """Buffers of the search: rows of cells as bits, with an empty row below and one above."""
 
-    waves: Bits  # [GRID^2, GRID + 2] the cells that are so many steps from the goal disc
+    waves: Bits  # [GRID^2, GRID + 2] wave i: the cells that are i steps from the goal disc
     free: Bits  # [GRID + 2] free cells
-    fresh: Bits  # [GRID + 2] those of them that no wave has reached
-    way: Floats  # [GRID^2, 2] metres
+    fresh: Bits  # [GRID + 2] free cells that no wave has reached yet
+    path: Floats  # [GRID^2, 2] metres
 
 
 def allocate_flood() -> Flood:
@@ -45,7 +45,7 @@ def allocate_flood() -> Flood:
 
 @inlined
 def _is_set(rows: Bits, column: int, row: int) -> bool:
-    """Whether the bit of a cell is set in ``rows [GRID + 2]``; outside of the grid none is."""
+    """Whether the bit of a cell is set in ``rows [GRID + 2]``. Outside the grid none is."""
     if column < 0 or column >= GRID:
         return False
     return bool((rows[row + 1] >> np.uint64(column)) & _ONE)
@@ -67,13 +67,13 @@ def _first_wave(goal_x: float, goal_y: float, radius: float, free: Bits, wave: B
 
 @lean
 def _next_wave(last: Bits, free: Bits, fresh: Bits, wave: Bits) -> bool:
-    """Fill in the fresh cells one step from those of the last wave; whether there are any."""
+    """Fill in the fresh cells one step from the last wave. Returns whether there are any."""
     reached = _NONE
     for r in range(1, GRID + 1):
         here = last[r]
         below = last[r - 1]
         above = last[r + 1]
-        # a diagonal step needs both cells beside it free: one in this row, one in the row it comes from
+        # a diagonal step needs the cells on both sides free: one in this row, one in the row it comes from
         from_below = below & free[r]
         from_above = above & free[r]
         spread = here << _ONE | here >> _ONE | below | above
@@ -90,10 +90,10 @@ def _next_wave(last: Bits, free: Bits, fresh: Bits, wave: Bits) -> bool:
 def flood_from_goal(
     occupied: Bits, start_x: float, start_y: float, goal_x: float, goal_y: float, radius: float, flood: Flood
 ) -> int:
-    """Fill ``flood.way`` with centres of free cells from start to goal disc; how many, 0: none.
+    """Fill ``flood.path`` with the centres of free cells from the start to the goal disc.
 
-    Neighbours are the eight around a cell; a diagonal step needs both cells beside it free. Where an obstacle
-    touches the start's cell, the way begins beside it.
+    A cell has eight neighbours; a diagonal step needs the cells on both sides free. If an obstacle touches
+    the start's cell, the path begins beside it. Returns the number of cells, 0 if there is no path.
     """
     waves = flood.waves
     free = flood.free
@@ -105,25 +105,25 @@ def flood_from_goal(
     column = int((start_x - _LEFT) // CELL)
     row = int((start_y - _BOTTOM) // CELL)
     inside = 0 <= row < GRID and 0 <= column < GRID
-    apart = 0 if inside and _is_set(free, column, row) else 1  # cells from the start's at which it may begin
+    apart = 0 if inside and _is_set(free, column, row) else 1  # cells from the start's where it may begin
     wave = 0
     while True:
         for r in range(max(row - apart, 0), min(row + apart, GRID - 1) + 1):
             for c in range(column - apart, column + apart + 1):
                 if _is_set(waves[wave], c, r):
-                    return _trace(waves, free, wave, c, r, flood.way)
+                    return _trace(waves, free, wave, c, r, flood.path)
         if not _next_wave(waves[wave], free, flood.fresh, waves[wave + 1]):
             return 0
         wave += 1
 
 
 @lean
-def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, way: Floats) -> int:
-    """Fill in the way from a cell of a wave down to the first one; straight steps before diagonal ones."""
+def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, path: Floats) -> int:
+    """Fill in the path from a cell of a wave down to the first wave, straight steps before diagonal ones."""
     filled = 0
     while True:
-        way[filled, 0] = _LEFT + (column + 0.5) * CELL
-        way[filled, 1] = _BOTTOM + (row + 0.5) * CELL
+        path[filled, 0] = _LEFT + (column + 0.5) * CELL
+        path[filled, 1] = _BOTTOM + (row + 0.5) * CELL
         filled += 1
         if wave == 0:
             return filled
@@ -138,11 +138,7 @@ def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, way: Float
 
 
 def grid_path(
-    occupied: Bits,
-    start: tuple[float, float],
-    goal: tuple[float, float],
-    radius: float,
-    workspace: Workspace | None = None,
+    occupied: Bits, start: Point, goal: Point, radius: float, workspace: Workspace | None = None
 ) -> Floats | None:
     """Find the shortest path over a problem's free cells from a point to a disc.
 
@@ -155,8 +151,7 @@ def grid_path(
 
     Returns:
         The centres ``[M, 2]`` of the cells along the path, in metres; None if there is no path.
-
     """
     flood = (workspace or Workspace()).buffers(allocate_flood)
     count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, flood)
-    return flood.way[:count].copy() if count else None
+    return flood.path[:count].copy() if count else None

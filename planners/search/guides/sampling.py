@@ -1,4 +1,4 @@
-"""Where a planner's samples come from: anywhere, a disc, or along a guiding way."""
+"""Where planners sample: anywhere, in a disc, or along a guiding path."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def uniform(rng: BitGenerator) -> float:
 
 @inlined
 def in_disc(x: float, y: float, radius: float, rng: BitGenerator) -> tuple[float, float]:
-    """A uniform point of the disc around (x, y), metres."""
+    """A uniform point of a disc around (x, y), in metres."""
     angle = 2.0 * math.pi * uniform(rng)
     r = radius * math.sqrt(uniform(rng))
     return x + r * math.cos(angle), y + r * math.sin(angle)
@@ -33,7 +33,7 @@ def in_disc(x: float, y: float, radius: float, rng: BitGenerator) -> tuple[float
 
 @inlined
 def in_bounds(bounds: Floats, rng: BitGenerator) -> tuple[float, float]:
-    """A uniform point of the bounds ``[4]``, metres."""
+    """A uniform point of the bounds ``[4]``, in metres."""
     return (
         bounds[0] + (bounds[2] - bounds[0]) * uniform(rng),
         bounds[1] + (bounds[3] - bounds[1]) * uniform(rng),
@@ -42,20 +42,15 @@ def in_bounds(bounds: Floats, rng: BitGenerator) -> tuple[float, float]:
 
 @lean
 def guided(
-    guide: Guide,
-    goal: Floats,
-    bounds: Floats,
-    near_m: float,
-    far_m: float,
-    lead: int,
-    rng: BitGenerator,
+    guide: Guide, goal: Floats, bounds: Floats, near_m: float, far_m: float, lead: int, rng: BitGenerator
 ) -> tuple[float, float, float, float]:
-    """From where to extend, x, y, and where to, x, y: along way i of the guide with probability b_i.
+    """Draw where to extend from and where to, x and y each: along path i of the guide with probability b_i.
 
-    From around a uniformly drawn point of the way, radius U(near_m, far_m), to around one of the ``lead``
-    points after it. With b_goal the target lies in the goal disc, else anywhere in the bounds; then what is
-    nearest to the target is extended. (The paper, III-D, draws targets near a plan as it does anywhere. That
-    says where to be, but not which way to go on from there, and is slower than no guide: docs/planners.md.)
+    The first point lies around a uniformly drawn point of the path, within a radius U(near_m, far_m), the
+    second around one of the ``lead`` points after it. With probability b_goal the target lies in the goal
+    disc, else anywhere in the bounds, and what is nearest to the target is extended. (The paper, III-D, only
+    draws targets near a plan. That says where to be, but not in which direction to go on, and is slower than
+    no guide: docs/planners.md.)
     """
     draw = uniform(rng)
     for i in range(guide.probabilities.shape[0]):

@@ -1,1 +1,1 @@
-"""What planners build while they search: trees, roadmaps, nearest neighbours."""
+"""What planners build while they search: trees, roadmaps, nearest neighbours, controls."""

@@ -1,4 +1,4 @@
-"""Room around places and along straight ways."""
+"""Clearance around points and along straight lines."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from planners.world.geometry.collision import NORMAL_X, NORMAL_Y, OFFSET, REACH_M, Scene, X, Y, box_is_free
 from planners.world.jit import lean
-from planners.world.trigonometry import length
+from planners.world.trigonometry import gap_to_segment, length
 
 
 @lean
@@ -17,7 +17,7 @@ def clearance(x: float, y: float, limit: float, scene: Scene) -> float:
     edges = scene.edges
     starts = scene.piece_starts
     for p in range(starts.shape[0] - 1):
-        outside = -math.inf  # the largest edge distance is a lower bound of the distance to the piece
+        outside = -math.inf  # the largest distance to an edge's line: at most the distance to the piece
         edge = starts[p]
         for i in range(starts[p], starts[p + 1]):
             gap = edges[i, NORMAL_X] * x + edges[i, NORMAL_Y] * y - edges[i, OFFSET]
@@ -30,14 +30,10 @@ def clearance(x: float, y: float, limit: float, scene: Scene) -> float:
             continue
         if outside <= 0.0:
             return 0.0
-        # beyond an end of that edge a corner is nearer still: measure to the edge itself
+        # beyond an end of that edge its corner is nearest: measure the distance to the edge itself
         other = edge + 1 if edge + 1 < starts[p + 1] else starts[p]
-        ex = edges[other, X] - edges[edge, X]
-        ey = edges[other, Y] - edges[edge, Y]
-        dx = x - edges[edge, X]
-        dy = y - edges[edge, Y]
-        share = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-        best = min(best, length(dx - share * ex, dy - share * ey))
+        gap_x, gap_y = gap_to_segment(x, y, edges[edge, X], edges[edge, Y], edges[other, X], edges[other, Y])
+        best = min(best, length(gap_x, gap_y))
     return float(max(best, 0.0))
 
 
@@ -45,17 +41,18 @@ def clearance(x: float, y: float, limit: float, scene: Scene) -> float:
 def strip_is_free(
     ax: float, ay: float, bx: float, by: float, half_width: float, scene: Scene
 ) -> tuple[bool, int]:
-    """Whether a strip from a to b is free, and how many boxes, short enough for the scene, were checked."""
-    way = length(bx - ax, by - ay)
-    if way == 0.0:
+    """Whether a strip from a to b is free, and how many boxes were checked, each short enough for a scene."""
+    metres = length(bx - ax, by - ay)
+    if metres == 0.0:
         return True, 0
-    cos = (bx - ax) / way
-    sin = (by - ay) / way
+    cos = (bx - ax) / metres
+    sin = (by - ay) / metres
     longest = 1.9 * math.sqrt(REACH_M * REACH_M - half_width * half_width)
-    pieces = math.ceil(way / longest)
-    half = 0.5 * way / pieces
+    pieces = math.ceil(metres / longest)
+    half = 0.5 * metres / pieces
     for i in range(pieces):
         along = (2 * i + 1) * half
-        if not box_is_free(ax + along * cos, ay + along * sin, cos, sin, half, half_width, scene):
+        box = (ax + along * cos, ay + along * sin, cos, sin, half, half_width)
+        if not box_is_free(box, scene):
             return False, i + 1
     return True, pieces

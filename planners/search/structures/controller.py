@@ -1,4 +1,4 @@
-"""The controller that drives a vehicle towards a point: one PID controller each for turning and for speed."""
+"""The controller that drives a vehicle towards a point: one PID controller each for heading and for speed."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from planners.world.jit import inlined
 from planners.world.vehicles.dynamics import State, control_limits, turn_error
 from planners.world.vehicles.vehicle import Vehicle
 
-Errors = tuple[
-    float, float, float, float
-]  # of turn (rad) and speed (m/s) a step ago, and their sums over time
+Errors = tuple[float, float, float, float]  # of heading (rad) and speed (m/s) a step ago; their integrals
 NO_ERRORS = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -24,35 +22,28 @@ class Gains(NamedTuple):
 
 @inlined
 def _pid(error: float, last: float, total: float, gains: Gains, dt: float, limit: float) -> float:
-    """The control for an error, within plus and minus ``limit``."""
+    """The control for an error, between ``-limit`` and ``limit``."""
     control = gains.proportional * error + gains.integral * total + gains.derivative * (error - last) / dt
     return min(max(control, -limit), limit)
 
 
 @inlined
 def steer(
-    state: State,
-    x: float,
-    y: float,
-    speed: float,
-    errors: Errors,
-    begins: bool,
-    gains: Gains,
-    vehicle: Vehicle,
+    state: State, x: float, y: float, speed: float, last: Errors, first: bool, gains: Gains, vehicle: Vehicle
 ) -> tuple[float, float, Errors]:
     """The controls that drive towards (x, y) at ``speed`` (m/s), and the errors for the next step.
 
-    ``begins`` says that this is the first step, so that no error a step ago is known.
+    In the ``first`` step there are no errors of a step ago.
     """
     limit_1, limit_2 = control_limits(vehicle)
-    last_turn, last_lack, turn_sum, lack_sum = errors
+    last_turn, last_slow, turn_sum, slow_sum = last
     turn = turn_error(state, x, y, vehicle)
-    lack = speed - state[3]
-    if begins:
+    slow = speed - state[3]
+    if first:
         last_turn = turn
-        last_lack = lack
+        last_slow = slow
     turn_sum += turn * vehicle.dt
-    lack_sum += lack * vehicle.dt
-    control_1 = _pid(lack, last_lack, lack_sum, gains, vehicle.dt, limit_1)
+    slow_sum += slow * vehicle.dt
+    control_1 = _pid(slow, last_slow, slow_sum, gains, vehicle.dt, limit_1)
     control_2 = _pid(turn, last_turn, turn_sum, gains, vehicle.dt, limit_2)
-    return control_1, control_2, (turn, lack, turn_sum, lack_sum)
+    return control_1, control_2, (turn, slow, turn_sum, slow_sum)

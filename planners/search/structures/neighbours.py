@@ -1,7 +1,7 @@
-"""Nearest neighbour in the plane by buckets, looking at a bounded number of points in each.
+"""Nearest neighbours in the plane by buckets that remember only their newest points.
 
-A linear scan is the bottleneck of a tree planner, and crowded buckets make its tails: only the newest
-points of a bucket are looked at, but none is ever refused.
+A linear scan would be the bottleneck of a tree planner, and crowded buckets would make some searches slow. So
+each bucket compares only its newest points, but every new point is taken.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
 
 BUCKETS_A_SIDE = 64
-NEWEST = 16  # points looked at in a bucket
+NEWEST = 16  # points that a bucket remembers
 
 
 class Buckets(NamedTuple):
     """The newest points of each bucket."""
 
     items: Indices  # [BUCKETS_A_SIDE^2, NEWEST] point numbers, used as a ring
-    positions: Floats  # [BUCKETS_A_SIDE^2, NEWEST, 2] where they are, metres: beside each other in memory
+    positions: Floats  # [BUCKETS_A_SIDE^2, NEWEST, 2] of these points, metres
     counts: Indices  # [BUCKETS_A_SIDE^2] points ever put into each bucket
     frame: Floats  # [3] x_min, y_min, bucket size, metres
     extent: Indices  # [4] first and last column, first and last row that hold points
 
 
 def allocate_buckets() -> Buckets:
-    """Empty buckets."""
+    """Buffers for buckets."""
     cells = BUCKETS_A_SIDE**2
     return Buckets(
         np.empty((cells, NEWEST), np.int64),
@@ -43,7 +43,7 @@ def allocate_buckets() -> Buckets:
 
 @lean
 def clear_buckets(buckets: Buckets, bounds: Floats, size_m: float) -> None:
-    """Empty the buckets and lay them over ``bounds``, ``size_m`` wide or as wide as the bounds need."""
+    """Empty the buckets and lay them over ``bounds [4]``, at least ``size_m`` metres wide each."""
     buckets.counts.fill(0)
     buckets.frame[0] = bounds[0]
     buckets.frame[1] = bounds[1]
@@ -56,7 +56,7 @@ def clear_buckets(buckets: Buckets, bounds: Floats, size_m: float) -> None:
 
 @inlined
 def bucket_index(offset: float, size: float) -> int:
-    """Row or column of a coordinate, clipped to the grid."""
+    """The row or column of a coordinate, clipped to the grid."""
     return min(max(int(offset / size), 0), BUCKETS_A_SIDE - 1)
 
 
@@ -66,10 +66,10 @@ def put(buckets: Buckets, item: int, x: float, y: float) -> None:
     column = bucket_index(x - buckets.frame[0], buckets.frame[2])
     row = bucket_index(y - buckets.frame[1], buckets.frame[2])
     cell = row * BUCKETS_A_SIDE + column
-    place = buckets.counts[cell] % NEWEST
-    buckets.items[cell, place] = item
-    buckets.positions[cell, place, 0] = x
-    buckets.positions[cell, place, 1] = y
+    slot = buckets.counts[cell] % NEWEST
+    buckets.items[cell, slot] = item
+    buckets.positions[cell, slot, 0] = x
+    buckets.positions[cell, slot, 1] = y
     buckets.counts[cell] += 1
     extent = buckets.extent
     extent[0] = min(extent[0], column)
@@ -80,7 +80,7 @@ def put(buckets: Buckets, item: int, x: float, y: float) -> None:
 
 @lean
 def remove(buckets: Buckets, item: int, x: float, y: float) -> None:
-    """Take point ``item`` at (x, y) out, if it is still among the newest of its bucket."""
+    """Take out point ``item`` at (x, y), if its bucket still remembers it."""
     column = bucket_index(x - buckets.frame[0], buckets.frame[2])
     row = bucket_index(y - buckets.frame[1], buckets.frame[2])
     cell = row * BUCKETS_A_SIDE + column
@@ -96,14 +96,14 @@ def remove(buckets: Buckets, item: int, x: float, y: float) -> None:
 
 @inlined
 def first_ring(buckets: Buckets, column: int, row: int) -> int:
-    """The smallest square ring of buckets around (column, row) that can hold a point."""
+    """The number of the first square ring of buckets around (column, row) that can hold a point."""
     extent = buckets.extent
     return int(max(extent[0] - column, column - extent[1], extent[2] - row, row - extent[3], 0))
 
 
 @inlined
 def _nearest(buckets: Buckets, x: float, y: float) -> tuple[int, float, float]:
-    """The nearest point, its squared distance, and a lower bound of that of all others."""
+    """The nearest point, its squared distance, and a lower bound of the squared distance of all others."""
     size = buckets.frame[2]
     column = bucket_index(x - buckets.frame[0], size)
     row = bucket_index(y - buckets.frame[1], size)
@@ -138,26 +138,26 @@ def _nearest(buckets: Buckets, x: float, y: float) -> tuple[int, float, float]:
 
 @lean
 def nearest(buckets: Buckets, x: float, y: float) -> int:
-    """The nearest point among the newest of each bucket; -1 when there is none."""
+    """The nearest point that a bucket remembers; -1 if there is none."""
     return _nearest(buckets, x, y)[0]
 
 
 @lean
 def nearest_for(buckets: Buckets, x: float, y: float) -> tuple[int, float]:
-    """The nearest point, and how far (metres) one may go from (x, y) without another becoming nearer."""
+    """The nearest point, and how far (metres) from (x, y) it certainly stays the nearest."""
     best, best_squared, next_squared = _nearest(buckets, x, y)
     return best, 0.5 * (math.sqrt(next_squared) - math.sqrt(best_squared))
 
 
 @lean
 def nearest_k(buckets: Buckets, x: float, y: float, items: Indices, distances: Floats) -> int:
-    """Fill ``items`` and ``distances`` (both ``[k]``, nearest first); returns how many there are."""
+    """Fill in ``items [k]`` and ``distances [k]`` (metres), nearest first. Returns how many there are."""
     size = buckets.frame[2]
     column = bucket_index(x - buckets.frame[0], size)
     row = bucket_index(y - buckets.frame[1], size)
     extent = buckets.extent
     k = items.shape[0]
-    found = 0
+    filled = 0
     for ring in range(first_ring(buckets, column, row), BUCKETS_A_SIDE):
         for r in range(max(row - ring, extent[2]), min(row + ring, extent[3]) + 1):
             on_edge = r == row - ring or r == row + ring
@@ -169,16 +169,16 @@ def nearest_k(buckets: Buckets, x: float, y: float, items: Indices, distances: F
                 cell = r * BUCKETS_A_SIDE + c
                 for n in range(min(buckets.counts[cell], NEWEST)):
                     distance = length(buckets.positions[cell, n, 0] - x, buckets.positions[cell, n, 1] - y)
-                    if found == k and distance >= distances[k - 1]:
+                    if filled == k and distance >= distances[k - 1]:
                         continue
-                    place = min(found, k - 1)
-                    while place > 0 and distances[place - 1] > distance:
-                        distances[place] = distances[place - 1]
-                        items[place] = items[place - 1]
-                        place -= 1
-                    distances[place] = distance
-                    items[place] = buckets.items[cell, n]
-                    found = min(found + 1, k)
-        if found == k and distances[k - 1] <= ring * size:
+                    slot = min(filled, k - 1)
+                    while slot > 0 and distances[slot - 1] > distance:
+                        distances[slot] = distances[slot - 1]
+                        items[slot] = items[slot - 1]
+                        slot -= 1
+                    distances[slot] = distance
+                    items[slot] = buckets.items[cell, n]
+                    filled = min(filled + 1, k)
+        if filled == k and distances[k - 1] <= ring * size:
             break
-    return found
+    return filled

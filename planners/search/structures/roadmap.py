@@ -1,7 +1,7 @@
-"""The roadmap of GUST and Follow: free places, the strips between them, and the shortest ways to the goal.
+"""The roadmap of GUST and Follow: free points, the strips between them, and the shortest paths to the goal.
 
-Strips are checked only when Dijkstra's search would use them, which gives the same ways for far fewer
-checks. Batches are added until the start is connected.
+A strip is checked only if Dijkstra's search would use it, which gives the same paths with far fewer checks.
+Batches of points are added until the start is connected.
 """
 
 from __future__ import annotations
@@ -22,42 +22,42 @@ from planners.world.vehicles.vehicle import Vehicle
 
 BUCKET_M = 8.0  # nodes lie some 6 m apart
 GOAL, START = 0, 1  # the first two nodes
-# places in Roadmap.counts
+# indices into Roadmap.counts
 NODES, CHECKS, EDGES, QUEUED = range(4)
 UNKNOWN, FREE, BLOCKED = range(3)
 
 
 class RoadmapSettings(NamedTuple):
-    """How a roadmap is built (docs/planners.md); batch and neighbours are what ``make speed`` finds best."""
+    """How a roadmap is built (docs/planners.md). ``make speed`` measures that this batch and k are best."""
 
-    batch: int = 100  # nodes drawn before the first, and between two, searches for a way from the start
+    batch: int = 100  # nodes drawn before each search for a path from the start
     neighbours: int = 8
     most_nodes: int = 3000
-    body_length_scale: float = 1.5  # a node's body must be free: a little more room than the car needs
+    body_length_scale: float = 1.5  # the body at a node must be free, with a little more room than it needs
     body_width_scale: float = 1.25
     clearance_exponent: float = 0.0  # edge cost: length / clearance^f; GUST 0, Follow 1
-    clearance_limit_m: float = 5.0  # places with more room than this are all alike
+    clearance_limit_m: float = 5.0  # a larger clearance counts as this one
 
 
 class Roadmap(NamedTuple):
-    """Nodes, edges and the way from each node to the goal; buffers are kept from problem to problem."""
+    """Nodes, edges, and the path from each node to the goal."""
 
     nodes: Floats  # [C, 2] metres
     clearances: Floats  # [C] metres to the nearest obstacle
-    distances: Floats  # [C] d(q): cost of the way to the goal, infinite where there is none
-    following: Indices  # [C] next node of that way
+    distances: Floats  # [C] d(q): cost of the path to the goal, infinite if there is none
+    following: Indices  # [C] the next node of that path
     heads: Indices  # [C] first edge of a node, -1: none
-    edge_next: Indices  # [E] edges come in pairs 2i, 2i + 1, one a direction
-    edge_to: Indices  # [E]
+    edge_next: Indices  # [E] the next edge of the same node; edges 2i and 2i + 1 are one in both directions
+    edge_to: Indices  # [E] the node at the other end
     edge_state: Indices  # [E / 2] UNKNOWN, FREE, BLOCKED
     edge_length: Floats  # [E / 2] metres
     heap: Indices  # [C] binary heap of Dijkstra's search
-    places: Indices  # [C] a node's place in the heap, -1: not in it
+    heap_index: Indices  # [C] where a node is in the heap, -1: not in it
     counts: Indices  # [4] NODES, CHECKS, EDGES, QUEUED
     sampled: Buckets  # all nodes
-    connected: Buckets  # those that reach the goal
-    near_items: Indices  # [k]
-    near_distances: Floats  # [k]
+    connected: Buckets  # the nodes that reach the goal
+    near_items: Indices  # [k] scratch
+    near_distances: Floats  # [k] scratch
 
 
 def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
@@ -86,7 +86,7 @@ def allocate_roadmap(capacity: int, neighbours: int) -> Roadmap:
 
 @lean
 def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, scene: Scene) -> None:
-    """Add a place and the edges to its nearest neighbours."""
+    """Add a node at (x, y), and edges to its nearest neighbours."""
     counts = roadmap.counts
     new = counts[NODES]
     counts[NODES] += 1
@@ -95,8 +95,7 @@ def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, sc
     roadmap.heads[new] = -1
     if settings.clearance_exponent > 0.0:
         roadmap.clearances[new] = clearance(x, y, settings.clearance_limit_m, scene)
-    found = nearest_k(roadmap.sampled, x, y, roadmap.near_items, roadmap.near_distances)
-    for k in range(found):
+    for k in range(nearest_k(roadmap.sampled, x, y, roadmap.near_items, roadmap.near_distances)):
         other = roadmap.near_items[k]
         edge = counts[EDGES]
         roadmap.edge_state[edge] = UNKNOWN
@@ -112,19 +111,19 @@ def add_node(roadmap: Roadmap, x: float, y: float, settings: RoadmapSettings, sc
 
 
 @inlined
-def sift_up(roadmap: Roadmap, place: int) -> None:
-    """Move a heap entry towards the root until its parent is no farther."""
+def sift_up(roadmap: Roadmap, index: int) -> None:
+    """Move an entry of the heap towards the root until its parent is no farther from the goal."""
     heap = roadmap.heap
-    node = heap[place]
-    while place > 0:
-        parent = (place - 1) // 2
+    node = heap[index]
+    while index > 0:
+        parent = (index - 1) // 2
         if roadmap.distances[heap[parent]] <= roadmap.distances[node]:
             break
-        heap[place] = heap[parent]
-        roadmap.places[heap[place]] = place
-        place = parent
-    heap[place] = node
-    roadmap.places[node] = place
+        heap[index] = heap[parent]
+        roadmap.heap_index[heap[index]] = index
+        index = parent
+    heap[index] = node
+    roadmap.heap_index[node] = index
 
 
 @inlined
@@ -134,38 +133,38 @@ def pop(roadmap: Roadmap) -> int:
     roadmap.counts[QUEUED] -= 1
     size = roadmap.counts[QUEUED]
     top = heap[0]
-    roadmap.places[top] = -1
+    roadmap.heap_index[top] = -1
     node = heap[size]
-    place = 0
+    index = 0
     while True:
-        child = 2 * place + 1
+        child = 2 * index + 1
         if child >= size:
             break
         if child + 1 < size and (roadmap.distances[heap[child + 1]] < roadmap.distances[heap[child]]):
             child += 1
         if roadmap.distances[heap[child]] >= roadmap.distances[node]:
             break
-        heap[place] = heap[child]
-        roadmap.places[heap[place]] = place
-        place = child
-    heap[place] = node
-    roadmap.places[node] = place
+        heap[index] = heap[child]
+        roadmap.heap_index[heap[index]] = index
+        index = child
+    heap[index] = node
+    roadmap.heap_index[node] = index
     return int(top)
 
 
 @lean
 def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehicle, scene: Scene) -> None:
-    """Dijkstra's search from the goal: d(q) and the next node for every node that reaches it."""
+    """Dijkstra's search from the goal: d(q) and the next node of every node that reaches the goal."""
     count = roadmap.counts[NODES]
     for node in range(count):
         roadmap.distances[node] = math.inf
         roadmap.following[node] = -1
-        roadmap.places[node] = -1
+        roadmap.heap_index[node] = -1
     nodes = roadmap.nodes
     clear_buckets(roadmap.connected, scene.bounds, BUCKET_M)
     roadmap.distances[GOAL] = 0.0
     roadmap.heap[0] = GOAL
-    roadmap.places[GOAL] = 0
+    roadmap.heap_index[GOAL] = 0
     roadmap.counts[QUEUED] = 1
     while roadmap.counts[QUEUED] > 0:
         node = pop(roadmap)
@@ -193,24 +192,19 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehic
                 if roadmap.edge_state[edge // 2] == FREE:
                     roadmap.distances[other] = cost
                     roadmap.following[other] = node
-                    if roadmap.places[other] < 0:
+                    if roadmap.heap_index[other] < 0:
                         roadmap.heap[roadmap.counts[QUEUED]] = other
-                        roadmap.places[other] = roadmap.counts[QUEUED]
+                        roadmap.heap_index[other] = roadmap.counts[QUEUED]
                         roadmap.counts[QUEUED] += 1
-                    sift_up(roadmap, roadmap.places[other])
+                    sift_up(roadmap, roadmap.heap_index[other])
             edge = roadmap.edge_next[edge]
 
 
 @lean
 def grow_roadmap(
-    roadmap: Roadmap,
-    batch: int,
-    settings: RoadmapSettings,
-    vehicle: Vehicle,
-    scene: Scene,
-    rng: BitGenerator,
+    roadmap: Roadmap, batch: int, settings: RoadmapSettings, vehicle: Vehicle, scene: Scene, rng: BitGenerator
 ) -> None:
-    """Add ``batch`` draws, then search from the goal again."""
+    """Draw ``batch`` nodes, keep the free ones, and search from the goal again."""
     half_length = 0.5 * settings.body_length_scale * (vehicle.front + vehicle.rear)
     half_width = 0.5 * settings.body_width_scale * vehicle.width
     for _ in range(batch):
@@ -221,7 +215,7 @@ def grow_roadmap(
         roadmap.counts[CHECKS] += 1
         cos = math.cos(heading)
         sin = math.sin(heading)
-        if box_is_free(x, y, cos, sin, half_length, half_width, scene):
+        if box_is_free((x, y, cos, sin, half_length, half_width), scene):
             add_node(roadmap, x, y, settings, scene)
     search_from_goal(roadmap, settings, vehicle, scene)
 
@@ -236,7 +230,7 @@ def build_roadmap(
     scene: Scene,
     rng: BitGenerator,
 ) -> bool:
-    """Draw batches until the start reaches the goal; False when ``most_nodes`` do not suffice."""
+    """Draw batches until the start reaches the goal. Returns False if ``most_nodes`` do not suffice."""
     roadmap.counts.fill(0)
     clear_buckets(roadmap.sampled, scene.bounds, BUCKET_M)
     add_node(roadmap, goal[0], goal[1], settings, scene)
@@ -250,13 +244,13 @@ def build_roadmap(
 
 
 @lean
-def resample_way(roadmap: Roadmap, node: int, spacing_m: float, points: Floats) -> int:
-    """Fill ``points [m, 2]`` with the way from ``node`` to the goal, one each ``spacing_m``; how many."""
+def resample_path(roadmap: Roadmap, node: int, spacing_m: float, points: Floats) -> int:
+    """Fill in ``points [m, 2]``, ``spacing_m`` apart on the path from ``node`` to the goal; how many."""
     nodes = roadmap.nodes
     points[0, 0] = nodes[node, 0]
     points[0, 1] = nodes[node, 1]
     filled = 1
-    left = spacing_m  # to go until the next point
+    left = spacing_m  # metres until the next point
     while roadmap.following[node] >= 0 and filled < points.shape[0] - 1:
         after = roadmap.following[node]
         length = math.hypot(nodes[after, 0] - nodes[node, 0], nodes[after, 1] - nodes[node, 1])

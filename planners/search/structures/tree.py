@@ -1,4 +1,4 @@
-"""The motion tree: every state that an extension drives through is a vertex."""
+"""The tree of motions: every state that an extension drives through is a vertex."""
 
 from __future__ import annotations
 
@@ -12,40 +12,40 @@ from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.jit import inlined, lean
+from planners.world.jit import lean
 from planners.world.problem import Plan
-from planners.world.trigonometry import length
+from planners.world.trigonometry import gap_to_segment, length
 from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
-# places in Tree.counts
+# indices into Tree.counts
 SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX = range(4)
 
 
 class Tree(NamedTuple):
-    """Vertices in the order in which they were reached; buffers are kept from problem to problem."""
+    """Vertices in the order in which they were reached."""
 
     states: Floats  # [C, S]
     controls: Floats  # [C, 2] that led here from the parent
     parents: Indices  # [C]
     depths: Indices  # [C] steps from the root
     waypoints: Indices  # [C] next waypoint of the lead path (Follow)
-    spent: Indices  # [C] 1 where an extension soon collided: too near an obstacle to lead anywhere
+    spent: Indices  # [C] 1 after an extension that soon collided: too near an obstacle to lead anywhere
     counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
-    bound: Floats  # [1] seconds: no vertex is added from which the goal cannot be reached sooner
+    bound: Floats  # [1] seconds by which the goal must be reached; vertices too late for that are not added
     buckets: Buckets
 
 
 class Extension(NamedTuple):
     """How a vertex is extended towards a target (docs/planners.md)."""
 
-    steer_probability: float = 0.99  # else one random constant control
-    metres_a_step: float = 0.5  # floor(distance / this) steps ...
-    least_steps: int = 20  # ... plus a uniform number of these
+    steer_probability: float = 0.99  # else a random control is kept constant
+    metres_a_step: float = 0.5  # an extension has floor(distance / this) steps ...
+    least_steps: int = 20  # ... plus a uniform number from here to ``most_steps``
     most_steps: int = 40
-    least_added: int = 12  # a vertex from which fewer steps were free is not extended again
-    arrival_m: float = 1.0  # a target is reached within this distance
-    slowest_share: float = 0.95  # desired speed: U(this, 1) of the maximum
+    least_added: int = 12  # a vertex from which fewer steps are free is not extended again
+    arrival_m: float = 1.0  # within this distance a target is reached
+    slowest_share: float = 0.95  # the desired speed is U(this, 1) of the maximum
     gains: Gains = Gains()
 
 
@@ -72,9 +72,9 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
 
 @lean
 def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
-    """Begin a new tree with a drive: ``states [n, S]`` from the root on and the ``controls [n - 1, 2]``."""
+    """Begin a new tree with a drive: ``states [n, S]`` from the root on, and ``controls [n - 1, 2]``."""
     for i in range(states.shape[0]):
-        for k in range(states.shape[1]):  # one by one: assigning a row compiles for two seconds
+        for k in range(states.shape[1]):  # one by one, because assigning a row takes two seconds to compile
             tree.states[i, k] = states[i, k]
         tree.controls[i, 0] = controls[i - 1, 0] if i > 0 else 0.0
         tree.controls[i, 1] = controls[i - 1, 1] if i > 0 else 0.0
@@ -87,7 +87,7 @@ def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s:
 
 @lean
 def prune(tree: Tree, size: int, bounds: Floats) -> None:
-    """Forget all but the first ``size`` vertices; what was counted stays counted."""
+    """Forget all but the first ``size`` vertices. Checks and expansions stay counted."""
     clear_buckets(tree.buckets, bounds, BUCKET_M)
     for i in range(size):
         tree.waypoints[i] = 0
@@ -95,18 +95,6 @@ def prune(tree: Tree, size: int, bounds: Floats) -> None:
         put(tree.buckets, i, tree.states[i, 0], tree.states[i, 1])
     tree.counts[SIZE] = size
     tree.counts[GOAL_VERTEX] = -1
-
-
-@inlined
-def segment_distance(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance in metres from a point to the segment from a to b."""
-    dx = bx - ax
-    dy = by - ay
-    squared = dx * dx + dy * dy
-    share = 0.0
-    if squared > 0.0:
-        share = min(max(((x - ax) * dx + (y - ay) * dy) / squared, 0.0), 1.0)
-    return length(x - ax - share * dx, y - ay - share * dy)
 
 
 @lean
@@ -124,10 +112,11 @@ def extend(
     scene: Scene,
     rng: BitGenerator,
 ) -> int:
-    """Drive from ``vertex`` towards a target and add what is free; returns the number of new vertices.
+    """Drive from a vertex towards a target (x, y) in metres, and add the states before the first blocked one.
 
-    ``goal [3]``: x, y, radius in metres. Along a ``lead [m, 2]`` (empty: none) each vertex must keep within
-    ``tube_m`` of the segment to its next waypoint, which is passed within ``passing_m``.
+    ``goal [3]`` is x, y and radius in metres; a state in it ends the extension. Along a ``lead [m, 2]``
+    (empty for none) each state must be within ``tube_m`` of the segment to its next waypoint, which is passed
+    within ``passing_m``. Returns the number of new vertices.
     """
     states = tree.states
     counts = tree.counts
@@ -172,10 +161,10 @@ def extend(
             ):
                 waypoint += 1
             before = max(waypoint - 1, 0)
-            if (
-                segment_distance(x, y, lead[before, 0], lead[before, 1], lead[waypoint, 0], lead[waypoint, 1])
-                > tube_m
-            ):
+            gap_x, gap_y = gap_to_segment(
+                x, y, lead[before, 0], lead[before, 1], lead[waypoint, 0], lead[waypoint, 1]
+            )
+            if length(gap_x, gap_y) > tube_m:
                 break
         new = counts[SIZE]
         counts[SIZE] += 1
@@ -214,7 +203,7 @@ def _trace(tree: Tree, states: Floats, controls: Floats) -> None:
 
 
 def plan_to_goal(tree: Tree, dt: float) -> Plan:
-    """The way from the root to the goal vertex."""
+    """Copy the plan from the root to the goal vertex."""
     steps = int(tree.depths[tree.counts[GOAL_VERTEX]])
     plan = Plan(np.empty((steps + 1, tree.states.shape[1])), np.empty((steps, 2)), dt)
     _trace(tree, plan.states, plan.controls)

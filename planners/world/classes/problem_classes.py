@@ -1,11 +1,11 @@
-"""The named problem classes, each easy, standard or hard, drawn from a seed."""
+"""The problem classes, each easy, standard or hard, drawn from a seed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,8 +20,8 @@ CLASSES: Final = ("curves", "random", "trap")
 DIFFICULTIES: Final = ("easy", "standard", "hard")
 
 
-# The figures beside each setting are measured (docs/decisions/0002-problem-classes.md): oracle@100; the best
-# planner's median and mean milliseconds from scratch; RRT's collision checks, in those of an empty world.
+# The figures beside each setting are measured (docs/decisions/0002-problem-classes.md): oracle@100; median
+# and mean milliseconds of the best planner from scratch; collision checks of RRT, in those of an empty world.
 
 _CURVES_STANDARD: Final = Curves(
     curves=4,
@@ -76,9 +76,16 @@ _TRAP: Final = {
 }
 
 
+_LAYOUTS: Final[dict[str, tuple[Any, Any]]] = {  # settings by difficulty, and what draws with them
+    "curves": (_CURVES, draw_curves),
+    "random": (_RANDOM, draw_random),
+    "trap": (_TRAP, draw_trap),
+}
+
+
 @dataclass(frozen=True)
 class ProblemClass:
-    """A source of problems that are alike."""
+    """A source of similar problems."""
 
     name: str
     difficulty: str
@@ -86,7 +93,7 @@ class ProblemClass:
     draw_obstacles: Callable[[np.random.Generator], Obstacles]
 
     def draw(self, seed: int, index: int) -> Problem:
-        """The canonical problem number ``index`` of ``seed``: the same one whoever draws it."""
+        """Draw the canonical problem number ``index`` of a seed, always the same one."""
         return Problem(
             id=f"{self.name}-{self.difficulty}-{seed}-{index}",
             class_name=self.name,
@@ -99,29 +106,20 @@ class ProblemClass:
 
 
 def problem_class(name: str, difficulty: str = "standard", vehicle: Vehicle = CAR) -> ProblemClass:
-    """The class of that name and difficulty; ValueError with the known ones where there is none.
+    """Return the class of that name and difficulty. Raises ValueError if there is none.
 
-    All vehicles get the same draws. Only what reaches into the room of a trailer, standing straight behind
-    the start, is left out for the vehicle that has it.
+    All vehicles get the same draws, but obstacles near a trailer that stands straight behind the start are
+    left out for the vehicle that has it.
     """
     if name not in CLASSES:
         raise ValueError(f"Unknown problem class {name!r}; choose one of {', '.join(CLASSES)}.")
     if difficulty not in DIFFICULTIES:
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
-    layout: Curves | Random | Trap
-    draw: Callable[[np.random.Generator], Obstacles]
-    if name == "curves":
-        layout = _CURVES[difficulty]
-        draw = partial(draw_curves, layout)
-    elif name == "random":
-        layout = _RANDOM[difficulty]
-        draw = partial(draw_random, layout)
-    else:
-        layout = _TRAP[difficulty]
-        draw = partial(draw_trap, layout)
+    settings, draw_layout = _LAYOUTS[name]
+    draw = partial(draw_layout, settings[difficulty])
     if isinstance(vehicle, CarWithTrailers):
         draw = partial(_draw_with_room, draw, _trailer_rooms(vehicle))
-    return ProblemClass(name, difficulty, layout, draw)
+    return ProblemClass(name, difficulty, settings[difficulty], draw)
 
 
 def _draw_with_room(

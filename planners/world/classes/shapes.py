@@ -1,4 +1,4 @@
-"""Obstacle shapes, drawn by jitted code as groups of convex pieces into one canvas."""
+"""Kernels that draw obstacles of several shapes, as groups of convex pieces, on a canvas."""
 
 from __future__ import annotations
 
@@ -9,26 +9,25 @@ import numpy as np
 
 from planners.world.arrays import Floats, Integers
 from planners.world.jit import jit
+from planners.world.obstacle_sets import first_obstacles, new_obstacles, take_obstacle
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, GOAL_RADIUS, Obstacles
 
-# Kept free, so that every problem can begin and end: the footprint at the start with room to pull out, and
-# the goal disc with room for the body ahead of the rear axle.
+# Kept free in every problem: the footprint at the start with room to pull out, and the goal disc with room
+# for the body ahead of the rear axle.
 START_ROOM = (0.57, 0.57, 3.0)  # x, y, radius in metres: around the footprint's centre
 GOAL_ROOM = (CANONICAL_GOAL[0], CANONICAL_GOAL[1], GOAL_RADIUS + 2.0)  # x, y, radius in metres
-TRAILER_ROOM_M = (
-    1.5  # radius around each trailer that stands behind the start: its half-diagonal and half a metre
-)
+TRAILER_ROOM_M = 1.5  # radius around a trailer behind the start: its half-diagonal and half a metre
 
 TRIANGLE, BOX, POLYGON, CROSS, ELL, ZED = range(6)
 SHAPES = 6
-ARM = 0.2  # half the width of an arm of a cross, L or Z, in its radius
+ARM = 0.2  # half the width of an arm of a cross, L or Z, as a share of its radius
 
 _MAX_VERTICES = 4096
 _MAX_PIECES = 1024
 
 
 class Canvas(NamedTuple):
-    """Obstacles being drawn; written in place."""
+    """Obstacles that are being drawn."""
 
     vertices: Floats  # [4096, 2] metres
     piece_starts: Integers  # [1025]
@@ -49,18 +48,14 @@ def new_canvas() -> Canvas:
 
 @jit
 def finished(canvas: Canvas) -> Obstacles:
-    """The obstacles on a canvas."""
-    pieces = canvas.counts[0]
-    return Obstacles(
-        canvas.vertices[: canvas.piece_starts[pieces]].copy(),
-        canvas.piece_starts[: pieces + 1].copy(),
-        canvas.obstacle_starts[: canvas.counts[1] + 1].copy(),
-    )
+    """Copy the obstacles from a canvas."""
+    drawn = Obstacles(canvas.vertices, canvas.piece_starts, canvas.obstacle_starts)
+    return first_obstacles(drawn, canvas.counts[1])
 
 
 @jit
 def _add_vertex(canvas: Canvas, x: float, y: float) -> None:
-    """Give the open piece one more vertex, rounded to float32 so that shards keep it exactly."""
+    """Add a vertex to the open piece, rounded to float32 so that files keep it exactly."""
     end = canvas.piece_starts[canvas.counts[0] + 1]
     canvas.vertices[end, 0] = np.float64(np.float32(x))
     canvas.vertices[end, 1] = np.float64(np.float32(y))
@@ -79,7 +74,7 @@ def _close_piece(canvas: Canvas) -> None:
 
 @jit
 def add_regular(canvas: Canvas, x: float, y: float, angle: float, radius: float, sides: int) -> None:
-    """A regular polygon around (x, y), its first corner in direction ``angle``."""
+    """Add a regular polygon around (x, y) with its first corner in direction ``angle``."""
     _open_piece(canvas)
     for i in range(sides):
         direction = angle + 2.0 * math.pi * i / sides
@@ -98,7 +93,7 @@ def add_box(
     half_length: float,
     half_width: float,
 ) -> None:
-    """A box in the frame (x, y, angle): centred at (u, w) of it, along its axes."""
+    """Add a box along the axes of the frame (x, y, angle), with its centre at (u, w) of that frame."""
     cos = math.cos(angle)
     sin = math.sin(angle)
     _open_piece(canvas)
@@ -120,7 +115,7 @@ def add_arc(
     thickness: float,
     parts: int,
 ) -> None:
-    """A broken circle's arc around (x, y) as ``parts`` thin quads, from angle ``begin`` over ``sweep``."""
+    """Add an arc around (x, y) from angle ``begin`` over ``sweep`` radians, as ``parts`` thin quads."""
     inner = radius - 0.5 * thickness
     outer = radius + 0.5 * thickness
     for part in range(parts):
@@ -138,7 +133,7 @@ def add_arc(
 def add_trap(
     canvas: Canvas, x: float, y: float, angle: float, width: float, depth: float, thickness: float
 ) -> None:
-    """A bug trap: a wall ``width`` long at (x, y) with two arms ``depth`` long, open against ``angle``."""
+    """Add a bug trap: a wall ``width`` long at (x, y), two arms ``depth`` long, open against ``angle``."""
     half = 0.5 * thickness
     add_box(canvas, x, y, angle, 0.0, 0.0, half, 0.5 * width)
     for side in (-1.0, 1.0):
@@ -149,7 +144,7 @@ def add_trap(
 def add_shape(
     canvas: Canvas, shape: int, x: float, y: float, angle: float, radius: float, sides: int
 ) -> None:
-    """One of the small shapes within ``radius`` of (x, y); ``sides`` matters for polygons only."""
+    """Add one of the small shapes within ``radius`` of (x, y); only polygons use ``sides``."""
     arm = ARM * radius
     if shape == TRIANGLE:
         add_regular(canvas, x, y, angle, radius, 3)
@@ -190,14 +185,11 @@ def distance_to_piece(vertices: Floats, first: int, last: int, x: float, y: floa
 
 @jit
 def without_those_near(obstacles: Obstacles, rooms: Floats) -> Obstacles:
-    """The obstacles that reach into none of the discs ``rooms [n, 3]`` (x, y, radius in metres)."""
-    vertices = np.empty_like(obstacles.vertices)
-    piece_starts = np.zeros_like(obstacles.piece_starts)
-    obstacle_starts = np.zeros_like(obstacles.obstacle_starts)
-    pieces = 0
+    """Copy the obstacles that reach into none of the discs ``rooms [n, 3]`` (x, y, radius in metres)."""
+    result = new_obstacles(obstacles, obstacles)
     kept = 0
     for o in range(obstacles.obstacle_starts.shape[0] - 1):
-        begin = pieces
+        take_obstacle(obstacles, o, result, kept)
         near = False
         for p in range(obstacles.obstacle_starts[o], obstacles.obstacle_starts[o + 1]):
             first = obstacles.piece_starts[p]
@@ -205,29 +197,15 @@ def without_those_near(obstacles: Obstacles, rooms: Floats) -> Obstacles:
             for r in range(rooms.shape[0]):
                 distance = distance_to_piece(obstacles.vertices, first, last, rooms[r, 0], rooms[r, 1])
                 near = near or distance <= rooms[r, 2]
-            end = piece_starts[pieces]
-            for i in range(first, last):
-                vertices[end + i - first, 0] = obstacles.vertices[i, 0]
-                vertices[end + i - first, 1] = obstacles.vertices[i, 1]
-            pieces += 1
-            piece_starts[pieces] = end + last - first
-        if near:
-            pieces = begin
-        else:
-            kept += 1
-            obstacle_starts[kept] = pieces
-    return Obstacles(
-        vertices[: piece_starts[pieces]].copy(),
-        piece_starts[: pieces + 1].copy(),
-        obstacle_starts[: kept + 1].copy(),
-    )
+        kept += not near
+    return first_obstacles(result, kept)
 
 
 @jit
 def end_obstacle(canvas: Canvas) -> bool:
-    """Make one obstacle of the pieces added since the last; take them back where it may not stand.
+    """Make an obstacle of the pieces added since the last one, or take them back. Returns whether it stays.
 
-    It may not reach into the room of start or goal, and some of it must lie inside the bounds.
+    It may not reach into the room of start or goal, and one of its vertices must be inside the bounds.
     """
     vertices = canvas.vertices
     begin = canvas.obstacle_starts[canvas.counts[1]]

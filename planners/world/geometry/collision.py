@@ -1,7 +1,7 @@
-"""Exact collision of a vehicle's footprint with convex obstacles: a cell look-up, then separating axes.
+"""Exact collision checks of a vehicle's footprint with convex obstacles.
 
-Each piece is listed in every cell of a grid in which a footprint's centre could lie when it touches the
-piece, so one check reads one cell, however many obstacles there are.
+Each convex piece is listed in every cell of a grid in which a box that touches the piece may have its centre.
+So a check reads the list of one cell, however many obstacles there are, and looks for a separating axis.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats, Integers
+from planners.world.arrays import Box, Floats, Integers
 from planners.world.jit import inlined, jit
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import State, is_folded, load, swept_bodies
 from planners.world.vehicles.vehicle import Vehicle
 
-CELL_M = 2.0  # measured: smaller cells cost more to fill than they save in checks
-REACH_M = 1.75  # largest half-diagonal of a box that may be checked: a swept body, a roadmap node's
+CELL_M = 2.0  # measured: smaller cells cost more time to fill than they save in checks
+REACH_M = 1.75  # the largest half-diagonal of a box that may be checked
 
 
 NORMAL_X, NORMAL_Y, OFFSET, X, Y = range(5)  # columns of Scene.edges
@@ -30,26 +30,18 @@ class Scene(NamedTuple):
     """A problem made ready for collision checks."""
 
     bounds: Floats  # [4] x_min, y_min, x_max, y_max in metres
-    edges: Floats  # [V, 5] of each edge: outward unit normal, normal . vertex (m), vertex it begins at (m)
+    edges: Floats  # [V, 5] of each edge: outward unit normal, normal . vertex (m), first vertex (m)
     piece_starts: Integers  # [P + 1] piece p owns edges[piece_starts[p] : piece_starts[p + 1]]
     cell_starts: Integers  # [rows * columns + 1]
     cell_pieces: Integers  # [K, 3] pieces within reach of a cell, cell by cell: edges FIRST to before LAST,
-    # and FACING, the one whose line is farthest from the cell's middle: most often it separates
+    # and FACING, the edge whose line is farthest from the cell's middle: it separates most often
     columns: int
 
 
 @inlined
-def edge_separates(
-    x: float,
-    y: float,
-    cos: float,
-    sin: float,
-    half_length: float,
-    half_width: float,
-    edge: int,
-    edges: Floats,
-) -> bool:
-    """Whether a box (centre, direction, half extents) lies outside of an edge's line."""
+def edge_separates(box: Box, edge: int, edges: Floats) -> bool:
+    """Whether a box lies wholly outside the line of an edge."""
+    x, y, cos, sin, half_length, half_width = box
     nx = edges[edge, NORMAL_X]
     ny = edges[edge, NORMAL_Y]
     extent = half_length * abs(nx * cos + ny * sin) + half_width * abs(ny * cos - nx * sin)
@@ -57,21 +49,12 @@ def edge_separates(
 
 
 @inlined
-def box_meets_piece(
-    x: float,
-    y: float,
-    cos: float,
-    sin: float,
-    half_length: float,
-    half_width: float,
-    first: int,
-    last: int,
-    edges: Floats,
-) -> bool:
-    """Whether a box and the convex piece of edges ``first`` to before ``last`` meet (separating axes)."""
+def box_meets_piece(box: Box, first: int, last: int, edges: Floats) -> bool:
+    """Whether a box meets the convex piece of the edges ``first`` to before ``last``."""
     for i in range(first, last):
-        if edge_separates(x, y, cos, sin, half_length, half_width, i, edges):
+        if edge_separates(box, i, edges):
             return False
+    x, y, cos, sin, half_length, half_width = box
     low_u = math.inf
     high_u = -math.inf
     low_w = math.inf
@@ -95,10 +78,10 @@ def make_edges(vertices: Floats, first: int, last: int, edges: Floats, target: i
         j = i + 1 if i + 1 < last else first
         ex = vertices[j, 0] - vertices[i, 0]
         ey = vertices[j, 1] - vertices[i, 1]
-        way = length(ex, ey)
+        metres = length(ex, ey)
         edge = target + i - first
-        edges[edge, NORMAL_X] = ey / way
-        edges[edge, NORMAL_Y] = -ex / way
+        edges[edge, NORMAL_X] = ey / metres
+        edges[edge, NORMAL_Y] = -ex / metres
         edges[edge, OFFSET] = edges[edge, NORMAL_X] * vertices[i, 0] + edges[edge, NORMAL_Y] * vertices[i, 1]
         edges[edge, X] = vertices[i, 0]
         edges[edge, Y] = vertices[i, 1]
@@ -121,7 +104,7 @@ def piece_extent(vertices: Floats, first: int, last: int) -> tuple[float, float,
 
 @jit
 def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Scene:
-    """Edges and the cell lists of all pieces (``[V, 2]``, ``[P + 1]``, ``[4]``)."""
+    """Build the scene of pieces ``[V, 2]``, ``[P + 1]`` within bounds ``[4]``, all in metres."""
     pieces = piece_starts.shape[0] - 1
     edges = np.empty((vertices.shape[0], 5))
     for p in range(pieces):
@@ -172,7 +155,7 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
     for cell in range(rows * columns):
         cell_starts[cell + 1] += cell_starts[cell]
     cell_pieces = np.empty((listed, 3), np.int32)
-    for k in range(listed - 1, -1, -1):  # backwards, with starts moved up: each cell keeps its order
+    for k in range(listed - 1, -1, -1):  # backwards, with starts moved up, so that each cell keeps its order
         cell = listed_cells[k]
         cell_starts[cell + 1] -= 1
         for column in range(3):
@@ -184,22 +167,15 @@ def build_scene(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Sce
 
 
 def scene_of(problem: Problem) -> Scene:
-    """The problem made ready for collision checks."""
+    """Make a problem ready for collision checks."""
     obstacles = problem.obstacles
     return build_scene(obstacles.vertices, obstacles.piece_starts, np.array(problem.bounds))
 
 
 @inlined
-def box_is_free(
-    x: float,
-    y: float,
-    cos: float,
-    sin: float,
-    half_length: float,
-    half_width: float,
-    scene: Scene,
-) -> bool:
-    """Whether a box lies inside the bounds and meets no obstacle; its half-diagonal is at most REACH_M."""
+def box_is_free(box: Box, scene: Scene) -> bool:
+    """Whether a box, whose half-diagonal is at most REACH_M, is inside the bounds and meets no obstacle."""
+    x, y, cos, sin, half_length, half_width = box
     extent_x = half_length * abs(cos) + half_width * abs(sin)
     extent_y = half_length * abs(sin) + half_width * abs(cos)
     bounds = scene.bounds
@@ -216,27 +192,33 @@ def box_is_free(
     pieces = scene.cell_pieces
     edges = scene.edges
     for k in range(scene.cell_starts[cell], scene.cell_starts[cell + 1]):
-        if edge_separates(x, y, cos, sin, half_length, half_width, pieces[k, FACING], edges):
+        if edge_separates(box, pieces[k, FACING], edges):
             continue
-        if box_meets_piece(x, y, cos, sin, half_length, half_width, pieces[k, FIRST], pieces[k, LAST], edges):
+        if box_meets_piece(box, pieces[k, FIRST], pieces[k, LAST], edges):
             return False
     return True
 
 
 @inlined
+def point_is_free(x: float, y: float, scene: Scene) -> bool:
+    """Whether a point (metres) is inside the bounds and in no obstacle."""
+    return box_is_free((x, y, 1.0, 0.0, 0.0, 0.0), scene)
+
+
+@inlined
 def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether the vehicle's bodies, inflated for the steps into and out of this state, are free."""
+    """Whether the vehicle's bodies, inflated to cover the steps into and out of a state, are free."""
     if is_folded(state, vehicle):
         return False
-    for box in swept_bodies(state, vehicle):
-        if not box_is_free(box[0], box[1], box[2], box[3], box[4], box[5], scene):
+    for box in swept_bodies(state, vehicle):  # noqa: SIM110 Numba has no generators for all()
+        if not box_is_free(box, scene):
             return False
     return True
 
 
 @jit
 def count_free_prefix(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
-    """How many of ``states [T, S]`` are free before the first that is not; T when all are."""
+    """Count the free states before the first blocked one of ``states [T, S]``: T if all are free."""
     for i in range(states.shape[0]):
         if not state_is_free(load(states, i, vehicle), vehicle, scene):
             return i

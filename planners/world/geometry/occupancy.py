@@ -1,4 +1,4 @@
-"""Which 1 m squares of the canonical window are not free: as bits, for recall, and as the encoder's grid."""
+"""Which 1 m cells of the canonical window are not free: as bits for recall, as a grid for the encoder."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats, Integers
+from planners.world.arrays import Bounds, Floats, Integers
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Problem
 from planners.world.workspace import Workspace
@@ -24,12 +24,12 @@ _LEAST_PIECES = 256  # convex pieces that the buffers hold at least
 
 
 class Drawing(NamedTuple):
-    """The cells that obstacles meet: bit c of word r is the cell in row r (y) and column c (x)."""
+    """The cells that obstacles meet. Bit c of word r is the cell in row r (y) and column c (x)."""
 
     occupied: Bits  # [64] cells that are not free
-    pieces: Bits  # [C, 64] those that each convex piece meets; only the words of its rows are filled in
-    rows: Integers  # [C, 2] first and last row that each piece meets; the first after the last where none
-    spans: Floats  # [2, 64] from and to which x a piece covers each row: scratch
+    pieces: Bits  # [C, 64] cells that each convex piece meets; only the words of its rows are filled in
+    rows: Integers  # [C, 2] first and last row that each piece meets; if it meets none, first > last
+    spans: Floats  # [2, 64] scratch: least and greatest x of a piece in each row
 
 
 def allocate_drawing(pieces: int) -> Drawing:
@@ -44,16 +44,16 @@ def allocate_drawing(pieces: int) -> Drawing:
 
 @inlined
 def cells_between(first: int, last: int) -> np.uint64:
-    """The word whose bits ``first`` to ``last`` are set; both are at least 0 and at most 63."""
+    """The word with bits ``first`` to ``last`` set, both from 0 to 63."""
     return np.uint64((ALL_CELLS << np.uint64(first)) & (ALL_CELLS >> np.uint64(GRID - 1 - last)))
 
 
 @lean
 def draw_piece(vertices: Floats, first: int, last: int, words: Bits, spans: Floats) -> tuple[int, int]:
-    """Fill in the ``words [64]`` of the rows that a convex piece ``vertices[first : last]`` meets; which.
+    """Fill in the ``words [64]`` of the rows that a convex piece ``vertices[first : last]`` meets.
 
-    Exact: what a convex piece covers of a row of half-open squares is one interval of x, so its edges are
-    clipped row by row.
+    This is exact: a convex piece covers one interval of x in each row of half-open cells, so its edges are
+    clipped row by row. Returns the first and the last of these rows; ``spans [2, 64]`` is scratch.
     """
     low = spans[0]
     high = spans[1]
@@ -92,7 +92,7 @@ def draw_piece(vertices: Floats, first: int, last: int, words: Bits, spans: Floa
 
 @lean
 def _draw_outside(x_min: float, y_min: float, x_max: float, y_max: float, occupied: Bits) -> None:
-    """Set the cells that are not wholly inside the bounds, and no others."""
+    """Set exactly those cells of ``occupied [64]`` that are not wholly inside the bounds."""
     columns = np.uint64(0)
     for column in range(GRID):
         left = _LEFT + column * CELL
@@ -105,10 +105,8 @@ def _draw_outside(x_min: float, y_min: float, x_max: float, y_max: float, occupi
 
 
 @lean
-def draw(
-    vertices: Floats, piece_starts: Integers, bounds: tuple[float, float, float, float], drawing: Drawing
-) -> None:
-    """Draw convex pieces ``[V, 2]``, ``[P + 1]``; what is not wholly inside the bounds is not free either."""
+def draw(vertices: Floats, piece_starts: Integers, bounds: Bounds, drawing: Drawing) -> None:
+    """Draw convex pieces ``[V, 2]``, ``[P + 1]``. Cells not wholly inside the bounds are not free."""
     occupied = drawing.occupied
     _draw_outside(bounds[0], bounds[1], bounds[2], bounds[3], occupied)
     for p in range(piece_starts.shape[0] - 1):
@@ -130,7 +128,7 @@ def _unpack(bits: Bits, grid: Grid) -> None:
 
 @jit
 def draw_occupancy(vertices: Floats, piece_starts: Integers, bounds: Floats) -> Grid:
-    """Grid ``[64, 64]`` of convex pieces ``[V, 2]``, ``[P + 1]`` and bounds ``[4]``, for other kernels."""
+    """The grid ``[64, 64]`` of convex pieces ``[V, 2]``, ``[P + 1]`` in bounds ``[4]``, for other kernels."""
     occupied = np.empty(GRID, np.uint64)
     words = np.empty(GRID, np.uint64)
     spans = np.empty((2, GRID))
@@ -150,7 +148,6 @@ def drawing_of(problem: Problem, workspace: Workspace | None = None) -> Drawing:
     Args:
         problem: what to draw.
         workspace: the caller's buffers, which the next drawing overwrites; by default new ones.
-
     """
     obstacles = problem.obstacles
     pieces = max(_LEAST_PIECES, 1 << len(obstacles.piece_starts).bit_length())
@@ -160,28 +157,28 @@ def drawing_of(problem: Problem, workspace: Workspace | None = None) -> Drawing:
 
 
 def grid_of(bits: Bits) -> Grid:
-    """The grid ``[64, 64]`` (row = y, column = x) of bits ``[64]``."""
+    """Unpack bits ``[64]`` into a grid ``[64, 64]`` (row = y, column = x)."""
     grid = np.empty((GRID, GRID), np.uint8)
     _unpack(bits, grid)
     return grid
 
 
 def bits_of(grids: Grid) -> Bits:
-    """The bits ``[..., 64]`` of grids ``[..., 64, 64]``."""
+    """Pack grids ``[..., 64, 64]`` into bits ``[..., 64]``."""
     return np.packbits(grids, axis=-1, bitorder="little").view("<u8").astype(np.uint64)[..., 0]
 
 
 def occupancy_of(problem: Problem) -> Grid:
-    """The grid ``[64, 64]`` of a canonical problem: 1 where a cell's half-open square is not free."""
+    """Draw the grid ``[64, 64]`` of a canonical problem: 1 for each cell that is not free."""
     vertices, piece_starts, _ = problem.obstacles
     return draw_occupancy(vertices, piece_starts, np.array(problem.bounds))
 
 
 def pack(grid: Grid) -> Grid:
-    """The bits of a grid ``[64, 64]`` in bytes ``[512]``, as shards keep them."""
+    """Pack a grid ``[64, 64]`` into bytes ``[512]``, as files hold it."""
     return np.packbits(grid)
 
 
 def unpack(packed: Grid) -> Grid:
-    """The grid ``[64, 64]`` of bytes ``[512]``."""
+    """Unpack bytes ``[512]`` into a grid ``[64, 64]``."""
     return np.unpackbits(packed).reshape(GRID, GRID)

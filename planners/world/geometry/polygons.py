@@ -1,4 +1,4 @@
-"""Simple polygons of any kind into convex pieces, without moving a vertex."""
+"""Cuts simple polygons of any kind into convex pieces, without moving a vertex."""
 
 from __future__ import annotations
 
@@ -13,22 +13,29 @@ from planners.world.problem import counter_clockwise
 
 Corner = tuple[float, ...]
 
-LARGEST_COORDINATE_M: Final = 10_000.0  # float32 is exact to 1 mm up to there
-SURE_TURN_M2: Final = 1e-6  # far more than rounding makes of a straight angle
+LARGEST_COORDINATE_M: Final = 10_000.0  # up to here float32 is exact to 1 mm
+SURE_TURN_M2: Final = 1e-6  # far more than rounding can make of a straight angle
 
 
 class PolygonError(ValueError):
-    """What is wrong with a polygon, and what to do; the end of a sentence that names it."""
+    """Says what is wrong with a polygon and what to do, as the end of a sentence that names the polygon."""
 
 
 def convex_pieces(polygon: Floats) -> list[Floats]:
-    """Convex pieces ``[n, 2]`` that cover a simple polygon ``[m, 2]`` in any orientation, metres.
+    """Cut a simple polygon into convex pieces.
 
-    Vertices are rounded to float32 first, as every problem holds them, and none is added. A convex polygon is
-    its own only piece; others are triangulated, and triangles joined as long as they stay convex (Hertel and
-    Mehlhorn 1983).
+    Vertices are rounded to float32 first, and none is added. A convex polygon is its own only piece. Others
+    are triangulated, and triangles are joined as long as they stay convex (Hertel and Mehlhorn 1983).
 
-    PolygonError: fewer than 3 points, not finite, too far away, crossing itself, or without area.
+    Args:
+        polygon: ``[m, 2]`` metres, in any orientation.
+
+    Returns:
+        Counter-clockwise pieces ``[n, 2]``, which cover the polygon.
+
+    Raises:
+        PolygonError: The polygon has fewer than 3 points or no area, crosses itself, or has coordinates that
+            are not finite or too large.
     """
     corners = counter_clockwise(_corners(polygon))
     if len(corners) <= 4 and _turns(corners).min() > SURE_TURN_M2:  # five such points can make a star
@@ -43,14 +50,14 @@ def convex_pieces(polygon: Floats) -> list[Floats]:
 
 
 def joined_triangles(shape: shapely.Polygon) -> list[Floats]:
-    """Convex pieces ``[n, 2]`` that cover a valid polygon, which may have holes; no vertex is added."""
+    """Cut a valid polygon, which may have holes, into convex pieces ``[n, 2]`` without a new vertex."""
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
     pieces = [counter_clockwise(shapely.get_coordinates(triangle)[:-1]) for triangle in triangles]
     return _joined([piece for piece in pieces if _is_convex(piece)])
 
 
 def _corners(polygon: Floats) -> Floats:
-    """The polygon in float32 steps, without repeated points."""
+    """Round a polygon to float32 and leave out repeated points."""
     if len(polygon) < 3:
         raise PolygonError(f"has {len(polygon)} points, wanted were at least 3; complete or remove it")
     farthest = float(np.abs(polygon).max())
@@ -69,13 +76,13 @@ def _corners(polygon: Floats) -> Floats:
 
 
 def _is_convex(corners: Floats) -> bool:
-    """Whether a simple counter-clockwise polygon with area is convex; straight angles are allowed."""
+    """Whether a simple counter-clockwise polygon with area is convex. Straight angles are allowed."""
     turns = _turns(corners)
     return bool((turns >= 0.0).all() and (turns > 0.0).any())
 
 
 def _turns(corners: Floats) -> Floats:
-    """For each edge the cross product with the next, square metres: above 0 where the way turns left."""
+    """The cross product of each edge with the next one, in square metres: above 0 for a left turn."""
     edges = _after(corners) - corners
     after = _after(edges)
     turns: Floats = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
@@ -83,12 +90,12 @@ def _turns(corners: Floats) -> Floats:
 
 
 def _after(corners: Floats) -> Floats:
-    """For each corner the next one; ``np.roll`` takes ten times as long."""
+    """The next corner of each corner; ``np.roll`` takes ten times as long."""
     return np.concatenate((corners[1:], corners[:1]))
 
 
 def _joined(pieces: list[Floats]) -> list[Floats]:
-    """Join neighbours over their common edges, one edge after another, while the union stays convex."""
+    """Join neighbouring pieces over their common edges, one edge after another, if the union is convex."""
     loops = [[tuple(corner) for corner in piece.tolist()] for piece in pieces]
     owner = {edge: i for i, loop in enumerate(loops) for edge in _edges(loop)}
     for begin, end in list(owner):
@@ -99,7 +106,7 @@ def _joined(pieces: list[Floats]) -> list[Floats]:
         at = first.index(end)
         there = second.index(begin)
         union = first[at:] + first[:at] + (second[there:] + second[:there])[1:-1]
-        joint = len(first) - 1  # the union begins with one end of the common edge, here is the other
+        joint = len(first) - 1  # the union begins at one end of the common edge; the other end is here
         if (
             len(set(union)) == len(union)
             and _turns_left(union[-1], union[0], union[1])
@@ -111,7 +118,7 @@ def _joined(pieces: list[Floats]) -> list[Floats]:
 
 
 def _turns_left(before: Corner, corner: Corner, after: Corner) -> bool:
-    """Whether the way over a corner turns left or goes straight on."""
+    """Whether the outline turns left or goes straight on at ``corner``."""
     to, on = (corner[0] - before[0], corner[1] - before[1]), (after[0] - corner[0], after[1] - corner[1])
     return to[0] * on[1] - to[1] * on[0] >= 0.0
 

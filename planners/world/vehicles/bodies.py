@@ -1,4 +1,4 @@
-"""The boxes that a vehicle's bodies fill along a drive: with the margins of the kernels, or as they are."""
+"""The boxes that a vehicle's bodies fill along a drive, with the margins of the kernels or without."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle
 
 
 def body_count(vehicle: Vehicle) -> int:
-    """How many bodies a vehicle has: itself and its trailers."""
+    """Count the bodies of a vehicle: itself and its trailers."""
     return 1 + (len(vehicle.hitch_lengths) if isinstance(vehicle, CarWithTrailers) else 0)
 
 
@@ -26,9 +26,15 @@ def _fill(states: Floats, vehicle: Vehicle, boxes: Floats) -> None:
 
 
 def swept_boxes(states: Floats, vehicle: Vehicle = CAR) -> Floats:
-    """The boxes ``[T * B, 6]`` that ``collision.state_is_free`` tests at ``states [T, S]``, state by state.
+    """List the boxes that ``collision.state_is_free`` tests.
 
-    Centre x, y (m), cos, sin of the heading, half length, half width with margin (m).
+    Args:
+        states: ``[T, S]`` of the vehicle.
+        vehicle: with B bodies.
+
+    Returns:
+        Boxes ``[T * B, 6]``, state by state: centre x, y (m), cosine and sine of the heading, half length and
+        half width with margin (m).
     """
     boxes = np.empty((len(states) * body_count(vehicle), 6))
     _fill(np.ascontiguousarray(states), vehicle, boxes)
@@ -39,7 +45,7 @@ _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 def box_corners(boxes: Floats, widened_m: float = 0.0) -> Floats:
-    """Corners ``[4 S, 2]`` of boxes ``[S, 6]`` as ``swept_boxes`` gives them, widened on every side."""
+    """Corners ``[4 S, 2]`` in metres of boxes ``[S, 6]`` (as of ``swept_boxes``), widened on every side."""
     centre, (cos, sin), half = boxes[:, :2], boxes[:, 2:4].T, boxes[:, 4:] + widened_m
     turns = np.stack((np.stack((cos, sin), -1), np.stack((-sin, cos), -1)), 1)  # [S, 2, 2]
     corners: Floats = (_CORNERS * half[:, None]) @ turns + centre[:, None]
@@ -47,7 +53,7 @@ def box_corners(boxes: Floats, widened_m: float = 0.0) -> Floats:
 
 
 def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
-    """Corners ``[T, B, 4, 2]`` in metres of every body at every one of ``states [T, S]``, without margin."""
+    """Corners ``[T, B, 4, 2]`` in metres of each body, without margin, at each of ``states [T, S]``."""
     bodies = [(states[:, :3], vehicle.front, vehicle.rear, vehicle.width)]
     if isinstance(vehicle, CarWithTrailers):
         x, y, heading = states[:, :3].T
@@ -60,7 +66,7 @@ def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
 
 
 def _corners(poses: Floats, front: float, rear: float, width: float) -> Floats:
-    """Corners ``[T, 4, 2]`` of a body at ``poses [T, 3]``."""
+    """Corners ``[T, 4, 2]`` in metres of a body at ``poses [T, 3]``."""
     half = 0.5 * width
     box = np.array([[-rear, -half], [front, -half], [front, half], [-rear, half]])
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])

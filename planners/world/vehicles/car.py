@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
-from planners.world.vehicles.interface import (
-    Box,
-    State,
-    admissible,
-    control_limits,
-    is_folded,
-    kept_within,
-    leading_body,
-    load,
-    step,
-    swept_bodies,
-    turn_error,
-)
+from planners.world.vehicles import interface
+from planners.world.vehicles.interface import State, kept_within, leading_body
 from planners.world.vehicles.vehicle import Car, CarWithTrailers
 
 CarLike = Car | CarWithTrailers
@@ -27,8 +16,9 @@ CarLike = Car | CarWithTrailers
 def turn_rates(
     speed: float, steering: float, acceleration: float, steering_rate: float, car: CarLike
 ) -> tuple[float, float, float]:
-    """Turn rates (rad/s) at the beginning, the middle and the end of a step: known beforehand, as speed and
-    steering are linear in time.
+    """Turn rates (rad/s) at the beginning, middle and end of a step.
+
+    They are known beforehand, because speed and steering are linear in time.
     """
     h = car.dt
     return (
@@ -48,7 +38,7 @@ def drive(
     turns: tuple[float, float, float],
     h: float,
 ) -> tuple[float, float, float]:
-    """The pose after a Runge-Kutta step of ``h`` seconds at these turn rates (as ``turn_rates``)."""
+    """The pose after a Runge-Kutta step of ``h`` seconds with the turn rates of ``turn_rates``."""
     half_speed = 0.5 * (speed + end_speed)
     sin_1, cos_1 = sincos(heading)
     sin_2, cos_2 = turned_by(sin_1, cos_1, 0.5 * h * turns[0])
@@ -61,13 +51,13 @@ def drive(
     )
 
 
-@implements(load, Car)
+@implements(interface.load, Car)
 def _load(states: Floats, i: int, vehicle: Car) -> State:
     row = states[i]
     return row[0], row[1], row[2], row[3], row[4]
 
 
-@implements(step, Car)
+@implements(interface.step, Car)
 def _step(state: State, first: float, second: float, vehicle: Car) -> State:
     x, y, heading, speed, steering = state
     end_speed = speed + vehicle.dt * first
@@ -83,12 +73,12 @@ def _step(state: State, first: float, second: float, vehicle: Car) -> State:
     )
 
 
-@implements(control_limits, Car, CarWithTrailers)
+@implements(interface.control_limits, Car, CarWithTrailers)
 def _control_limits(vehicle: CarLike) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_steering_rate
 
 
-@implements(admissible, Car, CarWithTrailers)
+@implements(interface.admissible, Car, CarWithTrailers)
 def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
     return (
         kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
@@ -96,26 +86,26 @@ def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> 
     )
 
 
-@implements(turn_error, Car, CarWithTrailers)
+@implements(interface.turn_error, Car, CarWithTrailers)
 def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
-    """The angle between the way to (x, y) and the wheels."""
+    """The angle between the direction to (x, y) and that of the wheels."""
     return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - state[4])
 
 
-@implements(is_folded, Car)
+@implements(interface.is_folded, Car)
 def _is_folded(state: State, vehicle: Car) -> bool:
     return False
 
 
 @inlined
 def most_motion(speed: float, steering: float, car: CarLike) -> tuple[float, float]:
-    """The most speed (m/s) and turn rate (rad/s) at the rear axle in a step into or out of a state."""
+    """The largest speed (m/s) and turn rate (rad/s) at the rear axle in a step into or out of a state."""
     fastest = min(abs(speed) + car.max_acceleration * car.dt, max(car.max_speed, -car.min_speed))
     sharpest = min(abs(steering) + car.max_steering_rate * car.dt, car.max_steering)
     return fastest, fastest * tan(sharpest) / car.wheelbase
 
 
-@implements(swept_bodies, Car)
+@implements(interface.swept_bodies, Car)
 def _swept_bodies(state: State, vehicle: Car) -> tuple[Box, ...]:
     speed, turn = most_motion(state[3], state[4], vehicle)
     return (leading_body(state, speed, turn, vehicle),)

@@ -1,4 +1,4 @@
-"""The car with one or two trailers (LaValle 2006, section 13.1.2.4), each hitched to the axle in front of it.
+"""A car with one or two trailers (LaValle 2006, section 13.1.2.4), each hitched to the axle in front of it.
 
 Hitch angle beta_i = theta_(i-1) - theta_i, theta_0 the car's heading; theta_i' = v_(i-1) sin(beta_i) / d_i,
 v_i = v_(i-1) cos(beta_i). The car moves as without trailers.
@@ -8,32 +8,23 @@ from __future__ import annotations
 
 import math
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import sincos
+from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive, most_motion, turn_rates
-from planners.world.vehicles.interface import (
-    Box,
-    State,
-    box_at,
-    half_way,
-    is_folded,
-    leading_body,
-    load,
-    step,
-    swept_bodies,
-)
+from planners.world.vehicles.interface import State, box_at, half_way, leading_body
 from planners.world.vehicles.vehicle import CarWithTrailers
 
 
-@implements(load, CarWithTrailers)
+@implements(interface.load, CarWithTrailers)
 def _load(states: Floats, i: int, vehicle: CarWithTrailers) -> State:
     return _load_row(states[i], vehicle.hitch_lengths)
 
 
 @inlined
 def _load_row(row: Floats, hitch_lengths: tuple[float, ...]) -> State:
-    if len(hitch_lengths) == 1:  # settled when compiling: a state's size is part of its type
+    if len(hitch_lengths) == 1:  # decided when compiling: a state's size is part of its type
         return row[0], row[1], row[2], row[3], row[4], row[5]
     else:
         return row[0], row[1], row[2], row[3], row[4], row[5], row[6]
@@ -43,7 +34,7 @@ def _load_row(row: Floats, hitch_lengths: tuple[float, ...]) -> State:
 def _hitch_rates(
     speed: float, turn: float, hitch_1: float, hitch_2: float, length_1: float, length_2: float
 ) -> tuple[float, float]:
-    """beta_1' and beta_2' (rad/s) at the car's speed and turn rate. One trailer needs but the first."""
+    """beta_1' and beta_2' (rad/s) at the car's speed and turn rate. One trailer needs only the first."""
     sin_1, cos_1 = sincos(hitch_1)
     sin_2, _ = sincos(hitch_2)
     turn_1 = speed * sin_1 / length_1
@@ -51,7 +42,7 @@ def _hitch_rates(
     return turn - turn_1, turn_1 - turn_2
 
 
-@implements(step, CarWithTrailers)
+@implements(interface.step, CarWithTrailers)
 def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -> State:
     h = vehicle.dt
     speed = state[3]
@@ -82,7 +73,7 @@ def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -
         return x, y, heading, new_speed, new_steering, new_hitch_1, new_hitch_2
 
 
-@implements(is_folded, CarWithTrailers)
+@implements(interface.is_folded, CarWithTrailers)
 def _is_folded(state: State, vehicle: CarWithTrailers) -> bool:
     return abs(state[5]) > vehicle.max_hitch or abs(state[-1]) > vehicle.max_hitch
 
@@ -98,9 +89,9 @@ def _trailer(
     turn: float,
     vehicle: CarWithTrailers,
 ) -> tuple[float, float, float, float, Box]:
-    """The axle (x, y), heading, most turn rate and swept box of the trailer behind a body at this pose.
+    """Axle (x, y), heading, largest turn rate and swept box of the trailer behind a body at this pose.
 
-    ``speed`` and ``turn`` are the most (m/s, rad/s) that the axle in front goes and turns in a step.
+    ``speed`` (m/s) and ``turn`` (rad/s) are the largest of the axle in front within a step.
     """
     widest = min(abs(hitch) + vehicle.dt * (turn + speed / length), 0.5 * math.pi)
     turn_here = speed * sincos(widest)[0] / length
@@ -111,19 +102,12 @@ def _trailer(
     reach = max(vehicle.trailer_front, vehicle.trailer_rear)
     margin = half_way(vehicle.dt, speed, turn_here, reach, 0.5 * vehicle.trailer_width)
     box = box_at(
-        axle_x,
-        axle_y,
-        cos,
-        sin,
-        vehicle.trailer_front,
-        vehicle.trailer_rear,
-        vehicle.trailer_width,
-        margin,
+        axle_x, axle_y, cos, sin, vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width, margin
     )
     return axle_x, axle_y, heading_here, turn_here, box
 
 
-@implements(swept_bodies, CarWithTrailers)
+@implements(interface.swept_bodies, CarWithTrailers)
 def _swept_bodies(state: State, vehicle: CarWithTrailers) -> tuple[Box, ...]:
     x = state[0]
     y = state[1]

@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Box, Floats
 from planners.world.jit import implements
 from planners.world.trigonometry import angle_to, wrapped
+from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive
-from planners.world.vehicles.interface import (
-    Box,
-    State,
-    admissible,
-    control_limits,
-    is_folded,
-    kept_within,
-    leading_body,
-    load,
-    step,
-    swept_bodies,
-    turn_error,
-)
+from planners.world.vehicles.interface import State, kept_within, leading_body
 from planners.world.vehicles.vehicle import DifferentialDrive
 
-LOOK_AHEAD_S = 0.5  # the turn under way counts for this long: damps the controller as steering does a car's
+LOOK_AHEAD_S = 0.5  # the present turn is counted on for this long: damps the controller, as steering a car's
 
 
-@implements(load, DifferentialDrive)
+@implements(interface.load, DifferentialDrive)
 def _load(states: Floats, i: int, vehicle: DifferentialDrive) -> State:
     row = states[i]
     return row[0], row[1], row[2], row[3], row[4]
 
 
-@implements(step, DifferentialDrive)
+@implements(interface.step, DifferentialDrive)
 def _step(state: State, first: float, second: float, vehicle: DifferentialDrive) -> State:
     x, y, heading, speed, turn = state
     h = vehicle.dt
@@ -47,12 +36,12 @@ def _step(state: State, first: float, second: float, vehicle: DifferentialDrive)
     )
 
 
-@implements(control_limits, DifferentialDrive)
+@implements(interface.control_limits, DifferentialDrive)
 def _control_limits(vehicle: DifferentialDrive) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_turn_acceleration
 
 
-@implements(admissible, DifferentialDrive)
+@implements(interface.admissible, DifferentialDrive)
 def _admissible(state: State, first: float, second: float, vehicle: DifferentialDrive) -> tuple[float, float]:
     return (
         kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
@@ -60,17 +49,17 @@ def _admissible(state: State, first: float, second: float, vehicle: Differential
     )
 
 
-@implements(turn_error, DifferentialDrive)
+@implements(interface.turn_error, DifferentialDrive)
 def _turn_error(state: State, x: float, y: float, vehicle: DifferentialDrive) -> float:
     return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - LOOK_AHEAD_S * state[4])
 
 
-@implements(is_folded, DifferentialDrive)
+@implements(interface.is_folded, DifferentialDrive)
 def _is_folded(state: State, vehicle: DifferentialDrive) -> bool:
     return False
 
 
-@implements(swept_bodies, DifferentialDrive)
+@implements(interface.swept_bodies, DifferentialDrive)
 def _swept_bodies(state: State, vehicle: DifferentialDrive) -> tuple[Box, ...]:
     h = vehicle.dt
     speed = min(abs(state[3]) + vehicle.max_acceleration * h, max(vehicle.max_speed, -vehicle.min_speed))

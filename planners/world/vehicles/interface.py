@@ -1,18 +1,18 @@
-"""What a vehicle must be able to do, as kernels that each kind implements in a file of its own.
+"""The kernels that each kind of vehicle implements, in a file of its own.
 
-A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s); two controls
-are constant during a step. A new vehicle is settings in ``vehicle``, a file here, and a line in ``dynamics``.
+A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s). The two
+controls are constant during a step. A new kind of vehicle needs its settings in ``vehicle``, a file here and
+an entry in ``dynamics.KINDS``.
 """
 
 from __future__ import annotations
 
-from planners.world.arrays import Floats
+from planners.world.arrays import Box, Floats
 from planners.world.jit import by_vehicle, inlined
 from planners.world.trigonometry import length, sincos
 from planners.world.vehicles.vehicle import Vehicle
 
 State = tuple[float, ...]
-Box = tuple[float, float, float, float, float, float]  # centre x, y, cos, sin, half length, half width
 
 
 @by_vehicle
@@ -30,28 +30,28 @@ def store(states: Floats, i: int, state: State) -> None:
 
 @by_vehicle
 def step(state: State, first: float, second: float, vehicle: Vehicle) -> State:
-    """Where a classical fourth-order Runge-Kutta step of ``vehicle.dt`` seconds leads with these controls."""
+    """The state after a classical fourth-order Runge-Kutta step of ``vehicle.dt`` seconds."""
     raise NotImplementedError
 
 
 @by_vehicle
 def control_limits(vehicle: Vehicle) -> tuple[float, float]:
-    """The largest absolute value of each of the two controls."""
+    """The largest absolute value of each control."""
     raise NotImplementedError
 
 
 @by_vehicle
 def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
-    """The controls, reduced where a step with them would lead past a limit of the state.
+    """The controls, reduced if a step with them would lead past a limit of the state.
 
-    So nothing is clamped in the middle of a plan, and the margins of ``swept_bodies`` hold.
+    So no state of a plan is ever clamped, and the margins of ``swept_bodies`` hold.
     """
     raise NotImplementedError
 
 
 @by_vehicle
 def turn_error(state: State, x: float, y: float, vehicle: Vehicle) -> float:
-    """By how many radians to turn, left positive, to head for (x, y): a steering controller's error."""
+    """The angle (radians, left positive) by which to turn to head for (x, y): a controller's error."""
     raise NotImplementedError
 
 
@@ -63,25 +63,25 @@ def is_folded(state: State, vehicle: Vehicle) -> bool:
 
 @by_vehicle
 def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
-    """A box around each body, inflated by half the farthest way of its points in an admissible step.
+    """A box around each body, inflated by half of the longest path of a body point in an admissible step.
 
-    So the boxes at both ends of a step cover the sweep between them: nothing is jumped.
+    So the boxes at both ends of a step cover the sweep between them, and no obstacle is jumped over.
     """
     raise NotImplementedError
 
 
 @inlined
 def kept_within(control: float, value: float, low: float, high: float, dt: float) -> float:
-    """The control, reduced where ``dt`` seconds of it would lead ``value`` out of ``low`` to ``high``."""
+    """The control, reduced if ``dt`` seconds of it would lead ``value`` out of ``low`` to ``high``."""
     return min(max(control, (low - value) / dt), (high - value) / dt)
 
 
 @inlined
 def half_way(dt: float, speed: float, turn: float, reach: float, half_width: float) -> float:
-    """Half of the farthest way, in metres, of a body's points in ``dt`` seconds.
+    """Half of the longest path, in metres, of a body point in ``dt`` seconds.
 
-    ``speed`` and ``turn`` are the most (m/s, rad/s) at the body's reference point, from which it reaches
-    ``reach`` metres along and ``half_width`` across.
+    ``speed`` (m/s) and ``turn`` (rad/s) are the largest at the body's reference point, from which the body
+    extends ``reach`` metres along and ``half_width`` metres across.
     """
     return 0.5 * dt * length(speed + half_width * turn, reach * turn)
 
@@ -90,7 +90,7 @@ def half_way(dt: float, speed: float, turn: float, reach: float, half_width: flo
 def box_at(
     x: float, y: float, cos: float, sin: float, front: float, rear: float, width: float, margin: float
 ) -> Box:
-    """The box of a body whose reference point is (x, y), ``margin`` larger on every side."""
+    """The box of a body with its reference point at (x, y), ``margin`` metres larger on every side."""
     ahead = 0.5 * (front - rear)
     half_length = 0.5 * (front + rear) + margin
     return x + ahead * cos, y + ahead * sin, cos, sin, half_length, 0.5 * width + margin
@@ -98,7 +98,7 @@ def box_at(
 
 @inlined
 def leading_body(state: State, speed: float, turn: float, vehicle: Vehicle) -> Box:
-    """The swept box of the first body, which goes and turns at most so fast (m/s, rad/s) in a step."""
+    """The swept box of the first body, for the largest ``speed`` (m/s) and ``turn`` (rad/s) in a step."""
     reach = max(vehicle.front, vehicle.rear)
     margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
     sin, cos = sincos(state[2])

@@ -79,19 +79,19 @@ VEHICLES: dict[str, Vehicle] = {
 
 
 def vehicle_named(name: str) -> Vehicle:
-    """The vehicle of that name; raises ValueError when there is none."""
+    """Return the vehicle of that name. Raises ValueError if there is none."""
     if name not in VEHICLES:
         raise ValueError(f"No vehicle is named {name!r}; the vehicles are {', '.join(VEHICLES)}.")
     return VEHICLES[name]
 
 
 def name_of(vehicle: Vehicle) -> str:
-    """The vehicle's name; a vehicle with settings of its own is called by these."""
-    return next((name for name, known in VEHICLES.items() if known == vehicle), repr(vehicle))
+    """Return the vehicle's name; a vehicle with settings of its own is named by these."""
+    return next((name for name, named in VEHICLES.items() if named == vehicle), repr(vehicle))
 
 
 def state_names(vehicle: Vehicle) -> tuple[str, ...]:
-    """What each variable of a state is, in order."""
+    """Name the variables of a state, in order."""
     pose = ("x", "y", "heading", "speed")
     if isinstance(vehicle, DifferentialDrive):
         return (*pose, "turn_rate")
@@ -101,11 +101,11 @@ def state_names(vehicle: Vehicle) -> tuple[str, ...]:
 
 
 def state_size(vehicle: Vehicle) -> int:
-    """Number of variables of a state: ``S`` in ``[T, S]``."""
+    """Count the variables of a state: ``S`` in ``[T, S]``."""
     return len(state_names(vehicle))
 
 
 def control_names(vehicle: Vehicle) -> tuple[str, str]:
-    """What each of the two controls is, in order."""
+    """Name the two controls, in order."""
     turning = "turn_acceleration" if isinstance(vehicle, DifferentialDrive) else "steering_rate"
     return "acceleration", turning

@@ -35,9 +35,8 @@ def boxes_are_free(boxes: Floats, half_length: float, half_width: float, scene: 
     """Whether each box ``[n, 4]`` (centre, cosine and sine) is free."""
     free = np.empty(len(boxes), np.bool_)
     for i in range(len(boxes)):
-        free[i] = box_is_free(
-            boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], half_length, half_width, scene
-        )
+        box = (boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], half_length, half_width)
+        free[i] = box_is_free(box, scene)
     return free
 
 

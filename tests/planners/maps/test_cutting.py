@@ -8,7 +8,7 @@ import pytest
 import shapely
 from scipy import ndimage
 
-from planners.maps.cutting import LONGEST_WAY, Cut, cut_problems, cut_scenarios
+from planners.maps.cutting import LONGEST_PATH, Cut, cut_problems, cut_scenarios
 from planners.maps.global_path import GlobalPaths, local_goal
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Part, blocks_of
@@ -161,4 +161,4 @@ def test_a_scenario_begins_towards_where_its_way_leaves_the_canonical_distance()
         assert local_goal(path, start, 1.0) == cut.pose[2]
         end = start + CANONICAL_DISTANCE * np.array([math.cos(cut.pose[2]), math.sin(cut.pose[2])])
         assert np.hypot(*(path - end).T).min() <= 1.5
-    assert LONGEST_WAY > 1.0
+    assert LONGEST_PATH > 1.0

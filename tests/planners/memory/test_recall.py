@@ -121,7 +121,7 @@ def test_a_large_memory_finds_a_free_plan_if_and_only_if_there_is_one(
 ):
     problem = problem_in(seed, count)
     free = free_in(memory, problem)
-    with mock.patch("planners.memory.recall.ASKED_FIRST", first):
+    with mock.patch("planners.memory.recall.TRIED_EARLY", first):
         for strategy in ("exhaustive", "hybrid"):
             found = recalled_by(memory, problem, strategy, k)
             assert (found.free >= 0) == free.any()

@@ -10,7 +10,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.optimisation.equations import bounds_of, discs_of, step_of
+from planners.optimisation.equations import discs_of, limits_of, step_of
 from planners.world.arrays import Floats
 from planners.world.vehicles.bodies import body_count, swept_boxes
 from planners.world.vehicles.dynamics import simulate
@@ -25,7 +25,7 @@ DISCS = {name: discs_of(vehicle, 3) for name, vehicle in VEHICLES.items()}
 
 def state_within(rng: np.random.Generator, vehicle: Vehicle) -> Floats:
     """A state ``[S]`` within the limits, so far that a step of controls does not pass them."""
-    limits = bounds_of(vehicle)
+    limits = limits_of(vehicle)
     state = np.concatenate((rng.uniform(-5.0, 55.0, 2), rng.uniform(-math.pi, math.pi, 1)))
     reserve = vehicle.dt * np.append(limits.control_high, np.zeros(len(limits.state_low) - 5))
     return np.append(state, rng.uniform(limits.state_low[3:] + reserve, limits.state_high[3:] - reserve))
@@ -34,7 +34,7 @@ def state_within(rng: np.random.Generator, vehicle: Vehicle) -> Floats:
 @given(names, seeds)
 def test_a_symbolic_step_is_the_kernels_step(name: str, seed: int) -> None:
     rng, vehicle = np.random.default_rng(seed), VEHICLES[name]
-    state, limits = state_within(rng, vehicle), bounds_of(vehicle)
+    state, limits = state_within(rng, vehicle), limits_of(vehicle)
     controls = rng.uniform(limits.control_low, limits.control_high)
     expected = simulate(state, controls[None], vehicle)[1]
     found = np.array(STEPS[name](state, controls, vehicle.dt)).ravel()
@@ -54,6 +54,6 @@ def test_discs_cover_the_boxes_that_the_kernels_check(name: str, seed: int) -> N
 
 @pytest.mark.parametrize("name", VEHICLES)
 def test_there_are_as_many_discs_as_asked_for_on_each_body(name: str) -> None:
-    centres, radii = discs_of(VEHICLES[name], 2)(np.zeros(len(bounds_of(VEHICLES[name]).state_low)))
+    centres, radii = discs_of(VEHICLES[name], 2)(np.zeros(len(limits_of(VEHICLES[name]).state_low)))
     assert centres.shape == (2, 2 * body_count(VEHICLES[name]))
     assert radii.shape == (1, centres.shape[1])

@@ -15,8 +15,8 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
+from planners.routes.path_ahead import PathAhead
 from planners.routes.route import Route, Router, Stuck
-from planners.routes.way_ahead import WayAhead
 from planners.solve import Attempt, solve
 from planners.world.authority.authority import faults
 from planners.world.problem import GOAL_RADIUS, Problem
@@ -130,7 +130,7 @@ def test_where_no_local_problem_is_solved_the_route_ends_with_a_place() -> None:
 def test_the_way_to_go_is_that_of_the_shortest_path() -> None:
     world = OccupancyMap("wall", np.zeros((100, 100), bool), 1.0)
     world.occupied[:90, 50] = True
-    ahead = WayAhead(GlobalPaths(world, 1.0), (80.5, 10.5))
+    ahead = PathAhead(GlobalPaths(world, 1.0), (80.5, 10.5))
     poses = np.array([[20.5, 10.5, 0.0], [80.5, 40.5, 0.0], [80.0, 11.0, 0.0]])
     path = ahead.path(poses[0])
     assert path is not None

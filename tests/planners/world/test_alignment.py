@@ -87,9 +87,9 @@ def test_alignment_changes_nothing_that_is_free(turn: float, x: float, y: float,
             (own, aligned, (u, w, heading), there),
             (aligned, own, there, (u, w, heading)),
         ):
-            roomy = box_is_free(*pose[:2], math.cos(pose[2]), math.sin(pose[2]), 1.001, 0.451, one)
+            roomy = box_is_free((*pose[:2], math.cos(pose[2]), math.sin(pose[2]), 1.001, 0.451), one)
             if roomy:
-                assert box_is_free(*image[:2], math.cos(image[2]), math.sin(image[2]), 1.0, 0.45, other)
+                assert box_is_free((*image[:2], math.cos(image[2]), math.sin(image[2]), 1.0, 0.45), other)
 
 
 def test_a_canonical_problem_stays_as_it_is() -> None:

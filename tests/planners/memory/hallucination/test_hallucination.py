@@ -18,10 +18,10 @@ from planners.memory.plans.experience import Experience
 from planners.memory.plans.fit import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import CAR, Plan, obstacles_of
+from planners.world.problem import Plan, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR_2_TRAILERS
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS
 from tests.planners.memory.conftest import make_experiences
 
 SEEDS = st.integers(0, 2**32 - 1)

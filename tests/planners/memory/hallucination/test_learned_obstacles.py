@@ -18,8 +18,8 @@ from planners.memory.hallucination.learned_obstacles import (
     Learned,
     anchors_of,
     inputs_of,
+    path_of,
     propose,
-    way_of,
 )
 from planners.memory.hallucination.learned_obstacles_training import (
     LearnedTraining,
@@ -48,7 +48,7 @@ def test_the_same_seed_trains_the_same_weights(experiences, weights):
 
 def test_workers_propose_what_was_trained_without_torch(experiences, weights):
     tensors = {name: torch.from_numpy(value) for name, value in weights.items()}
-    ways = np.stack([way_of(experience.plan) for experience in experiences])
+    ways = np.stack([path_of(experience.plan) for experience in experiences])
     means, deviations = proposals(tensors, torch.from_numpy(inputs_of(ways)))
     scale = np.array([PLACE_STD_M, PLACE_STD_M, RADIUS_STD])
     for i, experience in enumerate(experiences):
@@ -60,7 +60,7 @@ def test_workers_propose_what_was_trained_without_torch(experiences, weights):
 
 def test_a_way_is_resampled_evenly_between_its_ends(experiences):
     states = experiences[0].plan.states
-    way = way_of(experiences[0].plan)
+    way = path_of(experiences[0].plan)
     assert way.shape == (POINTS, 2)
     np.testing.assert_allclose(way[[0, -1]], states[[0, -1], :2])
     steps = np.hypot(*np.diff(way, axis=0).T)
@@ -100,7 +100,7 @@ def test_training_finds_obstacles_that_hold_plans():
         return float((made - way).square().sum(2).mean().sqrt())
 
     bends = [_Bent(height) for height in (-12.0, -8.0, 8.0, 12.0)]
-    ways = np.stack([way_of(bend.plan) for bend in bends])
+    ways = np.stack([path_of(bend.plan) for bend in bends])
     assert reconstruction(LearnedTraining(steps=200)) < 0.6 * reconstruction(LearnedTraining(steps=0))
 
 

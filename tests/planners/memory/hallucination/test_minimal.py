@@ -17,21 +17,22 @@ from planners.memory.hallucination.shortcut import (
     SIDE,
     STEP_M,
     close_around,
+    distances_left,
     inflated_radius,
     lattice,
-    shortest_way,
-    ways_left,
+    shortest_path,
 )
 from planners.memory.plans.experience import Experience
-from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, CAR, Obstacles, Plan, obstacles_of
+from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, Obstacles, Plan, obstacles_of
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR
 from tests.planners.memory.conftest import boxes, problem_around
 
 SEEDS = st.integers(0, 2**32 - 1)
 START = (0.0, 0.0)
 RADIUS = inflated_radius(CAR.width)
-LEFT = ways_left(CANONICAL_GOAL, 2.0)
+LEFT = distances_left(CANONICAL_GOAL, 2.0)
 
 
 def detour(rng: np.random.Generator, steps: int = 220) -> Experience:
@@ -53,7 +54,7 @@ def detours() -> list[Experience]:
 
 
 def left(experience: Experience):
-    return ways_left(experience.problem.goal, experience.problem.goal_radius)
+    return distances_left(experience.problem.goal, experience.problem.goal_radius)
 
 
 def closed_by(obstacles: Obstacles):
@@ -103,15 +104,15 @@ def dijkstra_length(solid, goal) -> float:
 def test_the_shortest_way_is_dijkstras_and_keeps_clear(seed, count):
     obstacles = boxes(generator(seed), count)
     solid = polygons_of(obstacles)
-    way = shortest_way(closed_by(obstacles), 0, START, LEFT, math.inf)
+    way = shortest_path(closed_by(obstacles), 0, START, LEFT, math.inf)
     expected = dijkstra_length(solid, CANONICAL_GOAL)
     assert way.length_m == pytest.approx(expected, abs=1e-9)
     if math.isfinite(expected):
         line = LineString(np.column_stack((way.points % SIDE, way.points // SIDE)) * STEP_M + BOUNDS[:2])
         assert line.length == pytest.approx(expected, abs=1e-9)
         assert count == 0 or line.distance(solid) >= 0.5 * CAR.width
-        assert shortest_way(closed_by(obstacles), 0, START, LEFT, expected).length_m == math.inf
-        assert shortest_way(closed_by(obstacles), 0, START, LEFT, expected + 1e-6).length_m < math.inf
+        assert shortest_path(closed_by(obstacles), 0, START, LEFT, expected).length_m == math.inf
+        assert shortest_path(closed_by(obstacles), 0, START, LEFT, expected + 1e-6).length_m < math.inf
 
 
 @given(seed=SEEDS, saving=st.sampled_from([0.02, 0.05, 0.1]))
@@ -123,11 +124,11 @@ def test_removing_any_placed_obstacle_lets_a_shorter_way_through(seed, saving):
     count = len(placed.obstacle_starts) - 1
     limit = (1.0 - saving) * experience.plan.length_m
     closed = closed_by(placed)
-    with_all = min(limit, shortest_way(closed, 0, START, to_goal, limit).length_m)
+    with_all = min(limit, shortest_path(closed, 0, START, to_goal, limit).length_m)
     assert min(limit, dijkstra_length(polygons_of(placed), goal)) == pytest.approx(with_all)
     assert count > 0
     for o in range(count):
-        assert shortest_way(closed, 1 << o, START, to_goal, math.inf).length_m < with_all
+        assert shortest_path(closed, 1 << o, START, to_goal, math.inf).length_m < with_all
     for o in {0, count - 1} & set(range(count)):
         others = [[piece] for k, piece in enumerate(placed.pieces()) if k != o]
         assert dijkstra_length(polygons_of(obstacles_of(others)), goal) < with_all
@@ -138,7 +139,7 @@ def test_shortcuts_that_save_more_are_closed():
     for i, experience in enumerate(detours()):
         limit = 0.9 * experience.plan.length_m
         placed = Minimal().obstacles(experience, generator(3, i))
-        open_ways.append(shortest_way(closed_by(placed), 0, START, left(experience), limit).length_m < limit)
+        open_ways.append(shortest_path(closed_by(placed), 0, START, left(experience), limit).length_m < limit)
     assert np.mean(open_ways) <= 0.2  # where the sweep leaves no room for a polygon, shortcuts stay
 
 

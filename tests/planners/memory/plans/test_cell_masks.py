@@ -74,7 +74,7 @@ def test_plans_are_ranked_by_the_cells_that_they_share_with_obstacles(seed, coun
     assert ranking.cells.tolist() == np.minimum(shared, MOST_CELLS).tolist()
     assert ranking.order.tolist() == np.argsort(np.minimum(shared, MOST_CELLS), kind="stable").tolist()
     for most in (0, 10, MOST_CELLS):
-        assert ranking.places[most] == (shared <= most).sum()
+        assert ranking.ends[most] == (shared <= most).sum()
 
 
 def test_a_plan_that_leaves_the_window_is_never_taken_for_free():

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from planners.memory.plans.fit import Ends, free_plans, plan_fits
 from planners.memory.plans.sweeps import coarse_to_fine, sweep_plans
 from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import CAR, Plan
+from planners.world.problem import Plan
 from planners.world.randomness import generator
+from planners.world.vehicles.vehicle import CAR
 
 SEEDS = st.integers(0, 2**32 - 1)
 

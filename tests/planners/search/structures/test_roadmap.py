@@ -17,7 +17,7 @@ from planners.search.structures.roadmap import (
     RoadmapSettings,
     allocate_roadmap,
     build_roadmap,
-    resample_way,
+    resample_path,
 )
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
@@ -94,7 +94,7 @@ def test_a_resampled_way_has_even_steps_and_ends_at_the_goal():
     roadmap, joined, _ = build(problem, RoadmapSettings(), 3)
     assert joined
     points = np.empty((256, 2))
-    filled = resample_way(roadmap, START, 3.0, points)
+    filled = resample_path(roadmap, START, 3.0, points)
     steps = np.hypot(*np.diff(points[:filled], axis=0).T)
     assert steps.max() <= 3.0 + 1e-9
     np.testing.assert_allclose(points[0], problem.start[:2])

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, ProblemClass, problem_class
 from planners.world.classes.shapes import GOAL_ROOM, START_ROOM
 from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import BOUNDS, CAR, Problem, start_state
+from planners.world.problem import BOUNDS, Problem, start_state
 from planners.world.randomness import generator
-from planners.world.vehicles.vehicle import VEHICLES, CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import CAR, VEHICLES, CarWithTrailers, Vehicle
 from tests.planners.world.kernels import state_is_free
 from tests.planners.world.strategies import seeds
 

@@ -74,10 +74,10 @@ def kernel_answers(
     """Whether each footprint meets its piece, by the planners' kernel."""
     meets = np.empty(poses.shape[0], np.bool_)
     for i in range(poses.shape[0]):
-        meets[i] = box_meets_piece(
-            poses[i, 0], poses[i, 1], math.cos(poses[i, 2]), math.sin(poses[i, 2]), half_length, half_width,
-            scene.piece_starts[pieces[i]], scene.piece_starts[pieces[i] + 1], scene.edges,
-        )  # fmt: skip
+        x, y, heading = poses[i, 0], poses[i, 1], poses[i, 2]
+        box = (x, y, math.cos(heading), math.sin(heading), half_length, half_width)
+        first, last = scene.piece_starts[pieces[i]], scene.piece_starts[pieces[i] + 1]
+        meets[i] = box_meets_piece(box, first, last, scene.edges)
     return meets
 
 
@@ -153,7 +153,8 @@ def test_a_box_is_free_exactly_where_shapely_says_so(seed: int) -> None:
             footprint = shapely.Polygon(box_corners(*box[:3], box[3] + slack, box[4] + slack))
             return inside.covers(footprint) and not len(tree.query(footprint, "intersects"))
 
-        free = box_is_free(x, y, math.cos(heading), math.sin(heading), half_length, half_width, scene)
+        box = (x, y, math.cos(heading), math.sin(heading), half_length, half_width)
+        free = box_is_free(box, scene)
         assert not free or is_free(-CONTACT)
         assert free or not is_free(CONTACT)
 
