@@ -117,10 +117,11 @@ def _arc(side: int, direction: int, steps: int, share: float, vehicle: Vehicle) 
     """
     acceleration, rate = control_limits(vehicle)
     if isinstance(vehicle, DifferentialDrive):
-        speed, level = 0.0, 0.25 * vehicle.max_turn_rate * side
+        # as many steps for every share: with fewer the angle turned would jump, and `_exact` would stop there
+        speed, steer = 0.0, share * _ramp(0.25 * vehicle.max_turn_rate * side, rate, vehicle.dt)
     else:
-        speed, level = -vehicle.min_speed * direction, vehicle.max_steering * side * direction
-    steer = _ramp(share * level, rate, vehicle.dt)
+        speed = -vehicle.min_speed * direction
+        steer = _ramp(share * vehicle.max_steering * side * direction, rate, vehicle.dt)
     hasten = _ramp(speed, acceleration, vehicle.dt)
     still = np.zeros(0)
     return np.concatenate(
