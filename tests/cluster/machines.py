@@ -140,7 +140,7 @@ class Fleet:
             "AWS_DEFAULT_REGION": "us-east-1",
             "AWS_EC2_METADATA_DISABLED": "true",
             "NO_PROXY": "127.0.0.1,localhost",
-            "DASK_CONFIG": str(ROOT / "tasks" / "dask.yaml"),
+            "DASK_CONFIG": str(ROOT / "tasks" / "fan_out" / "dask.yaml"),
         }
         self.start("store", sys.executable, str(Path(__file__).with_name("object_store.py")), str(store))
         on = ("--host", "127.0.0.1", "--port")

@@ -225,7 +225,7 @@ def test_without_no_plan_problems_row_0_never_wins(memory):
 
 
 def test_rows_that_do_not_fit_the_plans_are_refused(memory):
-    with pytest.raises(ValueError, match="8 rows of biases, 8 plans need 9"):
+    with pytest.raises(ValueError, match="8 rows of biases; 8 plans need 9"):
         dataclasses.replace(memory, biases=memory.biases[1:])
 
 

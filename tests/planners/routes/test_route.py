@@ -109,7 +109,7 @@ def test_occupied_and_unreachable_places_are_said() -> None:
         (world, START, inside, "the goal is occupied"),
         (world, (-5.0, 3.0, 0.0), GOALS[0], "out of the map"),
         (world, START, (400.0, 3.0), "out of the map"),
-        (walled, START, GOALS[0], "no way over the map"),
+        (walled, START, GOALS[0], "no path over the map"),
     ):
         found = Router(asked, searched, searched).route(start, [goal])
         assert isinstance(found, Stuck)

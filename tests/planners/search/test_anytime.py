@@ -56,5 +56,5 @@ def test_what_has_no_solution_ends_too(name):
 
 
 def test_without_a_limit_nothing_is_begun():
-    with pytest.raises(ValueError, match="give it seconds or expansions"):
+    with pytest.raises(ValueError, match="give seconds or expansions"):
         improve("rrt", problem_of([]))
