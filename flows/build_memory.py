@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from prefect import flow
-
-from tasks.fan_out.fan_out import run_stage, task_runner
+from tasks.fan_out.fan_out import run_stage
 from tasks.reports.report import report_retrieval, show_retrieval
-from tasks.reports.stage_times import timed
-from tasks.session.hold import holding
+from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.measure_recall import MEASURE_RECALL
 from tasks.tracking.logbook import log_memories
 
 
-@flow(name="build-memory", task_runner=task_runner())
-@holding
-@timed
+@stage_flow
 def build_memory(settings: RunSettings, data: str) -> None:
     """Join encoder, centroids and plans into one archive for each memory, and measure what it recalls."""
     memories = run_stage(BUILD_MEMORY, data, settings)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from prefect import flow
-
 from tasks.fan_out.chunk import keep_settings
-from tasks.fan_out.fan_out import run_stage, task_runner
-from tasks.reports.stage_times import timed
-from tasks.session.hold import holding
+from tasks.fan_out.fan_out import run_stage
+from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
 from tasks.stages.curate import CURATE
@@ -15,9 +12,7 @@ from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
 from tasks.stages.read_worlds import READ_WORLDS, tell_skipped
 
 
-@flow(name="collect", task_runner=task_runner())
-@holding
-@timed
+@stage_flow
 def collect(settings: RunSettings, data: str) -> None:
     """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""
     keep_settings(data, settings)

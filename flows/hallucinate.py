@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from prefect import flow
-
-from tasks.fan_out.fan_out import run_stage, task_runner
-from tasks.reports.stage_times import timed
-from tasks.session.hold import holding
+from tasks.fan_out.fan_out import run_stage
+from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.hallucinate import HALLUCINATE, tell_taken
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION
 from tasks.stages.relabel import RELABEL
 
 
-@flow(name="hallucinate", task_runner=task_runner())
-@holding
-@timed
+@stage_flow
 def hallucinate(settings: RunSettings, data: str) -> None:
     """Make many problems for each plan, label them, and label them once more for the combined memory."""
     run_stage(LEARN_HALLUCINATION, data, settings)

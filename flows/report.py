@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from prefect import flow
-
 from tasks.fan_out.chunk import run_folder
-from tasks.fan_out.fan_out import run_stage, task_runner
+from tasks.fan_out.fan_out import run_stage
 from tasks.reports.report import report_run, show
-from tasks.reports.stage_times import timed
-from tasks.session.hold import holding
+from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.draw_examples import DRAW_EXAMPLES
 from tasks.tracking.artifacts import publish
 from tasks.tracking.logbook import log_report
 
 
-@flow(name="report", task_runner=task_runner())
-@holding
-@timed
+@stage_flow
 def report(settings: RunSettings, data: str) -> None:
     """Turn the rows of a run into tables and figures, print the tables, and log all of it."""
     run_stage(DRAW_EXAMPLES, data, settings)

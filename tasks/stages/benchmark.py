@@ -55,8 +55,5 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
 
 
 BENCHMARK: Final = Stage(
-    name="benchmark",
-    do=benchmark_chunk,
-    cut=_cut,
-    output=lambda chunk: chunk.shard("results"),
+    name="benchmark", do=benchmark_chunk, cut=_cut, output=lambda chunk: chunk.shard("results")
 )

@@ -80,9 +80,4 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     return Cut(len(candidates), len(candidates), inputs)
 
 
-CURATE: Final = Stage(
-    name="curate",
-    do=curate_chunk,
-    cut=_cut,
-    output=lambda chunk: chunk.shard("curated"),
-)
+CURATE: Final = Stage(name="curate", do=curate_chunk, cut=_cut, output=lambda chunk: chunk.shard("curated"))

@@ -98,12 +98,7 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     return Cut(count, CHUNK_PROBLEMS, inputs)
 
 
-JUDGE: Final = Stage(
-    name="judge",
-    do=judge_chunk,
-    cut=_cut,
-    output=lambda chunk: chunk.shard("judged"),
-)
+JUDGE: Final = Stage(name="judge", do=judge_chunk, cut=_cut, output=lambda chunk: chunk.shard("judged"))
 
 
 class Judged(NamedTuple):
