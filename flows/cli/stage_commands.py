@@ -118,9 +118,9 @@ def _session(name: str, options: Options) -> Iterator[tuple[RunSettings, str]]:
 
     settings = settings_of(options)
     if options.learned is not None:
-        from tasks.inputs.learned_on_the_job import with_learned
+        from tasks.inputs.gained_on_the_job import with_gained
 
-        settings = with_learned(settings, options.folder, options.learned)
+        settings = with_gained(settings, options.folder, options.learned)
     workers = worker_count(options.workers)
     with command_session(name, settings, options.folder, workers, options.scheduler) as data:
         yield settings, data

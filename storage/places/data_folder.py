@@ -67,12 +67,12 @@ class DataFolder:
         """Prefect's own folder."""
         return self.path / "prefect"
 
-    def learned(self, vehicle: str) -> Path:
-        """The folder of what was learned on the job for a vehicle (``learned.py``)."""
+    def gained(self, vehicle: str) -> Path:
+        """The folder of experiences that a vehicle gained on the job (``gained_experiences.py``)."""
         return self.path / "learned" / checked_name(vehicle)
 
-    def learned_folders(self) -> list[Path]:
-        """The folders of ``learned`` that are there, one a vehicle."""
+    def gained_folders(self) -> list[Path]:
+        """The folders of experiences that were gained on the job, one a vehicle."""
         return folders_in(self.path / "learned")
 
     @property

@@ -77,7 +77,7 @@ def _changes(
         drawn = [experience for shard in shards for experience in read_experiences(shard, vehicle)]
     except StorageError:
         return settings.taught, list(range(shard_count)), shard_count
-    candidates = [*drawn, *pending.learned[name]]
-    kept = chosen(drawn, pending.learned[name], settings)[: settings.taught]
+    candidates = [*drawn, *pending.gained[name]]
+    kept = chosen(drawn, pending.gained[name], settings)[: settings.taught]
     new = [index for index, row in enumerate(kept) if candidates[row].problem.id not in taught_ids]
     return len(new), sorted({index // size for index in new}), shard_count

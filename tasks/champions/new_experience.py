@@ -12,9 +12,9 @@ from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory, save_memory
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
-from storage.tables.learned_experiences import read_learned, snapshot_ids
+from storage.tables.gained_experiences import read_gained, snapshot_ids
 from tasks.fan_out.chunk import run_folder
-from tasks.inputs.learned_on_the_job import with_learned
+from tasks.inputs.gained_on_the_job import with_gained
 from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version, registered_name
 from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import Champion, Retraining
@@ -37,7 +37,7 @@ class News(NamedTuple):
     first: RunSettings | None  # a run for memories that have no champion
     without: Sequence[str]  # these memories
     champions: Mapping[str, Version]  # by memory
-    learned: Mapping[str, list[Experience]]  # of each class with a champion: all there is
+    gained: Mapping[str, list[Experience]]  # of each class with a champion: all there is
     fresh: Mapping[str, list[Experience]]  # of these, where there are some: what no judged version has seen
     judged: Mapping[str, Version]  # by memory: the last one judged, which may be the champion
 
@@ -54,17 +54,17 @@ def news(folder: DataFolder, settings: RunSettings, registry: Registry) -> News:
         champions[memory], last[memory] = champion, known[-1] if known else champion
         seen[memory] = {each.tag("learned") for each in known}
     without = [memory for memory in settings.memory_names if memory not in champions]
-    everything = read_learned(folder.learned(settings.vehicle), vehicle_named(settings.vehicle))
-    learned = {
+    everything = read_gained(folder.gained(settings.vehicle), vehicle_named(settings.vehicle))
+    gained = {
         name: [each for each in everything if each.problem.class_name == name]
         for name in settings.class_names
         if name in champions
     }
-    place = folder.learned(settings.vehicle)
-    fresh = {name: _fresh(place, found, seen[name]) for name, found in learned.items()}
+    place = folder.gained(settings.vehicle)
+    fresh = {name: _fresh(place, found, seen[name]) for name, found in gained.items()}
     first = restricted(settings, without) if without else None
     return News(
-        first, without, champions, learned, {name: found for name, found in fresh.items() if found}, last
+        first, without, champions, gained, {name: found for name, found in fresh.items() if found}, last
     )
 
 
@@ -108,7 +108,7 @@ def _retraining(folder: DataFolder, settings: RunSettings, registry: Registry, f
     asked = settings if whole else restricted(settings, list(found.fresh))
     against = {name: found.champions[name] for name in asked.memory_names if name in found.champions}
     number = _next_number(registry)
-    asked = with_learned(asked, folder.path, f"retrain-{number:04d}")
+    asked = with_gained(asked, folder.path, f"retrain-{number:04d}")
     vehicle = vehicle_named(settings.vehicle)
     with scratch_folder() as scratch:
         archives = {}
@@ -148,10 +148,10 @@ def _is_judged(version: Version, champion: Version | None) -> bool:
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 
 
-def _fresh(place: Path, learned: Sequence[Experience], seen: set[str]) -> list[Experience]:
+def _fresh(place: Path, gained: Sequence[Experience], seen: set[str]) -> list[Experience]:
     """What is in none of the snapshots."""
     known = {identity for called in seen - {""} for identity in snapshot_ids(place, called)}
-    return [each for each in learned if each.problem.id not in known]
+    return [each for each in gained if each.problem.id not in known]
 
 
 def _told(memory: str, champion: Version, found: News) -> str:

@@ -25,7 +25,7 @@ from storage.places.files import whole_file
 from storage.places.mirror import folders_here
 from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.timing import no_garbage_collection
-from tasks.inputs.learned_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
 from tasks.settings.checks import check_known, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError

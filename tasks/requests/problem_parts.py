@@ -21,7 +21,7 @@ from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.inputs.learned_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 
 PART_PROBLEMS: Final = 500  # seconds of work: what a killed worker does again

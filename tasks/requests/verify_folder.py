@@ -34,8 +34,8 @@ from storage.places.mirror import is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
 from storage.tables.experiences import read_experiences
+from storage.tables.gained_experiences import gained_shards
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
-from storage.tables.learned_experiences import learned_shards
 from storage.tables.recalls import read_recalls
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt, same_outcome
 from tasks.inputs.problem_sources import held_back, source_of
@@ -59,7 +59,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
     data = open_data_folder(folder)
     jobs = [job for run in data.runs() for job in _jobs(data.place, run, sample)]
     for name, vehicle in VEHICLES.items():
-        jobs += [partial(_experiences, path, vehicle) for path in learned_shards(data.learned(name))]
+        jobs += [partial(_experiences, path, vehicle) for path in gained_shards(data.gained(name))]
     if not jobs:
         raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
     checked: Counter[str] = Counter()

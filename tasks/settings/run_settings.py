@@ -86,7 +86,7 @@ class RunSettings:
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
     candidates: int = 0  # solved problems of a class to choose experiences from; few: the first are kept
-    learned: str = ""  # a snapshot of what was learned on the job: more candidates
+    learned: str = ""  # a snapshot of experiences gained on the job: more candidates
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
     retraining: Retraining | None = None  # what it begins from, if it is one
 

@@ -11,7 +11,7 @@ from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.data_folder import open_data_folder
 from storage.tables.experiences import merge_experiences, read_experiences
-from storage.tables.learned_experiences import extract_class, snapshot_path
+from storage.tables.gained_experiences import extract_class, snapshot_path
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import held_back, source_of
@@ -24,25 +24,25 @@ def curate_chunk(chunk: Chunk) -> None:
     run, settings, name = chunk.run, chunk.settings, chunk.class_name
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
     drawn = [each for shard in shards for each in read_experiences(shard, chunk.vehicle)]
-    learned = _learned_of(chunk)
-    shards += [run.shard("learned", name, 0)] if learned else []
-    merge_experiences(shards, chunk.shard("curated"), chosen(drawn, learned, settings), chunk.key)
+    gained = _gained_of(chunk)
+    shards += [run.shard("learned", name, 0)] if gained else []
+    merge_experiences(shards, chunk.shard("curated"), chosen(drawn, gained, settings), chunk.key)
 
 
-def chosen(drawn: Sequence[Experience], learned: Sequence[Experience], settings: RunSettings) -> list[int]:
+def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: RunSettings) -> list[int]:
     """Which of a class's experiences to keep.
 
     Args:
         drawn: experiences of problems that the run drew itself.
-        learned: experiences that were gained on the job.
+        gained: experiences that were gained on the job.
         settings: those of the run.
 
     Returns:
-        [N] positions in ``drawn`` followed by ``learned``, the most useful first.
+        [N] positions in ``drawn`` followed by ``gained``, the most useful first.
 
     """
-    rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(learned)))
-    everything = [*drawn, *learned]
+    rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(gained)))
+    everything = [*drawn, *gained]
     candidates = [everything[row] for row in rows]
     kept = curate(candidates, settings.taught, vehicle_named(settings.vehicle)).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
@@ -51,7 +51,7 @@ def chosen(drawn: Sequence[Experience], learned: Sequence[Experience], settings:
     return [rows[i] for i in kept]
 
 
-def _learned_of(chunk: Chunk) -> list[Experience]:
+def _gained_of(chunk: Chunk) -> list[Experience]:
     """What was gained of the class on the job, but for problems by which the run is measured."""
     settings, name = chunk.settings, chunk.class_name
     if not settings.learned:
@@ -62,7 +62,7 @@ def _learned_of(chunk: Chunk) -> list[Experience]:
         for source in sources
         for i in range(source.count("test", settings.test_problems))
     }
-    snapshot = snapshot_path(open_data_folder(chunk.data).learned(settings.vehicle), settings.learned)
+    snapshot = snapshot_path(open_data_folder(chunk.data).gained(settings.vehicle), settings.learned)
     shard = chunk.shard("learned")
     extract_class(snapshot, name, tested, shard, chunk.key)
     return read_experiences(shard, chunk.vehicle)

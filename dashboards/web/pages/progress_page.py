@@ -27,7 +27,7 @@ from dashboards.web.parameters import Parameters, link
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
 from storage.tables.configurations import BASELINE
-from storage.tables.learned_experiences import learned_shards
+from storage.tables.gained_experiences import gained_shards
 from storage.tables.recalls import read_recalls
 from storage.tables.watched import read_watched
 
@@ -247,8 +247,8 @@ def _run_after_run(measured: list[MeasuredRun], configuration: str) -> Iterator[
 
 def _learned(data: DataReader) -> Iterator[dict[str, Any]]:
     """What was learned from solving: files and the newest change, by vehicle."""
-    for folder in data.folder.learned_folders():
-        times = [shard.stat().st_mtime for shard in learned_shards(folder) if shard.is_file()]
+    for folder in data.folder.gained_folders():
+        times = [shard.stat().st_mtime for shard in gained_shards(folder) if shard.is_file()]
         if times:
             newest = datetime.fromtimestamp(max(times), UTC)
             yield {"vehicle": folder.name, "files": len(times), "newest": f"{newest:%Y-%m-%d %H:%M} UTC"}

@@ -11,7 +11,7 @@ from planners.world.vehicles.vehicle import CAR
 from storage.places.data_folder import open_data_folder
 from tasks.champions.conclude import conclude
 from tasks.champions.new_experience import rounds
-from tasks.inputs.learned_on_the_job import Solved, remember
+from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.champion_registry import Registry
 from tasks.reports.report import report_retrieval
 from tasks.settings.presets import for_preset

@@ -21,7 +21,7 @@ from storage.exchange.problems import write_problems
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked
 from storage.tables.attempts import read_attempts, write_attempts
-from storage.tables.learned_experiences import learned_shards
+from storage.tables.gained_experiences import gained_shards
 from tasks.requests import problem_parts as parts
 from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
@@ -182,7 +182,7 @@ def test_plans_lie_in_one_folder_and_very_many_in_one_a_part(
 def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) -> None:
     for out in ("one.parquet", "other.parquet"):
         solve_many(ASSISTANT, problems, tmp_path / out, learn=tmp_path / "data")
-    shards = learned_shards(DataFolder(tmp_path / "data").learned("car"))
+    shards = gained_shards(DataFolder(tmp_path / "data").gained("car"))
     assert len(shards) == -(-COUNT // SIZE)
 
 

@@ -1,4 +1,4 @@
-"""What was learned on the job: problems that any number of processes solved, without repeats, up to a limit.
+"""Experiences gained on the job: problems that any number of processes solved, no repeats, up to a limit.
 
 A folder holds shards whose names follow from their contents, so writers never meet. The process that writes
 one too many merges them all, under a lock.
@@ -36,7 +36,7 @@ DIGITS: Final = 8  # of a snapshot's digest
 READINGS: Final = 3  # of shards that others may merge
 
 
-def add_learned(
+def add_gained(
     folder: Path,
     experiences: Sequence[Experience],
     *,
@@ -61,11 +61,11 @@ def add_learned(
         planning_seconds=planning_seconds,
         vehicle=vehicle,
     )
-    if len(learned_shards(folder)) > SHARDS:
+    if len(gained_shards(folder)) > SHARDS:
         _merge(folder, vehicle)
 
 
-def learned_shards(folder: Path) -> list[Path]:
+def gained_shards(folder: Path) -> list[Path]:
     """The shards in a ``folder``; their order says nothing."""
     return files_in(folder, "[!.]*.parquet")
 
@@ -76,7 +76,7 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     Returns what the snapshot is called: the name and a digest of the content. Raises StorageError if nothing
     is learned yet.
     """
-    if not learned_shards(folder):
+    if not gained_shards(folder):
         raise StorageError(f"{folder} holds nothing that was learned; solve problems with --learn first.")
     with locked(folder / ".lock", str(folder)):
         taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
@@ -101,7 +101,7 @@ def snapshot_ids(folder: Path, snapshot: str) -> set[str]:
         return set()
 
 
-def read_learned(folder: Path, vehicle: Vehicle) -> list[Experience]:
+def read_gained(folder: Path, vehicle: Vehicle) -> list[Experience]:
     """What a ``folder`` holds of a ``vehicle`` now, as a snapshot would keep it; nothing is written."""
     for _ in range(READINGS):
         with suppress(StorageError):  # another process merged the shards meanwhile
@@ -140,7 +140,7 @@ def _merge(folder: Path, vehicle: Vehicle) -> None:
 
 def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
     """All shards, what the rule keeps of them in its order, and a digest of that; call it with the lock."""
-    shards = learned_shards(folder)
+    shards = gained_shards(folder)
     if not shards:
         return [], EXPERIENCES.empty_table(), ""
     table = pa.concat_tables([read_experience_table(shard, vehicle) for shard in shards])

@@ -16,7 +16,7 @@ from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
-from tasks.inputs.learned_on_the_job import Solved, remember, with_learned
+from tasks.inputs.gained_on_the_job import Solved, remember, with_gained
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import RunSettings
 from tests.tasks.in_process import collect
@@ -45,7 +45,7 @@ def _candidates(data: Path, settings: RunSettings) -> list[Experience]:
 
 def test_what_was_learned_is_chosen_among(tmp_path: Path, solved: list[Solved]) -> None:
     assert remember(tmp_path, solved, CAR) == len(solved)
-    settings = with_learned(SETTINGS, tmp_path, "monday")
+    settings = with_gained(SETTINGS, tmp_path, "monday")
     assert settings.run_name != SETTINGS.run_name
     collect(str(tmp_path), settings)
     learned = _candidates(tmp_path, settings)
@@ -57,17 +57,17 @@ def test_what_was_learned_is_chosen_among(tmp_path: Path, solved: list[Solved]) 
 
 def test_a_name_means_the_same_after_more_was_learned(tmp_path: Path, solved: list[Solved]) -> None:
     remember(tmp_path, solved[:2], CAR)
-    before = with_learned(SETTINGS, tmp_path, "monday")
+    before = with_gained(SETTINGS, tmp_path, "monday")
     remember(tmp_path, solved[2:], CAR)
-    assert with_learned(SETTINGS, tmp_path, "monday") == before
-    assert with_learned(SETTINGS, tmp_path, "tuesday").digest != before.digest
+    assert with_gained(SETTINGS, tmp_path, "monday") == before
+    assert with_gained(SETTINGS, tmp_path, "tuesday").digest != before.digest
     assert RunSettings.from_json(before.to_json()) == before
 
 
 def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, solved: list[Solved]) -> None:
     asked = problem_class("curves", "easy").draw(2 * SETTINGS.seed + 1, 1)
     remember(tmp_path, [*solved[:1], _solved(asked)], CAR)
-    settings = with_learned(SETTINGS, tmp_path, "now")
+    settings = with_gained(SETTINGS, tmp_path, "now")
     collect(str(tmp_path), settings)
     assert [each.problem.id for each in _candidates(tmp_path, settings)] == [solved[0].problem.id]
 
@@ -76,4 +76,4 @@ def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) ->
     again = [Solved(problem, replace(attempt, source="recalled")) for problem, attempt in solved]
     assert remember(tmp_path, again, CAR) == 0
     with pytest.raises(StorageError, match="holds nothing that was learned"):
-        with_learned(SETTINGS, tmp_path, "now")
+        with_gained(SETTINGS, tmp_path, "now")

@@ -1,4 +1,4 @@
-"""Learning on the job: new plans of `solve` and `plan`, kept for runs that ask for them."""
+"""Experiences gained on the job: new plans of `solve` and `plan`, kept for runs that ask for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of, vehicle_named
 from storage.places.data_folder import open_data_folder
 from storage.places.run_folder import checked_name
-from storage.tables.learned_experiences import add_learned, take_snapshot
+from storage.tables.gained_experiences import add_gained, take_snapshot
 from tasks.settings.run_settings import RunSettings
 
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
@@ -44,8 +44,8 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
         if attempt.plan is not None and attempt.source in NEW
     ]
     if new:
-        add_learned(
-            open_data_folder(data).learned(name_of(vehicle)),
+        add_gained(
+            open_data_folder(data).gained(name_of(vehicle)),
             [experience for experience, _ in new],
             planner=new[0][1].planner,
             seeds=[attempt.seed for _, attempt in new],
@@ -55,8 +55,8 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     return len(new)
 
 
-def with_learned(settings: RunSettings, data: Path, name: str) -> RunSettings:
-    """The settings with a snapshot of what was learned on the job, as more candidates to choose from.
+def with_gained(settings: RunSettings, data: Path, name: str) -> RunSettings:
+    """The settings with a snapshot of what was gained on the job, as more candidates to choose from.
 
     Args:
         settings: those of the run.
@@ -67,6 +67,6 @@ def with_learned(settings: RunSettings, data: Path, name: str) -> RunSettings:
         StorageError: nothing was learned for the vehicle.
 
     """
-    folder = open_data_folder(data).learned(settings.vehicle)
+    folder = open_data_folder(data).gained(settings.vehicle)
     snapshot = take_snapshot(folder, checked_name(name), vehicle_named(settings.vehicle))
     return replace(settings, learned=snapshot)

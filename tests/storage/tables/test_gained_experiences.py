@@ -13,12 +13,12 @@ from planners.memory.plans.experience import Experience
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.errors import StorageError
-from storage.tables import learned_experiences as learned
+from storage.tables import gained_experiences as learned
 from storage.tables.experiences import read_experiences
-from storage.tables.learned_experiences import (
-    add_learned,
+from storage.tables.gained_experiences import (
+    add_gained,
     extract_class,
-    learned_shards,
+    gained_shards,
     snapshot_path,
     take_snapshot,
 )
@@ -39,7 +39,7 @@ def experience(number: int, identity: str = "", class_name: str = "curves") -> E
 def add(folder: Path, experiences: list[Experience]) -> None:
     """Add them, all with the same planner, seed and time."""
     count = len(experiences)
-    add_learned(
+    add_gained(
         folder, experiences, planner="gust", seeds=[1] * count, planning_seconds=[0.5] * count, vehicle=CAR
     )
 
@@ -66,7 +66,7 @@ def test_the_order_of_writing_and_merging_does_not_matter(
     for number in numbers:
         add(tmp_path / "one", [experience(number)])
     add(tmp_path / "other", [experience(number) for number in reversed(numbers)])
-    assert len(learned_shards(tmp_path / "one")) <= 4
+    assert len(gained_shards(tmp_path / "one")) <= 4
     assert known(tmp_path / "one") == known(tmp_path / "other")
     assert len(known(tmp_path / "one")) == 10
 
@@ -99,8 +99,8 @@ def test_nothing_learned_and_another_vehicle_are_told_in_a_line(tmp_path: Path) 
 
 def test_many_processes_at_once_lose_and_repeat_nothing(tmp_path: Path) -> None:
     script = (
-        "import sys; from pathlib import Path; from storage.tables import learned_experiences as learned;"
-        "from tests.storage.tables.test_learned_experiences import add, experience; learned.SHARDS = 4\n"
+        "import sys; from pathlib import Path; from storage.tables import gained_experiences as learned;"
+        "from tests.storage.tables.test_gained_experiences import add, experience; learned.SHARDS = 4\n"
         "for i in range(40): add(Path(sys.argv[1]), [experience(int(sys.argv[2]) * 20 + i)])"
     )  # each shares half of what it learns with the next
     writers = [
@@ -109,4 +109,4 @@ def test_many_processes_at_once_lose_and_repeat_nothing(tmp_path: Path) -> None:
     ]
     assert [writer.wait(timeout=100) for writer in writers] == [0] * WRITERS
     assert sorted(known(tmp_path)) == sorted(f"p-{i}" for i in range(20 * WRITERS + 20))
-    assert len(learned_shards(tmp_path)) < 40
+    assert len(gained_shards(tmp_path)) < 40
