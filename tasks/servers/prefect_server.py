@@ -1,9 +1,9 @@
-"""A command's own Prefect server: on loopback, inside the data folder, gone when nobody uses it.
+"""A command's own Prefect server, on loopback, with its files in the data folder.
 
-The server is a child process (``tasks.servers.prefect_app``) that watches the commands which registered with
-it. It outlives none of them: when the last one has ended, even by kill -9, it stops itself. A command that
-finds it alive shares it. Nobody else can be its client: its password, a new one each time, lies in a file
-that only the owner can read.
+The server is a child process (``tasks.servers.prefect_app``) that watches the commands registered with it.
+When the last of them has ended, even by kill -9, it stops. A command that finds a server running shares it.
+When the server dies, a command starts it again at the same address, with the same password, and goes on.
+Each server has a new password, in a file that only the owner can read.
 """
 
 from __future__ import annotations
@@ -27,14 +27,17 @@ from tasks.settings.environment import environment
 
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
-STOP_SECONDS: Final = 0.8  # then the child ends itself the hard way; SQLite stands that
+STOP_SECONDS: Final = 0.8  # then the child exits at once, which SQLite survives
 
-RESTARTS: Final = 2
+RESTARTS: Final = 2  # without an answer in between
 HOST: Final = "127.0.0.1"
-CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")  # what makes a client of a server
+CLIENT: Final = (
+    "PREFECT_API_URL",
+    "PREFECT_API_AUTH_STRING",
+)  # variables that make a process a client of the server
 URL, SECRET, LOG = "server.url", "server.auth", "server.log"  # files of the server's folder
 
-# Set before Prefect, MLflow, Dask or a BLAS is imported, and only where the user has not decided otherwise.
+# Set before Prefect, MLflow, Dask or a BLAS is imported, unless the user has set them.
 ENVIRONMENT: Final = {
     "DO_NOT_TRACK": "true",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
@@ -47,15 +50,15 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_READ_BATCH_SIZE": "50",
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_FLUSH_INTERVAL": "1",
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
-    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # a failure is told once, in one line, by the command
-    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # nor that an event did not reach a server that died
-    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states say it all; logs would cost a request a task
+    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command reports a failure once, in one line
+    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server has missed is no failure
+    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states are enough; logs would cost one request for each task
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
-    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # what a server says whose database is away
+    "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
     "MLFLOW_LOGGING_LEVEL": "ERROR",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",
-    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # that it cleans up after a process is no news
+    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # it cleans up after a killed process: no news
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -65,42 +68,42 @@ ENVIRONMENT: Final = {
 
 @dataclass(frozen=True)
 class LocalServer:
-    """A server that is up, or coming up."""
+    """A server that runs or is starting."""
 
     url: str  # of the API, http://127.0.0.1:<port>/api
-    folder: Path  # where it lives, ``prefect`` in the data folder
+    folder: Path  # of its files: ``prefect`` in the data folder
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """The port of the API and of the pages."""
         return int(self.ui_url.rpartition(":")[2])
 
     @property
     def ui_url(self) -> str:
-        """Address to open in a browser, which asks for the secret."""
+        """The address to open in a browser, which then asks for the password."""
         return self.url.removesuffix("/api")
 
     @property
     def secret_file(self) -> Path:
-        """Where the secret lies, readable by its owner alone."""
+        """The file with the password, which only its owner can read."""
         return self.folder / SECRET
 
     @property
     def secret(self) -> str:
-        """The ``user:password`` that it asks for."""
+        """The ``user:password`` that the server asks for."""
         return self.secret_file.read_text()
 
     @property
     def environment(self) -> dict[str, str]:
-        """What makes Prefect in this process, and in its children, a client of the server."""
+        """Variables that make Prefect, in this process and its children, a client of the server."""
         return dict(zip(CLIENT, (self.url, self.secret), strict=True))
 
     def __str__(self) -> str:
-        """The line that tells people where to look, and where the password lies."""
+        """The line that tells the user the address and the file of the password."""
         return f"Prefect  {self.ui_url} (while this runs; the password is in {self.secret_file})"
 
     def wait(self, seconds: float = START_SECONDS) -> None:
-        """Return when the server answers; RuntimeError with one line when it does not."""
+        """Return when the server answers. Raises RuntimeError if it does not within ``seconds``."""
         deadline = time.monotonic() + seconds
         while not is_healthy(self.url):
             if time.monotonic() > deadline:
@@ -112,9 +115,9 @@ class LocalServer:
 
 
 def set_environment(data: Path) -> None:
-    """Quiet, private and embedded defaults for every library a command uses, all inside ``data``.
+    """Set quiet and private defaults for the libraries that a command uses, with their files in ``data``.
 
-    And the password of all servers, where one is set: ours ask for it, and clients send it.
+    A password (``tasks.servers.access``) is set for Prefect's and MLflow's servers and clients too.
     """
     home = data / "prefect"
     home.mkdir(0o700, parents=True, exist_ok=True)
@@ -129,10 +132,10 @@ def set_environment(data: Path) -> None:
 
 @contextmanager
 def local_server(data: Path) -> Iterator[LocalServer | None]:
-    """Share or start the server of ``data [folder]``; None when PREFECT_API_URL names another one.
+    """Share or start the server of a data folder, and make this process its client.
 
-    Returns at once, and the server needs some 5 s more: see ``LocalServer.wait``. Sets the environment that
-    makes a client of Prefect.
+    Yields the server, which needs some 5 s to start (``LocalServer.wait``), or None if PREFECT_API_URL names
+    another one.
     """
     set_environment(data)
     if os.environ.get("PREFECT_API_URL"):
@@ -153,25 +156,28 @@ def local_server(data: Path) -> Iterator[LocalServer | None]:
 
 
 def running_server(data: Path) -> LocalServer | None:
-    """The server that lives in a data folder, if one does; healthy or still starting."""
+    """The server of a data folder that runs or is starting, or None."""
     folder = data / "prefect"
     return LocalServer((folder / URL).read_text(), folder) if is_held(folder / URL) else None
 
 
 def _join(folder: Path) -> tuple[LocalServer, socket.socket | None]:
-    """The server that other commands use, who start it again if it has died, or a new one and its socket."""
+    """The server that other commands use, or a new one and its open port.
+
+    If the server of other commands has died, they start it again.
+    """
     if is_held(folder / URL) or is_used(folder):
         return LocalServer((folder / URL).read_text(), folder), None
     new_secret(folder / SECRET)
     (folder / LOG).unlink(missing_ok=True)
-    listener = socket.create_server((HOST, 0))  # at once, so that no program of others takes the port first
+    listener = socket.create_server((HOST, 0))  # opened here, so that no other program takes the port
     server = LocalServer(f"http://{HOST}:{listener.getsockname()[1]}/api", folder)
     _start(server, listener)
     return server, listener
 
 
 def _start(server: LocalServer, listener: socket.socket) -> None:
-    """Have a child be the server."""
+    """Start the server in a child process at an open port."""
     folder = server.folder
     with (folder / URL).open("w") as state, (folder / LOG).open("ab") as sink:
         state.write(server.url)
@@ -182,21 +188,21 @@ def _start(server: LocalServer, listener: socket.socket) -> None:
             env=os.environ
             | {
                 "PREFECT_SERVER_API_AUTH_STRING": server.secret,
-                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # what this one has
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # as in this process
             },
             stdin=subprocess.DEVNULL,
             stdout=sink,
             stderr=sink,
-            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock for as long as it lives
-            start_new_session=True,  # Ctrl-C is for the command; the server follows by itself
+            pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock until it ends
+            start_new_session=True,  # Ctrl-C ends the command; the server then stops by itself
         )
-    threading.Thread(target=child.wait, daemon=True).start()  # no zombie, should it end first
+    threading.Thread(target=child.wait, daemon=True).start()  # no zombie is left if it ends first
 
 
 def _keep(server: LocalServer, listener: socket.socket | None, left: threading.Event) -> None:
     """Start the server again whenever it dies, until this command has left it.
 
-    While nobody listens at the port, who connects to it waits, if this command opened it.
+    As long as a command holds the port open, clients that connect meanwhile wait for the next server.
     """
     deaths = 0  # without an answer in between
     while not left.wait(POLL_SECONDS):
@@ -218,10 +224,10 @@ def _keep(server: LocalServer, listener: socket.socket | None, left: threading.E
         listener.close()
 
 
-def _give_up(server: LocalServer, why: str) -> None:
-    """End this process: it would wait for the server for minutes, whatever it does."""
+def _give_up(server: LocalServer, reason: str) -> None:
+    """End this process, which otherwise would wait for the server for minutes."""
     print(
-        f"motion-memory: The local Prefect server {why}; see {server.folder / LOG}. What is finished is "
+        f"motion-memory: The local Prefect server {reason}; see {server.folder / LOG}. What is finished is "
         "kept; the same command goes on from here.",
         file=sys.stderr,
         flush=True,
@@ -230,7 +236,7 @@ def _give_up(server: LocalServer, why: str) -> None:
 
 
 def _leave(folder: Path, user: IO[str]) -> None:
-    """Be no user any more and, if this was the last, see the server go."""
+    """Stop being a user; the last user waits for the server to end."""
     with (folder / URL).open("a") as state:  # the child still holds it after it removed the name
         Path(user.name).unlink(missing_ok=True)
         user.close()
@@ -240,8 +246,8 @@ def _leave(folder: Path, user: IO[str]) -> None:
 
 
 def is_healthy(url: str) -> bool:
-    """Whether the server at an address answers that it is."""
-    import urllib.request  # late: few who import this start a server
+    """Whether the server at an address answers that it is healthy."""
+    import urllib.request  # late: few importers of this module start a server
 
     try:
         direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))

@@ -1,4 +1,4 @@
-"""Who uses the server of a folder: each user holds a file locked, which the kernel takes from dead ones."""
+"""Users of the server of a folder: each holds a lock on a file, which the kernel releases when it dies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ USERS: Final = "users"  # folder of one file for each process that uses the serv
 
 
 def register(folder: Path) -> IO[str]:
-    """Become a user of the server of ``folder``, for as long as the file that is returned is open."""
+    """Register this process as a user of the server of ``folder``, until the file that is returned closes."""
     (folder / USERS).mkdir(parents=True, exist_ok=True)
     user = (folder / USERS / str(os.getpid())).open("w")
     fcntl.flock(user, fcntl.LOCK_EX)
@@ -21,7 +21,7 @@ def register(folder: Path) -> IO[str]:
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a command that registered is still alive; what dead ones left is removed."""
+    """Whether a registered command is alive; files of dead ones are removed."""
     entries = list((folder / USERS).glob("*"))
     for entry in entries:
         if not is_held(entry):
@@ -30,7 +30,7 @@ def is_used(folder: Path) -> bool:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a living process holds the lock on a file; the kernel takes locks from dead ones."""
+    """Whether a living process holds the lock on a file; the kernel releases the locks of dead ones."""
     try:
         with path.open() as file:
             return is_locked(file)
@@ -39,7 +39,7 @@ def is_held(path: Path) -> bool:
 
 
 def is_locked(file: IO[str]) -> bool:
-    """Whether another open file holds the lock."""
+    """Whether another open file holds the lock of this one."""
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -50,7 +50,7 @@ def is_locked(file: IO[str]) -> bool:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Nobody else starts or ends the server of ``folder`` meanwhile."""
+    """Keep other processes from starting or ending the server of ``folder``."""
     with (folder / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
