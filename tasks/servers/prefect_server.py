@@ -30,6 +30,7 @@ POLL_SECONDS: Final = 0.1
 STOP_SECONDS: Final = 0.8  # then the child exits at once, which SQLite survives
 
 RESTARTS: Final = 2  # without an answer in between
+PORT_SECONDS: Final = 5.0  # for which the port of a dead server may be taken
 HOST: Final = "127.0.0.1"
 CLIENT: Final = (
     "PREFECT_API_URL",
@@ -205,21 +206,27 @@ def _keep(server: LocalServer, listener: socket.socket | None, left: threading.E
     As long as a command holds the port open, clients that connect meanwhile wait for the next server.
     """
     deaths = 0  # without an answer in between
+    refusals = 0  # of the port, one after another
     while not left.wait(POLL_SECONDS):
         if is_held(server.folder / URL):
+            refusals = 0
             deaths = 0 if deaths and is_healthy(server.url) else deaths
             continue
-        deaths += 1
-        if deaths > RESTARTS:
-            _give_up(server, "dies again and again")
-        try:
-            with locked(server.folder):
-                if not (is_held(server.folder / URL) or left.is_set()):  # no other command was faster
-                    print("The local Prefect server died; it is started again.", file=sys.stderr)
-                    listener = listener or socket.create_server((HOST, server.port))
-                    _start(server, listener)
-        except OSError as error:
-            _give_up(server, f"died, and cannot be started again: {error.strerror}")
+        with locked(server.folder):
+            if is_held(server.folder / URL) or left.is_set():  # another command was faster
+                continue
+            try:
+                listener = listener or socket.create_server((HOST, server.port))
+            except OSError as error:  # mostly the command that has the port, which starts the server itself
+                refusals += 1
+                if refusals * POLL_SECONDS > PORT_SECONDS:
+                    _give_up(server, f"died, and cannot be started again: {error.strerror}")
+                continue
+            deaths += 1
+            if deaths > RESTARTS:
+                _give_up(server, "dies again and again")
+            print("The local Prefect server died; it is started again.", file=sys.stderr)
+            _start(server, listener)
     if listener is not None:
         listener.close()
 
