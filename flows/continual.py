@@ -9,14 +9,14 @@ from flows.build_memory import build_memory
 from flows.collect import collect
 from flows.hallucinate import hallucinate
 from flows.train import train
-from tasks.session.hold import holding
+from tasks.session.folder_lock import locks_data_folder
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
 @flow(name="continual")
-@holding
+@locks_data_folder
 def continual(settings: RunSettings, data: str) -> None:
     """Collect, hallucinate, train, build and benchmark with a fifth, two fifths ... of the experiences."""
     for fewer in runs_of_continual(settings):

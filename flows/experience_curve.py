@@ -10,13 +10,13 @@ from flows.hallucinate import hallucinate
 from flows.train import train
 from tasks.fan_out.fan_out import cluster
 from tasks.reports.experience_curve import report_curve, runs_of_curve
-from tasks.session.hold import holding
+from tasks.session.folder_lock import locks_data_folder
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
 @flow(name="experience-curve")
-@holding
+@locks_data_folder
 def experience_curve(settings: RunSettings, data: str) -> None:
     """Make memories of more and more experiences, each from the first stage on, and compare their recall."""
     runs = runs_of_curve(settings)

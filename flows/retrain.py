@@ -11,15 +11,15 @@ from flows.judge import judge
 from flows.train import train
 from tasks.champions.conclude import conclude
 from tasks.champions.new_experience import rounds
-from tasks.champions.retraining_schedule import tell_failure
+from tasks.champions.retraining_schedule import print_failure
 from tasks.fan_out.fan_out import cluster
 from tasks.registry.champion_registry import Registry
-from tasks.session.hold import hold
+from tasks.session.folder_lock import locked_folder
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="retrain", on_failure=[tell_failure])  # type: ignore[list-item]  # meant for methods
+@flow(name="retrain", on_failure=[print_failure])  # type: ignore[list-item]  # meant for methods
 def retrain(
     settings: RunSettings,
     data: str,
@@ -28,7 +28,7 @@ def retrain(
     scheduler: str | None = None,
 ) -> None:
     """Make memories of what was learned since the champions, judge them, and promote what is better."""
-    with hold(data) as folder, cluster(workers, scheduler):
+    with locked_folder(data) as folder, cluster(workers, scheduler):
         registry = Registry(folder)
         for made in rounds(folder, settings, registry):
             with run_logged(data, made.settings):

@@ -12,13 +12,13 @@ from flows.hallucinate import hallucinate
 from flows.report import report
 from flows.train import train
 from tasks.fan_out.fan_out import cluster
-from tasks.session.hold import holding
+from tasks.session.folder_lock import locks_data_folder
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
 @flow(name="run")
-@holding
+@locks_data_folder
 def run(settings: RunSettings, data: str) -> None:
     """Do every stage, then the same with fewer experiences if the settings ask for it, and report."""
     with cluster(), run_logged(data, settings):

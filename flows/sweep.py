@@ -6,14 +6,14 @@ from prefect import flow
 
 from tasks.fan_out.fan_out import run_stage, task_runner
 from tasks.reports.report import show_sweep
-from tasks.session.hold import holding
+from tasks.session.folder_lock import locks_data_folder
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.sweep import SWEEP
 from tasks.tracking.logbook import log_sweep
 
 
 @flow(name="sweep", task_runner=task_runner())
-@holding
+@locks_data_folder
 def sweep(settings: RunSettings, data: str) -> None:
     """Train each variant on the hallucinated problems, log them as children of one run, and print a table."""
     variants = run_stage(SWEEP, data, settings)

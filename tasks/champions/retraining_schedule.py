@@ -1,6 +1,6 @@
-"""Retraining on a schedule, and when hits have fallen, with a server that nobody had to set up.
+"""Retrain on a schedule, and when hits have fallen, with a Prefect server that nobody has to set up.
 
-Prefect's own runner asks the data folder's server for what is due and starts each retraining as a process.
+Prefect's runner asks the data folder's server which retrainings are due, and starts each as a process.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import psutil
 
 from tasks.champions.drift_watch import DRIFT
 from tasks.servers.prefect_server import local_server
-from tasks.session.hold import hold
+from tasks.session.folder_lock import locked_folder
 from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import RunSettings
 
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
 
 DAY: Final = 86_400.0
 NAME: Final = "scheduled"
-LOOK_SECONDS: Final = 2.0  # between two questions for what is due
+QUERY_SECONDS: Final = 2.0  # between two questions to the server
 CRON_FIELDS: Final = 5
-END_SECONDS: Final = 5.0  # for a retraining to end after Ctrl-C, before it is killed
+END_SECONDS: Final = 5.0  # a retraining may take so long to end after Ctrl-C; then it is killed
 
 
 def serve(
@@ -46,30 +46,31 @@ def serve(
     """Retrain on a schedule until Ctrl-C, one retraining at a time.
 
     Args:
-        flow: imports the flow that retrains; called once Prefect's environment is set.
-        settings: what a run is asked to do.
+        flow: imports and returns the flow that retrains; called once Prefect's environment is set.
+        settings: of each retraining.
         data: the data folder.
-        every: seconds between two retrainings; by default a day, if there is no ``cron`` either.
+        every: seconds from one retraining to the next; a day if neither this nor ``cron`` is given.
         cron: when to retrain, as a cron expression.
-        approve: whether a challenger that is better waits for approval.
+        approve: whether better challengers wait for approval.
         workers: worker processes of a retraining.
-        scheduler: address of a Dask scheduler to use instead.
+        scheduler: address of a Dask scheduler to use instead of such processes.
 
     Raises:
-        UsageError: both ``every`` and ``cron`` are given, or one of them is no schedule.
+        UsageError: both ``every`` and ``cron`` are given, or one of them is not a schedule.
+        InUseError: another command uses the data folder.
 
     """
     schedule = _schedule(every, cron)
-    with hold(data) as folder:  # is it ours, and free?
-        place = folder.path
+    with locked_folder(data) as folder:  # raises if it is in use; each retraining locks it again
+        data_path = folder.path
     parameters = {
         "settings": json.loads(settings.to_json()),
-        "data": str(place),
+        "data": str(data_path),
         "approve": approve,
         "workers": workers,
         "scheduler": scheduler,
     }
-    with local_server(place) as server:
+    with local_server(data_path) as server:
         deployment = _deployment(flow(), schedule, parameters)
         if server is not None:
             server.wait()
@@ -82,17 +83,17 @@ def serve(
             _end_children()
 
 
-def tell_failure(_flow: Any, flow_run: Any, state: Any) -> None:
-    """Print why a retraining that was started by Prefect failed; of one by command the command tells."""
+def print_failure(_flow: Any, flow_run: Any, state: Any) -> None:
+    """Print why a retraining failed, if the schedule started it; the command ``retrain`` prints it itself."""
     if flow_run.deployment_id is not None:
         reason = " ".join(str(state.message).split())
         print(f"motion-memory: {reason.partition('exception: ')[2] or reason}", file=sys.stderr, flush=True)
 
 
 def _schedule(every: float | None, cron: str | None) -> dict[str, Any]:
-    """What Prefect is to be asked for; it is not imported yet, as its settings come with the server."""
+    """The schedule as Prefect's arguments. Prefect is not imported yet: its settings come with the server."""
     if every is not None and cron is not None:
-        raise UsageError("--every and --cron are given; give one of them.")
+        raise UsageError("--every and --cron are both given; give one of them.")
     if every is not None and not 1.0 <= every < float("inf"):
         raise UsageError(f"Every {every:g} seconds: give 1 or more.")
     if cron is not None and len(cron.split()) != CRON_FIELDS:
@@ -107,7 +108,7 @@ def _no_cron(text: str) -> UsageError:
 def _deployment(
     flow: Flow[..., Any], schedule: dict[str, Any], parameters: dict[str, Any]
 ) -> RunnerDeployment:
-    """The retraining as Prefect knows it; a drift event starts one, too."""
+    """A deployment that retrains on the schedule, and whenever a drift event arrives."""
     from prefect.deployments.runner import RunnerDeployment
     from prefect.events import DeploymentEventTrigger
     from prefect.types.entrypoint import EntrypointType
@@ -122,7 +123,7 @@ def _deployment(
             triggers=[DeploymentEventTrigger(name="retrain when hits have fallen", expect={DRIFT})],
             entrypoint_type=EntrypointType.MODULE_PATH,
         )
-    except ValueError as error:  # Prefect's way to say so
+    except ValueError as error:  # how Prefect refuses a cron expression
         if "cron" not in schedule:
             raise
         raise _no_cron(schedule["cron"]) from error
@@ -131,19 +132,19 @@ def _deployment(
 def _run(deployment: RunnerDeployment) -> None:
     from prefect.runner import Runner
 
-    runner = Runner("motion-memory", query_seconds=LOOK_SECONDS, limit=1)
+    runner = Runner("motion-memory", query_seconds=QUERY_SECONDS, limit=1)
     runner.add_deployment(deployment)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # asyncio's own way to end in order
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # so that asyncio ends the runner in order
     asyncio.run(runner.start())
 
 
 def _end_children() -> None:
-    """Nothing that was started here outlives this; the server ends by itself."""
-    left = [child for child in psutil.Process().children(recursive=True) if not _is_server(child)]
-    for child in left:
+    """End all processes that were started here, except the server, which ends by itself."""
+    children = [child for child in psutil.Process().children(recursive=True) if not _is_server(child)]
+    for child in children:
         with suppress(psutil.NoSuchProcess):
             child.terminate()
-    for child in psutil.wait_procs(left, END_SECONDS)[1]:
+    for child in psutil.wait_procs(children, END_SECONDS)[1]:
         with suppress(psutil.NoSuchProcess):
             child.kill()
 

@@ -1,1 +1,1 @@
-"""One command: the folder that it holds, its server, its workers."""
+"""What one command needs around its flow: its locked folder, its server, its workers."""

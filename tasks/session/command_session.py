@@ -1,4 +1,4 @@
-"""One command: its folder, its server, its workers, its tracker, and the flow that runs among them."""
+"""What the flow of a command needs around it: the locked data folder, a server, workers, a tracker."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import is_there, local_place, shown
 from tasks.servers.prefect_server import LocalServer, local_server
-from tasks.session.hold import hold
+from tasks.session.folder_lock import locked_folder
 from tasks.settings.environment import default_scheduler
 from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
@@ -24,31 +24,36 @@ from tasks.tracking.mlflow_runs import tracking_uri
 def command_session(
     name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
 ) -> Iterator[str]:
-    """Everything that the flow of a command needs; at the end say where its results lie.
+    """Provide everything that the flow of a command needs; print at the end where its results lie.
 
-    Prefect reads its environment when it is imported, so the flow may only be imported inside.
+    Prefect reads its environment when it is imported, so import the flow only inside this context.
 
     Args:
         name: name of the flow.
-        settings: what the run is asked to do.
+        settings: settings of the run.
         data: the data folder.
-        workers: worker processes of a cluster that is started.
-        scheduler: address of a Dask scheduler to use instead.
+        workers: number of worker processes to start.
+        scheduler: address of a Dask scheduler to use instead of such processes.
 
     Yields:
-        the data folder, as flows take it.
+        the data folder, as flows take it: a path, or ``s3://bucket/folder``.
+
+    Raises:
+        InUseError: another command uses the data folder.
+        UsageError: workers of the scheduler could not reach the Prefect server, or the data folder is in
+            object storage and no MLflow server is named.
 
     """
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)
-    tracking_uri(DataFolder(local_place(data)))  # which refuses a place that cannot be tracked
+    tracking_uri(DataFolder(local_place(data)))  # raises UsageError early
     with (
-        hold(data) as folder,
+        locked_folder(data) as folder,
         local_server(folder.path) as server,
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         yield folder.place
-    _tell(folder, settings)
+    _print_locations(folder, settings)
 
 
 @contextmanager
@@ -60,7 +65,7 @@ def _workers_for(
     server: LocalServer | None,
     vehicle: str,
 ) -> Iterator[None]:
-    """Start workers and tracker, compile meanwhile, and wait for the server; all of it at the same time."""
+    """Start workers and tracker and compile the kernels while the server starts; then wait for it."""
     from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
     from tasks.session.warm_up import warm_up
     from tasks.tracking.logbook import tracker
@@ -77,7 +82,7 @@ def _workers_for(
         yield
 
 
-def _tell(folder: DataFolder, settings: RunSettings) -> None:
+def _print_locations(folder: DataFolder, settings: RunSettings) -> None:
     run = folder.run(settings.run_name)
     print(f"data     {shown(run.path if is_there(run.settings) else folder.path)}")
     if is_there(run.figures):
@@ -91,12 +96,12 @@ def _tell(folder: DataFolder, settings: RunSettings) -> None:
 
 
 def _check_reachable(scheduler: str | None) -> None:
-    """UsageError where workers elsewhere would look for a Prefect server on their own machine."""
+    """Raise UsageError if workers on other machines would get the address of a server on loopback."""
     host = urlsplit(scheduler or "").hostname or "localhost"
     if not os.environ.get("PREFECT_API_URL") and not (
         host == "localhost" or host.startswith(("127.", "::1"))
     ):
         raise UsageError(
             f"Workers of {scheduler} cannot reach a Prefect server on loopback: set PREFECT_API_URL to one "
-            "that they can (docs/runbook.md)."
+            "that they can reach (docs/runbook.md)."
         )

@@ -69,7 +69,8 @@ def _compile_rest(vehicle: Vehicle) -> None:
             solve(EMPTY, planner, assist, vehicle=vehicle)
 
 
-# In the order of need: of two workers each compiles one of the first two, and the first to finish the last.
+# In the order in which a run needs them. Of two workers each compiles one of the first two groups, and the
+# one that finishes first compiles the last.
 GROUPS: Final[tuple[Callable[[Vehicle], object], ...]] = (
     _compile_collecting,
     _compile_hallucination,

@@ -123,7 +123,7 @@ def _automated(data: Path) -> int:
 @pytest.mark.parametrize(
     ("every", "cron", "told"),
     [
-        (60.0, "0 3 * * *", "--every and --cron are given"),
+        (60.0, "0 3 * * *", "--every and --cron are both given"),
         (0.5, None, "Every 0.5 seconds: give 1 or more"),
         (None, "at night", "'at night' is no cron expression"),
     ],

@@ -62,7 +62,7 @@ COMMANDS = (
         (["solve", "p.jsonl", "--out", "rows.parquet", "--workers", "0"], 2, "0 workers: give 1 or more."),
         (["retrain", "--learned", "monday"], 2, "--learned is not for retraining"),
         (["retrain", "--classes", "maze"], 2, "Unknown class 'maze'"),
-        (["serve", "--every", "9", "--cron", "0 3 * * *"], 2, "--every and --cron are given"),
+        (["serve", "--every", "9", "--cron", "0 3 * * *"], 2, "--every and --cron are both given"),
         (["serve", "--every", "0"], 2, "Every 0 seconds: give 1 or more."),
         (["promote"], 1, "data is no data folder"),
         (["rollback", "--data", "nowhere"], 1, "nowhere is no data folder"),

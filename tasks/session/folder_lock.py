@@ -15,14 +15,15 @@ Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 Flow = Callable[Concatenate[RunSettings, str, Rest], Result]
 
-_locked: set[Path] = set()  # by this process
+_locked: set[Path] = set()  # data folders that this process has locked
 
 
 @contextmanager
-def hold(data: Path | str) -> Iterator[DataFolder]:
-    """Lock a data folder for this process, which may have locked it already.
+def locked_folder(data: Path | str) -> Iterator[DataFolder]:
+    """Lock a data folder for this process while the context lasts, and yield the folder.
 
-    Yields the folder. Raises InUseError, which names the other process, if that has locked it.
+    If this process has locked the folder already, nothing is locked or released. Raises InUseError, which
+    names the other process, if another one has locked it.
     """
     folder = open_data_folder(data)
     if folder.path in _locked:
@@ -36,12 +37,12 @@ def hold(data: Path | str) -> Iterator[DataFolder]:
             _locked.discard(folder.path)
 
 
-def holding(flow: Flow[Rest, Result]) -> Flow[Rest, Result]:
-    """Wrap a flow so that it locks its data folder, whoever starts the flow."""
+def locks_data_folder(flow: Flow[Rest, Result]) -> Flow[Rest, Result]:
+    """Decorate a flow: it locks its data folder while it runs, whoever starts it."""
 
     @functools.wraps(flow)
-    def locked_flow(settings: RunSettings, data: str, *rest: Rest.args, **named: Rest.kwargs) -> Result:
-        with hold(data):
-            return flow(settings, data, *rest, **named)
+    def locked_flow(settings: RunSettings, data: str, *rest: Rest.args, **options: Rest.kwargs) -> Result:
+        with locked_folder(data):
+            return flow(settings, data, *rest, **options)
 
     return cast("Flow[Rest, Result]", locked_flow)
