@@ -1,4 +1,4 @@
-"""Retrain: challengers from what was learned since, promoted where they are better."""
+"""Retrain: make challengers from new experiences, and promote those that are better."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from flows.hallucinate import hallucinate
 from flows.judge import judge
 from flows.train import train
 from tasks.champions.conclude import conclude
-from tasks.champions.new_experience import rounds
+from tasks.champions.new_experience import runs_to_make
 from tasks.champions.retraining_schedule import print_failure
 from tasks.fan_out.fan_out import cluster
 from tasks.registry.champion_registry import Registry
@@ -27,14 +27,14 @@ def retrain(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> None:
-    """Make memories of what was learned since the champions, judge them, and promote what is better."""
+    """Make memories from what was learned since the champions, judge them, and promote the better ones."""
     with locked_folder(data) as folder, cluster(workers, scheduler):
         registry = Registry(folder)
-        for made in rounds(folder, settings, registry):
-            with run_logged(data, made.settings):
-                collect(made.settings, data)
-                hallucinate(made.settings, data)
-                train(made.settings, data)
-                build_memory(made.settings, data)
-                judge(made.settings, data)
-                conclude(data, made, registry, approve)
+        for run in runs_to_make(folder, settings, registry):
+            with run_logged(data, run.settings):
+                collect(run.settings, data)
+                hallucinate(run.settings, data)
+                train(run.settings, data)
+                build_memory(run.settings, data)
+                judge(run.settings, data)
+                conclude(data, run, registry, approve)

@@ -1,4 +1,4 @@
-"""Retrain: what became of challengers, and who is champion then."""
+"""The last step of a retraining: judge its memories, register them, and decide who is champion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from dashboards.verdicts.promotion import (
 )
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
-from tasks.champions.new_experience import Round
+from tasks.champions.new_experience import RetrainingRun
 from tasks.champions.promote import promote
 from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.keys import key_of
@@ -40,56 +40,78 @@ from tasks.tracking.artifacts import publish_judgements
 from tasks.tracking.logbook import log_judgement, tracker
 
 
-class Outcome(NamedTuple):
-    """What became of one memory of a run."""
+class JudgedVersion(NamedTuple):
+    """A memory of a run, registered as a version, and the verdict on it."""
 
     memory: str
     version: Version
     verdict: str
-    judgement: Judgement | None  # None where there was no champion to beat
-    told: str  # in one line
+    judgement: Judgement | None  # None if there was no champion to beat
+    summary: str  # one line
     markdown: str
 
 
-def conclude(data: str, made: Round, registry: Registry, approve: bool) -> None:
-    """Judge the memories of a run, register them, and let the aliases follow.
+def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -> None:
+    """Judge the memories of a run, register them, and point the aliases at the champions.
 
-    Everything but the verdict is written before the alias is, which is one step: a version without a verdict
-    was interrupted, and is found and finished by the same command. ``approve``: challengers that are
-    better wait for ``motion-memory promote``.
+    The verdict of a version is noted last, after the alias is moved, which is one step. So a version without
+    a verdict was interrupted, and the same command finishes it.
+
+    Parameters
+    ----------
+    data
+        The data folder.
+    run
+        The run, whose stages are done.
+    registry
+        Where the memories are registered.
+    approve
+        Whether better challengers wait for ``motion-memory promote``.
+
+    Raises
+    ------
+    RunError
+        The registry cannot be reached, or somebody changed a champion meanwhile.
+    StorageError
+        A memory is damaged.
+
     """
-    settings = made.settings
-    outcomes = [_outcome(data, made, registry, memory, approve) for memory in made.memories]
-    _show(outcomes)
-    for each in outcomes:
-        if each.verdict == FIRST and registry.aliased(each.version.name) is None:
-            registry.point(each.version)
-        elif each.verdict == PROMOTED:
-            promote(registry, each.version)
-        elif each.verdict == AWAITING:
-            registry.point(each.version, CHALLENGER)
-        registry.tagged(each.version, {"verdict": each.verdict})
-    publish_judgements(settings.run_name, [(each.memory, each.told, each.markdown) for each in outcomes])
+    judged_versions = [_register(data, run, registry, memory, approve) for memory in run.memories]
+    _show(judged_versions)
+    for judged_version in judged_versions:
+        version, verdict = judged_version.version, judged_version.verdict
+        if verdict == FIRST and registry.aliased(version.name) is None:
+            registry.point(version)
+        elif verdict == PROMOTED:
+            promote(registry, version)
+        elif verdict == AWAITING:
+            registry.point(version, CHALLENGER)
+        registry.tagged(version, {"verdict": verdict})
+    publish_judgements(
+        run.settings.run_name, [(each.memory, each.summary, each.markdown) for each in judged_versions]
+    )
 
 
-def _outcome(data: str, made: Round, registry: Registry, memory: str, approve: bool) -> Outcome:
-    settings, run = made.settings, run_folder(data, made.settings)
+def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, approve: bool) -> JudgedVersion:
+    """Judge a memory of a run, register it, and log the judgement."""
+    settings, folder = run.settings, run_folder(data, run.settings)
     attempts = judged(data, settings, memory)
-    champion = made.against.get(memory)
+    champion = run.champions.get(memory)
     judgement = None if champion is None else judge(*attempts)
     verdict = _verdict(judgement, approve)
-    load_memory(run.memory(memory), vehicle_named(settings.vehicle))  # whole, or a StorageError
+    load_memory(folder.memory(memory), vehicle_named(settings.vehicle))  # raises StorageError if damaged
     (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
-    markdown = _markdown(made, memory, judgement)
+    markdown = _markdown(run, memory, judgement)
+    benchmark = usefulness(attempts.challenger)
     tags = {
         "memory": memory,
         "vehicle": settings.vehicle,
         "run": settings.run_name,
         "learned": settings.learned,
         "retraining": number_of(settings.retraining),
-        "digest": memory_digest(run.memory(memory)),
-        "benchmark": json.dumps({k: asdict(v) for k, v in usefulness(attempts.challenger).items()}),
+        "digest": memory_digest(folder.memory(memory)),
+        "benchmark": json.dumps({name: asdict(figures) for name, figures in benchmark.items()}),
         "against": "" if champion is None else champion.number,
     }
     if judgement is not None:
@@ -98,39 +120,37 @@ def _outcome(data: str, made: Round, registry: Registry, memory: str, approve: b
     name = registered_name(memory, settings.vehicle)
     version = registry.register(name, run_id, model_id, key_of(settings.run_name, key), tags, markdown)
     log_judgement(data, settings, memory, verdict, judgement, markdown, attempts)
-    return Outcome(
-        memory, version, verdict, judgement, _told(version, champion, verdict, judgement), markdown
-    )
+    summary = _summary(version, champion, verdict, judgement)
+    return JudgedVersion(memory, version, verdict, judgement, summary, markdown)
 
 
 def _verdict(judgement: Judgement | None, approve: bool) -> str:
     if judgement is None:
         return FIRST
-    return REFUSED if not judgement.promoted else AWAITING if approve else PROMOTED
+    if not judgement.promoted:
+        return REFUSED
+    return AWAITING if approve else PROMOTED
 
 
-def _told(version: Version, champion: Version | None, verdict: str, judgement: Judgement | None) -> str:
-    said = f"{version.name} version {version.number}"
+def _summary(version: Version, champion: Version | None, verdict: str, judgement: Judgement | None) -> str:
+    subject = f"{version.name} version {version.number}"
     if judgement is None or champion is None:
-        return f"{said} is the first champion; all its plans were checked"
-    against = f"version {champion.number}"
-    said = (
-        f"{said} is {verdict}" if verdict != AWAITING else f"{said} awaits approval (motion-memory promote)"
-    )
-    return f"{said}, against {against}: {judgement.why}"
+        return f"{subject} is the first champion; all its plans were checked"
+    state = "awaits approval (motion-memory promote)" if verdict == AWAITING else f"is {verdict}"
+    return f"{subject} {state}, against version {champion.number}: {judgement.why}"
 
 
-def _markdown(made: Round, memory: str, judgement: Judgement | None) -> str:
-    settings = made.settings
-    begin = f"Memory *{memory}* of run `{settings.run_name}`, learned: `{settings.learned or 'nothing'}`.\n\n"
+def _markdown(run: RetrainingRun, memory: str, judgement: Judgement | None) -> str:
+    learned = run.settings.learned or "nothing"
+    heading = f"Memory *{memory}* of run `{run.settings.run_name}`, learned: `{learned}`.\n\n"
     if judgement is None:
-        return begin + "There was no champion: it is the first, once all its plans were checked.\n"
-    return begin + judgement_markdown(judgement)
+        return heading + "There was no champion. This memory is the first; all its plans were checked.\n"
+    return heading + judgement_markdown(judgement)
 
 
-def _show(outcomes: Sequence[Outcome]) -> None:
-    for each in outcomes:
-        if each.judgement is not None:
-            console().print(judgement_table(each.judgement))
-            print(judgement_line(each.judgement))
-        print(each.told)
+def _show(judged_versions: Sequence[JudgedVersion]) -> None:
+    for judged_version in judged_versions:
+        if judged_version.judgement is not None:
+            console().print(judgement_table(judged_version.judgement))
+            print(judgement_line(judged_version.judgement))
+        print(judged_version.summary)

@@ -11,7 +11,7 @@ from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.mirror import fetch, local_place
 from storage.tables.experiences import read_experiences
-from tasks.champions.new_experience import News, news
+from tasks.champions.new_experience import PendingRetraining, pending_retraining
 from tasks.inputs.champion_run import champion_run
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.registry.champion_registry import Registry
@@ -30,20 +30,21 @@ def dry_run(data: Path, settings: RunSettings) -> None:
         print(f"{data} is no data folder yet: the run {settings.run_name} would make the first champions.")
         return
     folder = DataFolder(path)
-    pending = news(folder, settings, Registry(folder))
-    if pending.first is not None:
-        names = ", ".join([*pending.first.class_names, *([COMBINED] if pending.first.combined else [])])
-        print(f"No champion yet of {names}: the run {pending.first.run_name} would make the first.")
+    pending = pending_retraining(folder, settings, Registry(folder))
+    first_run = pending.first_run
+    if first_run is not None:
+        names = ", ".join([*first_run.class_names, *([COMBINED] if first_run.combined else [])])
+        print(f"No champion yet of {names}: the run {first_run.run_name} would make the first.")
     rows = [
         _row(folder, settings, pending, name) for name in settings.class_names if name in pending.champions
     ]
     if rows:
         console().print(rich_table("Retraining now", HEADINGS, [rows]))
-    if pending.first is None and not pending.fresh:
+    if first_run is None and not pending.fresh:
         print("Nothing new was learned since champions were last judged: nothing would be done.")
 
 
-def _row(folder: DataFolder, settings: RunSettings, pending: News, name: str) -> list[str]:
+def _row(folder: DataFolder, settings: RunSettings, pending: PendingRetraining, name: str) -> list[str]:
     champion = f"version {pending.champions[name].number}"
     if name not in pending.fresh:
         return [name, champion, "0", "0", "none"]
@@ -59,25 +60,28 @@ def _row(folder: DataFolder, settings: RunSettings, pending: News, name: str) ->
 
 
 def _changes(
-    folder: DataFolder, settings: RunSettings, pending: News, name: str
+    folder: DataFolder, settings: RunSettings, pending: PendingRetraining, name: str
 ) -> tuple[int, list[int], int]:
-    """The number of plans that the champion's run does not have, their shards, and the number of all shards.
+    """What a retraining would make anew for one class.
 
     Curation is done as in a retraining. If the champion's run is no longer here, all plans are new.
+
+    Returns the number of plans that the champion's run does not have, the numbers of their shards, and the
+    number of all shards.
     """
     vehicle, size = vehicle_named(settings.vehicle), plans_at_once(settings)
     shard_count = -(-settings.taught // size)
-    before = champion_run(str(folder.path), pending.champions[name].tag("run"))
+    old_run = champion_run(str(folder.path), pending.champions[name].tag("run"))
     try:
-        if before is None:
+        if old_run is None:
             raise StorageError("no run")
-        taught = taught_experiences(before.folder, before.settings, name)
+        taught = taught_experiences(old_run.folder, old_run.settings, name)
         taught_ids = {experience.problem.id for experience in taught}
-        shards = before.folder.shards("candidates", name)
+        shards = old_run.folder.shards("candidates", name)
         drawn = [experience for shard in shards for experience in read_experiences(shard, vehicle)]
     except StorageError:
         return settings.taught, list(range(shard_count)), shard_count
     candidates = [*drawn, *pending.gained[name]]
-    kept = chosen(drawn, pending.gained[name], settings)[: settings.taught]
-    new = [index for index, row in enumerate(kept) if candidates[row].problem.id not in taught_ids]
+    curated = chosen(drawn, pending.gained[name], settings)[: settings.taught]
+    new = [index for index, row in enumerate(curated) if candidates[row].problem.id not in taught_ids]
     return len(new), sorted({index // size for index in new}), shard_count

@@ -1,4 +1,4 @@
-"""What was learned since the champions: whether there is anything to retrain for, and on what."""
+"""What retraining has to do: which memories have no champion, and what was learned since the others."""
 
 from __future__ import annotations
 
@@ -20,56 +20,86 @@ from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import Champion, Retraining
 from tasks.settings.run_settings import COMBINED, RunSettings, world_class
 
-WARM_SHARE: Final = 0.5  # of the epochs: an encoder that begins where another ended needs fewer
+WARM_SHARE: Final = 0.5  # of the epochs: an encoder that starts from trained weights needs fewer
 
 
-class Round(NamedTuple):
-    """One run to make, its memories that are judged, and their champions; none where they are the first."""
+class RetrainingRun(NamedTuple):
+    """A run that makes memories, and the champions that they are judged against."""
 
     settings: RunSettings
-    memories: Sequence[str]
-    against: Mapping[str, Version]
+    memories: Sequence[str]  # names of the memories to judge
+    champions: Mapping[str, Version]  # by memory; empty if the run makes the first champions
 
 
-class News(NamedTuple):
-    """What there is to do."""
+class PendingRetraining(NamedTuple):
+    """What a retraining would find to do now."""
 
-    first: RunSettings | None  # a run for memories that have no champion
-    without: Sequence[str]  # these memories
+    first_run: RunSettings | None  # a run for the memories without a champion; None if all have one
+    without_champion: Sequence[str]  # names of these memories
     champions: Mapping[str, Version]  # by memory
-    gained: Mapping[str, list[Experience]]  # of each class with a champion: all there is
-    fresh: Mapping[str, list[Experience]]  # of these, where there are some: what no judged version has seen
-    judged: Mapping[str, Version]  # by memory: the last one judged, which may be the champion
+    gained: Mapping[
+        str, list[Experience]
+    ]  # all experiences gained on the job, for each class with a champion
+    fresh: Mapping[
+        str, list[Experience]
+    ]  # those that no judged version has seen; only classes that have some
+    last_judged: Mapping[str, Version]  # by memory: the newest judged version, which may be the champion
 
 
-def news(folder: DataFolder, settings: RunSettings, registry: Registry) -> News:
-    """Look at registry and data folder; nothing is written. RunError: the registry cannot be reached."""
-    champions, last, seen = {}, {}, {}
+def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Registry) -> PendingRetraining:
+    """Look up in the registry and the data folder what a retraining would do; write nothing.
+
+    Parameters
+    ----------
+    folder
+        The data folder, which holds the experiences gained on the job.
+    settings
+        The settings of a run; they name the memories.
+    registry
+        The registry of the champions.
+
+    Raises
+    ------
+    RunError
+        The registry cannot be reached.
+
+    """
+    champions, last_judged, seen_snapshots = {}, {}, {}
     for memory in settings.memory_names:
-        versions = registry.versions(registered_name(memory, settings.vehicle))
-        champion = registry.aliased(registered_name(memory, settings.vehicle))
+        name = registered_name(memory, settings.vehicle)
+        champion = registry.aliased(name)
         if champion is None:
             continue
-        known = [each for each in versions if _is_judged(each, champion)]
-        champions[memory], last[memory] = champion, known[-1] if known else champion
-        seen[memory] = {each.tag("learned") for each in known}
-    without = [memory for memory in settings.memory_names if memory not in champions]
-    everything = read_gained(folder.gained(settings.vehicle), vehicle_named(settings.vehicle))
+        judged = [version for version in registry.versions(name) if _is_judged(version, champion)]
+        champions[memory] = champion
+        last_judged[memory] = judged[-1] if judged else champion
+        seen_snapshots[memory] = {version.tag("learned") for version in judged}
+    without_champion = [memory for memory in settings.memory_names if memory not in champions]
+    gained_folder = folder.gained(settings.vehicle)
+    all_gained = read_gained(gained_folder, vehicle_named(settings.vehicle))
     gained = {
-        name: [each for each in everything if each.problem.class_name == name]
+        name: [experience for experience in all_gained if experience.problem.class_name == name]
         for name in settings.class_names
         if name in champions
     }
-    place = folder.gained(settings.vehicle)
-    fresh = {name: _fresh(place, found, seen[name]) for name, found in gained.items()}
-    first = restricted(settings, without) if without else None
-    return News(
-        first, without, champions, gained, {name: found for name, found in fresh.items() if found}, last
+    fresh = {
+        name: _fresh(gained_folder, experiences, seen_snapshots[name]) for name, experiences in gained.items()
+    }
+    return PendingRetraining(
+        first_run=settings_for(settings, without_champion) if without_champion else None,
+        without_champion=without_champion,
+        champions=champions,
+        gained=gained,
+        fresh={name: experiences for name, experiences in fresh.items() if experiences},
+        last_judged=last_judged,
     )
 
 
-def restricted(settings: RunSettings, memories: Sequence[str]) -> RunSettings:
-    """The settings of a run that makes some memories; for the combined one all classes are needed."""
+def settings_for(settings: RunSettings, memories: Sequence[str]) -> RunSettings:
+    """The settings of a run that makes only the named memories.
+
+    The combined memory needs all classes, so if it is among them the settings stay as they are.
+    """
     if COMBINED in memories:
         return settings
     return replace(
@@ -80,86 +110,115 @@ def restricted(settings: RunSettings, memories: Sequence[str]) -> RunSettings:
     )
 
 
-def rounds(folder: DataFolder, settings: RunSettings, registry: Registry) -> list[Round]:
-    """The runs to make: one for memories without a champion, one for classes of which more was learned.
+def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) -> list[RetrainingRun]:
+    """The runs of a retraining: one makes first champions, one makes challengers from new experiences.
 
-    What was learned is frozen under the retraining's number, and champions are copied into the run's folder;
-    a retraining that was interrupted finds both again.
+    A line about each memory with a champion is printed. The new experiences are frozen under the number of
+    the retraining, and the champions are copied into the folder of the run. A retraining that was interrupted
+    uses the same experiences and the same copies again.
+
+    Parameters
+    ----------
+    folder
+        The data folder.
+    settings
+        What a run is asked to do.
+    registry
+        The registry of the champions.
+
+    Returns
+    -------
+    None, one or two runs. There is none for classes without new experiences.
+
+    Raises
+    ------
+    RunError
+        The registry cannot be reached.
+
     """
-    for name in (registered_name(memory, settings.vehicle) for memory in settings.memory_names):
-        _note_verdict(registry, registry.aliased(name))
-    found = news(folder, settings, registry)
-    made = [] if found.first is None else [Round(found.first, found.without, {})]
-    for memory, champion in found.champions.items():
-        print(_told(memory, champion, found))
-    if found.fresh:
-        made.append(_retraining(folder, settings, registry, found))
-    return made
+    for memory in settings.memory_names:
+        _note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle)))
+    pending = pending_retraining(folder, settings, registry)
+    runs = []
+    if pending.first_run is not None:
+        runs.append(RetrainingRun(pending.first_run, pending.without_champion, {}))
+    for memory, champion in pending.champions.items():
+        print(_summary(memory, champion, pending))
+    if pending.fresh:
+        runs.append(_challenger_run(folder, settings, registry, pending))
+    return runs
 
 
 def _note_verdict(registry: Registry, champion: Version | None) -> None:
-    """Note the verdict on a champion if a kill came between its promotion and that."""
+    """Note the verdict on a champion whose promotion was interrupted before the verdict was noted."""
     if champion is not None and champion.tag("key") and not champion.tag("verdict"):
         registry.tagged(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
 
 
-def _retraining(folder: DataFolder, settings: RunSettings, registry: Registry, found: News) -> Round:
-    whole = settings.combined and COMBINED in found.champions
-    asked = settings if whole else restricted(settings, list(found.fresh))
-    against = {name: found.champions[name] for name in asked.memory_names if name in found.champions}
+def _challenger_run(
+    folder: DataFolder, settings: RunSettings, registry: Registry, pending: PendingRetraining
+) -> RetrainingRun:
+    all_memories = settings.combined and COMBINED in pending.champions
+    run_settings = settings if all_memories else settings_for(settings, list(pending.fresh))
+    champions = {
+        name: pending.champions[name] for name in run_settings.memory_names if name in pending.champions
+    }
     number = _next_number(registry)
-    asked = with_gained(asked, folder.path, f"retrain-{number:04d}")
+    run_settings = with_gained(run_settings, folder.path, f"retrain-{number:04d}")
     vehicle = vehicle_named(settings.vehicle)
     with scratch_folder() as scratch:
         archives = {}
-        for name, version in against.items():
-            place = scratch / name
-            place.mkdir()
-            archives[name] = registry.fetch(version, str(place))
-        asked = replace(
-            asked,
+        for name, version in champions.items():
+            download_folder = scratch / name
+            download_folder.mkdir()
+            archives[name] = registry.fetch(version, str(download_folder))
+        run_settings = replace(
+            run_settings,
             epochs=max(1, round(WARM_SHARE * settings.epochs)),
             continual="none",
             retraining=Retraining(
                 number,
                 tuple(
-                    Champion(name, against[name].tag("run"), memory_digest(archive))
+                    Champion(name, champions[name].tag("run"), memory_digest(archive))
                     for name, archive in archives.items()
                 ),
             ),
         )
-        run = run_folder(str(folder.path), asked)
+        run = run_folder(str(folder.path), run_settings)
         for name, archive in archives.items():
             save_memory(run.champion(name), load_memory(archive, vehicle))
-    return Round(asked, list(against), against)
+    return RetrainingRun(run_settings, list(champions), champions)
 
 
 def _next_number(registry: Registry) -> int:
-    """That of no retraining of any memory, but for one that was interrupted: it is the same one then."""
+    """One more than that of the last retraining that was judged; an interrupted one keeps its number."""
     numbers = [0]
     for name in registry.names():
         champion = registry.aliased(name)
-        numbers += [each.retraining for each in registry.versions(name) if _is_judged(each, champion)]
+        numbers += [
+            version.retraining for version in registry.versions(name) if _is_judged(version, champion)
+        ]
     return 1 + max(numbers)
 
 
 def _is_judged(version: Version, champion: Version | None) -> bool:
-    """Whether all was done with a version: what it has seen is no news. A crash leaves one without."""
+    """Whether a version has its verdict; one whose retraining was interrupted before that has none."""
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 
 
-def _fresh(place: Path, gained: Sequence[Experience], seen: set[str]) -> list[Experience]:
-    """What is in none of the snapshots."""
-    known = {identity for called in seen - {""} for identity in snapshot_ids(place, called)}
-    return [each for each in gained if each.problem.id not in known]
+def _fresh(folder: Path, gained: Sequence[Experience], snapshots: set[str]) -> list[Experience]:
+    """The experiences that are in none of the named snapshots."""
+    seen_ids = {identity for name in snapshots - {""} for identity in snapshot_ids(folder, name)}
+    return [experience for experience in gained if experience.problem.id not in seen_ids]
 
 
-def _told(memory: str, champion: Version, found: News) -> str:
-    new = len(found.fresh.get(memory, ()))
-    last = found.judged[memory]
-    said = f"{memory}: champion is version {champion.number}"
+def _summary(memory: str, champion: Version, pending: PendingRetraining) -> str:
+    """A line about a memory: its champion, the verdict on a newer version, the number of new experiences."""
+    fresh_count = len(pending.fresh.get(memory, ()))
+    last = pending.last_judged[memory]
+    line = f"{memory}: champion is version {champion.number}"
     if last.tag("verdict") == AWAITING:
-        said += f", version {last.number} awaits approval (motion-memory promote)"
+        line += f", version {last.number} awaits approval (motion-memory promote)"
     elif last.number != champion.number:
-        said += f", version {last.number} was {last.tag('verdict')}"
-    return f"{said}; {new:,} new experiences" if new else f"{said}; nothing new was learned"
+        line += f", version {last.number} was {last.tag('verdict')}"
+    return f"{line}; {fresh_count:,} new experiences" if fresh_count else f"{line}; nothing new was learned"

@@ -10,7 +10,7 @@ from planners.world.classes.problem_classes import problem_class
 from planners.world.vehicles.vehicle import CAR
 from storage.places.data_folder import open_data_folder
 from tasks.champions.conclude import conclude
-from tasks.champions.new_experience import rounds
+from tasks.champions.new_experience import runs_to_make
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.champion_registry import Registry
 from tasks.reports.report import report_retrieval
@@ -55,7 +55,7 @@ def retrain(data: str, settings: RunSettings = SETTINGS, approve: bool = False) 
     """Retrain once; the settings of the runs that were made."""
     folder = open_data_folder(data)
     registry = Registry(folder)
-    made = rounds(folder, settings, registry)
+    made = runs_to_make(folder, settings, registry)
     for each in made:
         with run_logged(data, each.settings):
             make(data, each.settings)

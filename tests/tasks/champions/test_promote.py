@@ -10,7 +10,7 @@ import pytest
 
 from storage.archives.memories import save_memory
 from storage.places.data_folder import open_data_folder
-from tasks.champions.new_experience import rounds
+from tasks.champions.new_experience import runs_to_make
 from tasks.champions.promote import promote, promote_awaiting, roll_back
 from tasks.registry.champion_registry import (
     AWAITING,
@@ -158,10 +158,10 @@ def test_a_champion_whose_promotion_was_killed_gets_its_verdict_by_the_next_retr
     registry = registered.registry
     registry.point(registered.version("one"))
     settings = for_preset("smoke", classes=["trap"])
-    assert rounds(open_data_folder(registered.data), settings, registry) == []
+    assert runs_to_make(open_data_folder(registered.data), settings, registry) == []
     assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST]
     promote(registry, registered.version("two", against=1, retraining=1))
-    assert rounds(open_data_folder(registered.data), settings, registry) == []
+    assert runs_to_make(open_data_folder(registered.data), settings, registry) == []
     assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST, PROMOTED]
 
 
