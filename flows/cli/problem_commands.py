@@ -11,7 +11,7 @@ from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
 
 if TYPE_CHECKING:
-    from tasks.requests.problem_parts import PartSolved, SolveRequest
+    from tasks.requests.problem_parts import PartResult, SolveRequest
 
 _USUAL: Final = SolveOptions()
 
@@ -135,7 +135,7 @@ def solve(
     solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
 
 
-def _solve_parts(request: SolveRequest) -> list[PartSolved]:
+def _solve_parts(request: SolveRequest) -> list[PartResult]:
     from flows.solve import solve  # late: Prefect reads its environment when it is imported
 
     return solve(request)

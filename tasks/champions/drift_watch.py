@@ -1,7 +1,7 @@
-"""Watching a memory at work: what it answers now beside its benchmark, told to Prefect as events.
+"""Compare what a memory answers at work with its benchmark, and send Prefect events about it.
 
-``motion-memory.solved`` after every file of problems, ``motion-memory.drift`` where hits have fallen. They go
-to the server at PREFECT_API_URL, or to the one that ``motion-memory serve`` runs for a data folder.
+``motion-memory.solved`` is sent after every file of problems; ``motion-memory.drift`` too, if hits fell.
+They go to the server at PREFECT_API_URL, or to the one that ``motion-memory serve`` runs for a data folder.
 """
 
 from __future__ import annotations
@@ -31,18 +31,26 @@ DRIFT: Final = "motion-memory.drift"
 _MODEL: Final = re.compile(r"models:/(?P<name>[^/@]+)(?:@(?P<alias>[^/]+)|/(?P<number>\d+))")
 
 
-class Watched(NamedTuple):
-    """A memory with what its benchmark says of it."""
+class BenchmarkedMemory(NamedTuple):
+    """A memory, and how useful it was in its benchmark."""
 
-    name: str  # with its version, where it has one
-    benchmark: Mapping[str, Usefulness]
-    home: Path  # the data folder that it is of
+    name: str  # as events name it: ``name/version``, or ``run/memory``
+    benchmark: Mapping[str, Usefulness]  # by planner and configuration
+    data_folder: Path  # that the memory belongs to
 
 
-def watched(memory: str | None) -> Watched | None:
-    """The benchmark of a memory, if there is one: of a registered version, or of the run that it lies in.
+def benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
+    """Look up the benchmark of a memory: of a registered version, or of the run whose folder holds it.
 
-    None where nothing is known, or the registry does not answer: solving does not depend on it.
+    Parameters
+    ----------
+    memory
+        What ``--memory`` was given: a folder or a model's address. None means that no memory is used.
+
+    Returns
+    -------
+    The memory, or None if it has no benchmark or the registry does not answer: solving goes on without.
+
     """
     model = _MODEL.fullmatch(memory) if memory else None
     try:
@@ -53,65 +61,87 @@ def watched(memory: str | None) -> Watched | None:
         return None
 
 
-def _registered(name: str, alias: str | None, number: str | None) -> Watched | None:
-    home = default_data().absolute()
-    registry = Registry(DataFolder(home))
+def _registered(name: str, alias: str | None, number: str | None) -> BenchmarkedMemory | None:
+    """The benchmark of a registered version, which is in its tags."""
+    data_folder = default_data().absolute()
+    registry = Registry(DataFolder(data_folder))
     if number is None:
         version = registry.aliased(name, alias or CHAMPION)
     else:
-        version = next((each for each in registry.versions(name) if str(each.number) == number), None)
+        version = next(
+            (version for version in registry.versions(name) if str(version.number) == number), None
+        )
     if version is None or not version.tag("benchmark"):
         return None
-    known = json.loads(version.tag("benchmark"))
-    return Watched(
-        f"{name}/{version.number}", {key: Usefulness(**value) for key, value in known.items()}, home
-    )
+    figures = json.loads(version.tag("benchmark"))
+    benchmark = {configuration: Usefulness(**values) for configuration, values in figures.items()}
+    return BenchmarkedMemory(f"{name}/{version.number}", benchmark, data_folder)
 
 
-def _of_run(folder: Path) -> Watched | None:
-    """Of a memory's own folder, whose run measured its class."""
-    place = folder.absolute()
-    results = RunFolder(place.parent.parent).results / place.name
-    if place.parent.name != "memories" or not results.is_dir():
+def _of_run(folder: Path) -> BenchmarkedMemory | None:
+    """The benchmark of a memory in a run's folder, from the attempts of that run."""
+    memory_folder = folder.absolute()
+    run = memory_folder.parent.parent
+    results = RunFolder(run).results / memory_folder.name
+    if memory_folder.parent.name != "memories" or not results.is_dir():
         return None
     rows = read_attempts(results, ("recalled",))
-    run, of_memory = place.parent.parent, rows[rows["memory"] == place.name]
-    return Watched(f"{run.name}/{place.name}", usefulness(of_memory), run.parent.parent)
+    benchmark = usefulness(rows[rows["memory"] == memory_folder.name])
+    return BenchmarkedMemory(f"{run.name}/{memory_folder.name}", benchmark, run.parent.parent)
 
 
-def watch(known: Watched | None, now: Mapping[str, Usefulness], data: Path | None) -> list[str]:
-    """Compare with the benchmark, keep it, and tell Prefect, if there is one to tell; the lines to print."""
-    if known is None:
+def report_drift(
+    memory: BenchmarkedMemory | None, now: Mapping[str, Usefulness], data: Path | None
+) -> list[str]:
+    """Compare a memory with its benchmark, store the comparison, and send it to Prefect.
+
+    Neither a failure to store nor a failure to send is raised: the problems are solved.
+
+    Parameters
+    ----------
+    memory
+        The memory with its benchmark, or None, which reports nothing.
+    now
+        How useful the memory was just now, by planner and configuration.
+    data
+        A data folder whose Prefect server gets the events, besides that of the default folder, or None.
+
+    Returns
+    -------
+    The lines to print.
+
+    """
+    if memory is None:
         return []
-    found = drifts(known.name, now, known.benchmark)
-    lines = [str(each) for each in found]
-    lines += _keep(known.home, found)
-    fallen = [each for each in found if each.has_fallen]
-    server = _server([data, default_data()]) if found else None
+    comparisons = drifts(memory.name, now, memory.benchmark)
+    lines = [str(drift) for drift in comparisons]
+    lines += _store(memory.data_folder, comparisons)
+    any_fallen = any(drift.has_fallen for drift in comparisons)
+    server = _server([data, default_data()]) if comparisons else None
     if server is None:
-        return lines + ["no Prefect server to tell: `motion-memory serve` runs one"] * bool(fallen)
-    place = server["PREFECT_API_URL"]
+        return lines + ["no Prefect server got the event: `motion-memory serve` runs one"] * any_fallen
+    url = server["PREFECT_API_URL"]
     try:
-        _send(server, found)
-    except Exception as error:  # solving is done, and told; who watches can be asked again
+        _send(server, comparisons)
+    except Exception as error:  # whatever fails in Prefect, the problems are solved
         reason = (str(error) or type(error).__name__).splitlines()[0]
-        return [*lines, f"Prefect at {place} was not told: {reason}"]
-    return lines + [f"event {DRIFT} sent to {place}"] * bool(fallen)
+        return [*lines, f"Prefect at {url} did not get the events: {reason}"]
+    return lines + [f"event {DRIFT} sent to {url}"] * any_fallen
 
 
-def _keep(home: Path, found: Sequence[Drift]) -> list[str]:
-    """Write down what was seen in the memory's data folder, for the dashboard; a line where that fails."""
-    if not found or not (home / MARK).is_file():
+def _store(data_folder: Path, comparisons: Sequence[Drift]) -> list[str]:
+    """Store comparisons in the memory's data folder, for the dashboard; return a line if that fails."""
+    if not comparisons or not (data_folder / MARK).is_file():
         return []
     try:
-        add_watched(DataFolder(home).watched, [each.to_row() for each in found])
-    except StorageError as error:  # as with telling: solving is done
-        return [f"not kept: {error}"]
+        add_watched(DataFolder(data_folder).watched, [drift.to_row() for drift in comparisons])
+    except StorageError as error:
+        return [f"not stored: {error}"]
     return []
 
 
 def _server(folders: Sequence[Path | None]) -> dict[str, str] | None:
-    """What makes a client of the user's server, or of one that runs for a data folder."""
+    """Variables that make a client of the user's server, or of one that runs for one of the data folders."""
     if os.environ.get("PREFECT_API_URL"):
         environment = auth_environment() | os.environ
         return {name: environment[name] for name in CLIENT if name in environment}
@@ -123,7 +153,7 @@ def _server(folders: Sequence[Path | None]) -> dict[str, str] | None:
     return None
 
 
-def _send(server: Mapping[str, str], found: Sequence[Drift]) -> None:
+def _send(server: Mapping[str, str], comparisons: Sequence[Drift]) -> None:
     from prefect.artifacts import create_markdown_artifact
     from prefect.events import Event, Resource
     from prefect.events.clients import PrefectEventsClient
@@ -140,16 +170,15 @@ def _send(server: Mapping[str, str], found: Sequence[Drift]) -> None:
         )
         return Event(event=name, resource=resource, payload=drift.to_json())
 
-    async def send() -> None:
+    async def send_events() -> None:
         async with PrefectEventsClient(reconnection_attempts=1) as client:
-            for drift in found:
+            for drift in comparisons:
                 await client.emit(event(SOLVED, drift))
                 if drift.has_fallen:
                     await client.emit(event(DRIFT, drift))
 
     with temporary_settings(server):
-        asyncio.run(send())
-        told = "".join(f"- {each}\n" for each in found)
-        create_markdown_artifact(
-            told, key=artifact_key(f"watch-{found[0].memory}"), description="Hits and times"
-        )
+        asyncio.run(send_events())
+        markdown = "".join(f"- {drift}\n" for drift in comparisons)
+        key = artifact_key(f"watch-{comparisons[0].memory}")
+        create_markdown_artifact(markdown, key=key, description="Hits and times")

@@ -1,4 +1,4 @@
-"""A file of problems in parts: a worker solves a part at once, and writes it whole or not at all."""
+"""Cut a file of problems into parts; a worker solves a part at a time and writes it whole or not at all."""
 
 from __future__ import annotations
 
@@ -24,94 +24,96 @@ from tasks.fan_out.stage import Job
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 
-PART_PROBLEMS: Final = 500  # seconds of work: what a killed worker does again
-PART_SECONDS: Final = 10.0  # at most of improving plans
-FLAT: Final = 10_000  # plans in one folder; of more problems each part has a folder of its own
-COLLECT_EVERY: Final = 50  # problems between two garbage collections
-LONGEST_NAME: Final = 200
+PART_PROBLEMS: Final = 500  # a killed worker loses one part, which is seconds of work
+PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
+MOST_IN_ONE_FOLDER: Final = 10_000  # plans; for more problems each part writes its plans into its own folder
+COLLECT_EVERY: Final = 50  # problems from one garbage collection to the next
+LONGEST_FILE_NAME: Final = 200  # characters of an id that names a file; file systems allow 255 bytes
 
 
 @dataclass(frozen=True)
 class SolveRequest:
-    """A file of problems to solve, how to solve them, and where to write what."""
+    """A file of problems to solve, how to solve them, and where to write the results."""
 
     problems: Path
-    out: Path  # for the rows
-    settings: AssistantSettings  # the memory is a folder
+    out: Path  # the file for the rows
+    settings: AssistantSettings  # in which the memory is a local folder
     memory_digest: str  # of the files in that folder
-    plans: Path | None = None  # a folder for the plans
-    learn: Path | None = None  # a data folder that remembers what was newly solved
+    plans: Path | None = None  # the folder for the plans; None writes no plans
+    learn: Path | None = None  # the data folder that keeps newly found plans; None keeps none
 
     @property
     def folder(self) -> Path:
-        """The folder of the finished parts, until all are there."""
+        """The folder that keeps finished parts until all parts are finished."""
         return self.out.with_name(f"{self.out.name}.parts")
 
 
 @dataclass(frozen=True)
 class FilePart:
-    """Some consecutive problems of a file: what a worker solves at once."""
+    """Some consecutive problems of a file, which one worker solves."""
 
     request: SolveRequest
-    piece: ProblemSlice
-    index: int
+    problem_slice: ProblemSlice  # where the problems stand in the file
+    index: int  # counted from 0 within the file
     own_folder: bool  # whether its plans get a folder of their own
     key: str  # digest of everything that its rows depend on
 
     @property
     def class_name(self) -> str:
-        """The name of the file, as messages say it."""
+        """The name of the file of problems, for messages."""
         return self.request.problems.name
 
     @property
     def result(self) -> Path:
-        """The file that keeps its result."""
+        """The file that keeps the part's ``PartResult``."""
         return self.request.folder / f"{self.index:06d}-{self.key}.json"
 
     @property
     def shard(self) -> Path:
-        """Its rows."""
+        """The file with the part's attempt rows."""
         return self.request.folder / f"{self.index:06d}.parquet"
 
 
-class PartSolved(NamedTuple):
-    """What came of a part."""
+class PartResult(NamedTuple):
+    """Whether a part was solved."""
 
-    fault: str | None  # of the first malformed problem; then nothing was written
+    fault: str | None  # where the first malformed problem is, and why; then nothing was written
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:
-    """The parts of a file of problems; the cut never depends on the number of workers.
+    """Cut a file of problems into parts, in a way that does not depend on the number of workers.
 
-    StorageError: the file is missing, holds no problem, or is no whole file of its format.
+    Raises StorageError if the file is missing or damaged, or holds no problems.
     """
     stat = request.problems.stat() if request.problems.exists() else None
     return _parts_of(request, stat and (stat.st_mtime_ns, stat.st_size))
 
 
 @functools.lru_cache(maxsize=1)
-def _parts_of(request: SolveRequest, _changed: tuple[int, int] | None) -> list[FilePart]:
+def _parts_of(request: SolveRequest, _file_state: tuple[int, int] | None) -> list[FilePart]:
     settings = request.settings
-    longest = PART_SECONDS / settings.improve_seconds if settings.improve_seconds else PART_PROBLEMS
-    pieces = slices_of(request.problems, max(1, int(min(PART_PROBLEMS, longest))))
-    if not pieces:
+    most = PART_SECONDS / settings.improve_seconds if settings.improve_seconds else PART_PROBLEMS
+    slices = slices_of(request.problems, max(1, int(min(PART_PROBLEMS, most))))
+    if not slices:
         raise StorageError(f"{request.problems} holds no problems; nothing to solve.")
-    many = sum(piece.count for piece in pieces) > FLAT
+    own_folder = sum(each.count for each in slices) > MOST_IN_ONE_FOLDER
     folders = [str(folder.absolute()) if folder else None for folder in (request.plans, request.learn)]
-    how = [*settings._replace(memory=None), request.memory_digest, *folders, many, request.problems.stem]
+    how = [*settings._replace(memory=None), request.memory_digest, *folders, own_folder]
+    how.append(request.problems.stem)
     return [
-        FilePart(request, piece, index, many, key_of("solve", how, *_described(piece)))
-        for index, piece in enumerate(pieces)
+        FilePart(request, each, index, own_folder, key_of("solve", how, *_identity(each)))
+        for index, each in enumerate(slices)
     ]
 
 
-def _described(piece: ProblemSlice) -> tuple[str, int, int, int]:
-    return piece.digest, piece.first, piece.count, piece.offset if piece.path.suffix == ".parquet" else 0
+def _identity(part: ProblemSlice) -> tuple[str, int, int, int]:
+    """What makes a slice the same as before; not its offset in a text, which moves with earlier lines."""
+    return part.digest, part.first, part.count, part.offset if part.path.suffix == ".parquet" else 0
 
 
 @contextmanager
 def unfinished(request: SolveRequest) -> Iterator[None]:
-    """Hold the folder of parts for this process, and remove it at the end if no part was finished."""
+    """Lock the folder of finished parts while the context lasts; remove it at the end if it holds none."""
     with ExitStack() as stack:
         try:
             request.folder.mkdir(parents=True, exist_ok=True)
@@ -127,21 +129,21 @@ def unfinished(request: SolveRequest) -> Iterator[None]:
                 remove_folder(request.folder)
 
 
-def solve_part(chunk: FilePart) -> PartSolved:
-    """Solve a part and write its rows, unless one of its problems is malformed."""
-    return solve_and_tell(chunk, lambda: None)
+def solve_part(chunk: FilePart) -> PartResult:
+    """Solve the problems of a part and write their rows; write nothing if one of them is malformed."""
+    return solve_part_reporting(chunk, lambda: None)
 
 
-def solve_and_tell(chunk: FilePart, on_problem: Callable[[], object]) -> PartSolved:
-    """Like ``solve_part``; ``on_problem`` is called after each problem."""
+def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> PartResult:
+    """Like ``solve_part``, and call ``on_problem`` after each problem."""
     request = chunk.request
     assistant = _assistant(request.settings, request.memory_digest)
     rows: list[dict[str, Any]] = []
     solved: list[Solved] = []
     with no_garbage_collection():
-        for place, problem in problems_or_faults_of(chunk.piece, assistant.vehicle):
+        for location, problem in problems_or_faults_of(chunk.problem_slice, assistant.vehicle):
             if isinstance(problem, str):
-                return PartSolved(f"{place}: {problem}")
+                return PartResult(f"{location}: {problem}")
             if not rows:
                 assistant.warm_up(problem)
             attempt, plan = assistant(problem)
@@ -150,7 +152,7 @@ def solve_and_tell(chunk: FilePart, on_problem: Callable[[], object]) -> PartSol
             if request.learn is not None:
                 solved.append(Solved(to_canonical(problem)[0], attempt))
             if request.plans is not None:
-                number = chunk.piece.first + len(rows) - 1
+                number = chunk.problem_slice.first + len(rows) - 1
                 write_plan(
                     _plan_path(chunk, request.plans, problem.id, number),
                     plan_record(assistant, problem, attempt, plan),
@@ -161,26 +163,27 @@ def solve_and_tell(chunk: FilePart, on_problem: Callable[[], object]) -> PartSol
     if request.learn is not None:
         remember(request.learn, solved, assistant.vehicle)
     write_attempts(chunk.shard, rows, key=chunk.key)
-    return PartSolved(None)
+    return PartResult(None)
 
 
 SOLVE: Final = Job(
     name="solve",
     do=solve_part,
-    result=PartSolved,
+    result=PartResult,
     output=lambda part: part.shard,
-    units=lambda part: part.piece.count,
+    units=lambda part: part.problem_slice.count,
 )
 
 
 @functools.lru_cache(maxsize=1)
 def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
-    """The assistant of this process, with the memories that it has read."""
+    """The assistant of this process, which keeps the memories that it has read."""
     return Assistant(*settings)
 
 
 def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:
-    """The file of a problem's plan, named by the problem's id if that can name a file, else by its number."""
-    plain = all(letter.isalnum() or letter in "-_.~" for letter in identity) and not identity.startswith(".")
-    name = identity if plain and 0 < len(identity) <= LONGEST_NAME else f"problem+{number}"
+    """The file of a problem's plan, named by its id if that is a safe file name, else by its number."""
+    is_plain = all(letter.isalnum() or letter in "-_.~" for letter in identity)
+    is_safe = is_plain and not identity.startswith(".") and 0 < len(identity) <= LONGEST_FILE_NAME
+    name = identity if is_safe else f"problem+{number}"
     return folder / (f"{part.index:06d}" if part.own_folder else "") / f"{name}.json"

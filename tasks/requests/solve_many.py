@@ -1,4 +1,4 @@
-"""Solve a file of few or very many problems: what is left of its parts, then all of them joined."""
+"""Solve a file of few or very many problems: solve the parts that are left, then join the rows of all."""
 
 from __future__ import annotations
 
@@ -23,29 +23,29 @@ from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.problem_parts import (
     SOLVE,
     FilePart,
-    PartSolved,
+    PartResult,
     SolveRequest,
     parts_of,
-    solve_and_tell,
+    solve_part_reporting,
     unfinished,
 )
 from tasks.servers.prefect_server import local_server
 from tasks.settings.errors import UsageError
 
 if TYPE_CHECKING:
-    from tasks.champions.drift_watch import Watched
+    from tasks.champions.drift_watch import BenchmarkedMemory
 
-SolveFlow = Callable[[SolveRequest], list[PartSolved]]
+SolveFlow = Callable[[SolveRequest], list[PartResult]]
 
-FEW: Final = 2  # parts: starting a server and workers for so many takes longer than doing them here
+FEW_PARTS: Final = 2  # solving so many here takes less time than starting a server and workers
 
 
 class Tally(NamedTuple):
-    """What came of all problems; 16 bytes each are all that is held of them in memory."""
+    """Counts and times of all problems; these take 16 bytes of memory for each problem."""
 
-    outcomes: Counter[str]  # sources of plans; how attempts failed, in brackets
+    outcomes: Counter[str]  # problems by the source of their plan, or by the status of a failure, in brackets
     seconds: Floats  # [n] planning times
-    repeated: str | None  # an id that occurs twice, and where
+    repeated_id: str | None  # a message about an id that occurs twice, or None
 
 
 def solve_many(
@@ -59,30 +59,31 @@ def solve_many(
 ) -> None:
     """Solve every problem of a file, write one attempt row each, and print a summary.
 
-    The same command does not do again what a killed one has finished.
+    If the command is killed, the same command solves only what is left.
 
     Args:
         settings: how to solve them.
         problems: a .json, .jsonl or .parquet file.
         out: where to write the rows, .parquet.
-        plans: a folder for the plans, one file each.
-        learn: a data folder that is to remember what was newly solved.
-        workers: worker processes.
-        flow: solves the parts of a file in worker processes. It may import Prefect, whose environment is set
-            when it is called. Without it everything is solved in this process.
+        plans: a folder for the plans, one file for each problem; None writes no plans.
+        learn: a data folder that keeps newly found plans; None keeps none.
+        workers: number of worker processes.
+        flow: solves the parts of a file in worker processes. It is called once Prefect's environment is set,
+            so it may import Prefect. None solves everything in this process.
 
     Raises:
-        UsageError: ``out`` has another ending, or the settings are not possible.
-        StorageError: a problem is malformed, or has the id of another one. All others are solved and kept, so
-            that the same command has little left to do once the problem is corrected.
+        UsageError: ``out`` does not end in .parquet, or the settings contradict each other.
+        StorageError: a problem is malformed, or two have the same id. All other parts are solved and kept,
+            so once the problem is corrected the same command has little left to do.
 
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    Assistant(*settings)  # which refuses what cannot be asked
+    Assistant(*settings)  # raises UsageError early
     if learn is not None:
         open_data_folder(learn)
-    known = None if settings.memory is None or settings.improve_seconds else _watched(settings.memory)
+    compared = settings.memory is not None and not settings.improve_seconds
+    benchmarked = _benchmarked_memory(settings.memory) if compared else None
     began = time.monotonic()
     with memory_folder(settings.memory) as memory:
         settings = settings._replace(memory=None if memory is None else str(memory))
@@ -90,31 +91,31 @@ def solve_many(
         parts = parts_of(request)
         with unfinished(request):
             left = [part for part in parts if not SOLVE.is_written(part)]
-            if flow is None or workers == 1 or len(left) <= FEW:
+            if flow is None or workers == 1 or len(left) <= FEW_PARTS:
                 results = _in_this_process(left)
             else:
                 results = _in_workers(request, workers, flow)
             faults = [result.fault for result in results if result.fault]
             if faults:
-                raise _faulty(faults)
+                raise _malformed(faults)
             seconds = time.monotonic() - began
             tally = _tally(parts)
-            if tally.repeated is not None:
-                raise StorageError(tally.repeated)
+            if tally.repeated_id is not None:
+                raise StorageError(tally.repeated_id)
             join_attempts(out, [part.shard for part in parts])
             remove_folder(request.folder)
-    _tell(request, tally, sum(part.piece.count for part in left), seconds)
-    if known is not None:
-        _watch(known, request, tally)
+    _print_summary(request, tally, sum(part.problem_slice.count for part in left), seconds)
+    if benchmarked is not None:
+        _print_drift(benchmarked, request, tally)
 
 
-def _in_this_process(parts: Sequence[FilePart]) -> list[PartSolved]:
-    solved = count(1)
-    with progress("solve", sum(part.piece.count for part in parts), ended=False) as show:
-        return [solve_and_tell(part, lambda: show(next(solved))) for part in parts]
+def _in_this_process(parts: Sequence[FilePart]) -> list[PartResult]:
+    numbers = count(1)  # of the problems, as they are solved
+    with progress("solve", sum(part.problem_slice.count for part in parts), ended=False) as show:
+        return [solve_part_reporting(part, lambda: show(next(numbers))) for part in parts]
 
 
-def _in_workers(request: SolveRequest, workers: int, flow: SolveFlow) -> list[PartSolved]:
+def _in_workers(request: SolveRequest, workers: int, flow: SolveFlow) -> list[PartResult]:
     """Solve the parts that are not solved yet in worker processes."""
     with local_server(request.folder.absolute()) as server:
         from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
@@ -125,80 +126,82 @@ def _in_workers(request: SolveRequest, workers: int, flow: SolveFlow) -> list[Pa
             return flow(request)
 
 
-def _faulty(faults: Sequence[str]) -> StorageError:
-    others = f" So it is with {len(faults) - 1} more." if len(faults) > 1 else ""
+def _malformed(faults: Sequence[str]) -> StorageError:
+    more = len(faults) - 1
+    others = f" {more} more {'part has' if more == 1 else 'parts have'} a malformed problem." if more else ""
     return StorageError(
-        f"{faults[0].rstrip('.')}.{others} All else is solved and kept: correct it and give the same command."
+        f"{faults[0].rstrip('.')}.{others} All other parts are solved and kept: correct the problem and "
+        "give the same command again."
     )
 
 
 def _tally(parts: Sequence[FilePart]) -> Tally:
     outcomes: Counter[str] = Counter()
-    seconds, marks = [], []
+    seconds, id_hashes = [], []
     for part in parts:
         rows = attempt_columns(part.shard, ["problem_id", "status", "source", "planning_seconds"])
         outcomes.update(
             source or f"({status})" for source, status in zip(rows["source"], rows["status"], strict=True)
         )
         seconds.append(np.array(rows["planning_seconds"]))
-        marks.append(np.array([hash(identity) for identity in rows["problem_id"]]))
-    return Tally(outcomes, np.concatenate(seconds), _repeated(parts, np.concatenate(marks)))
+        id_hashes.append(np.array([hash(identity) for identity in rows["problem_id"]]))
+    return Tally(outcomes, np.concatenate(seconds), _repeated_id(parts, np.concatenate(id_hashes)))
 
 
-def _watched(memory: str) -> Watched | None:
-    from tasks.champions.drift_watch import watched  # late: statistics cost a third of a second
+def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
+    from tasks.champions.drift_watch import benchmarked_memory  # late: SciPy takes a third of a second
 
-    return watched(memory)
+    return benchmarked_memory(memory)
 
 
-def _watch(known: Watched, request: SolveRequest, tally: Tally) -> None:
-    """Tell how useful the memory was beside its benchmark; all rows are of one planner and configuration."""
+def _print_drift(memory: BenchmarkedMemory, request: SolveRequest, tally: Tally) -> None:
+    """Compare the memory with its benchmark; all rows are of one planner and configuration."""
     import pandas as pd
 
     from dashboards.verdicts.drift import Usefulness
     from storage.tables.configurations import configured
-    from tasks.champions.drift_watch import watch
+    from tasks.champions.drift_watch import report_drift
 
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
     times = 1e3 * tally.seconds
     now = Usefulness(len(times), tally.outcomes["recalled"], float(times.mean()), float(np.median(times)))
-    for line in watch(known, {f"{request.settings.planner} {label}": now}, request.learn):
+    for line in report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn):
         print(f"watched  {line}")
 
 
-def _repeated(parts: Sequence[FilePart], marks: Floats) -> str | None:
-    """The first id that occurs twice, found by the marks of all ids, and where it is."""
-    order = np.argsort(marks, kind="stable")
-    same = np.flatnonzero(marks[order][1:] == marks[order][:-1])
-    ends = np.cumsum([part.piece.count for part in parts])
+def _repeated_id(parts: Sequence[FilePart], id_hashes: Floats) -> str | None:
+    """A message about an id that occurs twice, found by the hashes of all ids; None if there is none."""
+    order = np.argsort(id_hashes, kind="stable")
+    same = np.flatnonzero(id_hashes[order][1:] == id_hashes[order][:-1])
+    ends = np.cumsum([part.problem_slice.count for part in parts])
     for i in same.tolist():
-        (first, one), (second, other) = (_named(parts, ends, int(order[each])) for each in (i, i + 1))
-        if one == other:
-            return f'{second}: id "{one}" is that of {first} too; give every problem its own.'
+        first_location, first_id = _location_and_id(parts, ends, int(order[i]))
+        location, identity = _location_and_id(parts, ends, int(order[i + 1]))
+        if identity == first_id:
+            return f'{location}: id "{identity}" is that of {first_location} too; give each problem its own.'
     return None
 
 
-def _named(parts: Sequence[FilePart], ends: Floats, index: int) -> tuple[str, str]:
-    """Where problem ``index`` of all stands in the file, and its id."""
+def _location_and_id(parts: Sequence[FilePart], ends: Floats, index: int) -> tuple[str, str]:
+    """Where a problem stands in the file, and its id; ``index`` counts the problems of all parts from 0."""
     i = int(np.searchsorted(ends, index, side="right"))
-    part, within = parts[i], index - int(ends[i]) + parts[i].piece.count
-    number, _ = next(islice(raw_slice(part.piece), within, None))
+    part, within = parts[i], index - int(ends[i]) + parts[i].problem_slice.count
+    number, _ = next(islice(raw_slice(part.problem_slice), within, None))
     identity = attempt_columns(part.shard, ["problem_id"])["problem_id"][within]
-    path = part.piece.path
+    path = part.problem_slice.path
     return f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}", identity
 
 
-def _tell(request: SolveRequest, tally: Tally, solved_now: int, seconds: float) -> None:
+def _print_summary(request: SolveRequest, tally: Tally, solved_now: int, seconds: float) -> None:
     """Print the summary."""
     count = len(tally.seconds)
     solved = sum(number for outcome, number in tally.outcomes.items() if not outcome.startswith("("))
     outcomes = ", ".join(f"{outcome} {number:,}" for outcome, number in tally.outcomes.most_common())
-    mean, (median, ninth) = tally.seconds.mean(), np.quantile(tally.seconds, [0.5, 0.9])
-    times = ", ".join(f"{what} {1000 * each:.2f} ms" for what, each in (("mean", mean), ("median", median)))
+    mean_ms, (median_ms, ninth_ms) = 1e3 * tally.seconds.mean(), 1e3 * np.quantile(tally.seconds, [0.5, 0.9])
     lines = [
         ("solved", f"{solved:,} of {count:,} ({solved / count:.2%}): {outcomes}"),
-        ("planning", f"{times}, 90 % {1000 * ninth:.2f} ms"),
+        ("planning", f"mean {mean_ms:.2f} ms, median {median_ms:.2f} ms, 90 % {ninth_ms:.2f} ms"),
         ("speed", f"{solved_now / seconds:,.0f} problems/s: {solved_now:,} in {seconds:,.1f} s"),
         ("rows", str(request.out)),
         ("plans", None if request.plans is None else str(request.plans)),

@@ -20,7 +20,7 @@ import pytest
 
 from dashboards.verdicts.drift import Usefulness
 from storage.places.data_folder import DataFolder
-from tasks.champions.drift_watch import DRIFT, Watched, watch
+from tasks.champions.drift_watch import DRIFT, BenchmarkedMemory, report_drift
 from tasks.registry.champion_registry import FIRST, PROMOTED, Registry, registered_name
 from tasks.servers.prefect_server import running_server
 from tasks.settings.errors import UsageError
@@ -92,9 +92,9 @@ def test_a_schedule_retrains_on_what_was_learned_in_between(
 
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(data))
     then = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
-    known = Watched(f"{name}/2", {"gust open 5 exhaustive": then}, data)
+    memory = BenchmarkedMemory(f"{name}/2", {"gust open 5 exhaustive": then}, data)
     now = {"gust open 5 exhaustive": replace(then, problems=200, hits=80)}
-    assert any(DRIFT in line for line in watch(known, now, data))
+    assert any(DRIFT in line for line in report_drift(memory, now, data))
     _wait(lambda: _automated(data), process, log)
 
     family = psutil.Process(process.pid).children(recursive=True)

@@ -13,12 +13,12 @@ from dashboards.verdicts.drift import Drift, Usefulness
 from storage.places.data_folder import open_data_folder
 from storage.tables.watched import read_watched
 from tasks.champions import drift_watch as task
-from tasks.champions.drift_watch import DRIFT, SOLVED, Watched, watch, watched
+from tasks.champions.drift_watch import DRIFT, SOLVED, BenchmarkedMemory, benchmarked_memory, report_drift
 from tasks.registry.champion_registry import Version
 
 NAME = "gust open 5 exhaustive"
 THEN = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
-KNOWN = Watched("motion-memory-trap/2", {NAME: THEN}, Path("nowhere"))
+BENCHMARKED = BenchmarkedMemory("motion-memory-trap/2", {NAME: THEN}, Path("nowhere"))
 FALLEN = replace(THEN, problems=200, hits=90)
 
 
@@ -47,33 +47,33 @@ def sent(monkeypatch: pytest.MonkeyPatch) -> Sent:
 def test_drift_is_told_exactly_when_hits_have_fallen(
     sent: Sent, problems: int, hits: int, events: list[str]
 ) -> None:
-    lines = watch(KNOWN, {NAME: replace(THEN, problems=problems, hits=hits)}, None)
+    lines = report_drift(BENCHMARKED, {NAME: replace(THEN, problems=problems, hits=hits)}, None)
     assert sent.events == events
     assert (f"event {DRIFT} sent to http://prefect.example/api" in lines) == (DRIFT in events)
     assert lines[0].startswith("motion-memory-trap/2, gust open 5 exhaustive: ")
 
 
 def test_nothing_is_told_of_what_no_benchmark_knows(sent: Sent) -> None:
-    assert watch(None, {NAME: FALLEN}, None) == []
-    assert watch(KNOWN, {"rrt open 5 exhaustive": FALLEN}, None) == []
+    assert report_drift(None, {NAME: FALLEN}, None) == []
+    assert report_drift(BENCHMARKED, {"rrt open 5 exhaustive": FALLEN}, None) == []
     assert sent.events == []
 
 
 def test_with_nobody_to_tell_it_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("PREFECT_API_URL", raising=False)
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(tmp_path))
-    lines = watch(KNOWN, {NAME: FALLEN}, tmp_path)
-    assert lines[-1] == "no Prefect server to tell: `motion-memory serve` runs one"
-    assert watch(KNOWN, {NAME: THEN}, tmp_path)[1:] == []
+    lines = report_drift(BENCHMARKED, {NAME: FALLEN}, tmp_path)
+    assert lines[-1] == "no Prefect server got the event: `motion-memory serve` runs one"
+    assert report_drift(BENCHMARKED, {NAME: THEN}, tmp_path)[1:] == []
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_seen_is_kept_in_the_data_folder_of_the_memory(sent: Sent, tmp_path: Path) -> None:
     data = open_data_folder(tmp_path / "data")
-    known = KNOWN._replace(home=data.path)
-    watch(known, {NAME: FALLEN}, None)
-    watch(known, {NAME: THEN}, None)
-    watch(known, {"rrt open 5 exhaustive": THEN}, None)  # of which its benchmark says nothing
+    memory = BENCHMARKED._replace(data_folder=data.path)
+    report_drift(memory, {NAME: FALLEN}, None)
+    report_drift(memory, {NAME: THEN}, None)
+    report_drift(memory, {"rrt open 5 exhaustive": THEN}, None)  # of which its benchmark says nothing
     (data.watched / "20000101T000000-0.parquet").write_bytes(b"no table")
     seen, (fault,) = read_watched(data.watched)
     assert "no whole Parquet file" in fault
@@ -91,7 +91,9 @@ def test_who_cannot_be_told_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(task, "_send", gone)
     monkeypatch.setenv("PREFECT_API_URL", "http://prefect.example/api")
-    assert watch(KNOWN, {NAME: FALLEN}, None)[-1].endswith("was not told: connection refused")
+    assert report_drift(BENCHMARKED, {NAME: FALLEN}, None)[-1].endswith(
+        "did not get the events: connection refused"
+    )
 
 
 def test_the_benchmark_of_a_registered_version_is_in_its_tags(
@@ -103,10 +105,10 @@ def test_the_benchmark_of_a_registered_version_is_in_its_tags(
     version = Version("motion-memory-trap", 2, {"benchmark": json.dumps({NAME: asdict(THEN)})})
     monkeypatch.setattr(task.Registry, "aliased", lambda *_: version)
     monkeypatch.setattr(task.Registry, "versions", lambda *_: [version])
-    known = KNOWN._replace(home=data.path)
-    assert watched("models:/motion-memory-trap@champion") == known
-    assert watched("models:/motion-memory-trap/2") == known
-    assert watched("models:/motion-memory-trap/1") is None
-    assert watched("models:/motion-memory-trap/latest") is None
-    assert watched(str(tmp_path / "memories" / "trap")) is None
-    assert watched(None) is None
+    memory = BENCHMARKED._replace(data_folder=data.path)
+    assert benchmarked_memory("models:/motion-memory-trap@champion") == memory
+    assert benchmarked_memory("models:/motion-memory-trap/2") == memory
+    assert benchmarked_memory("models:/motion-memory-trap/1") is None
+    assert benchmarked_memory("models:/motion-memory-trap/latest") is None
+    assert benchmarked_memory(str(tmp_path / "memories" / "trap")) is None
+    assert benchmarked_memory(None) is None

@@ -59,8 +59,8 @@ def test_parts_are_so_small_that_improving_one_takes_seconds(
     problems: Path, tmp_path: Path, seconds: float, size: int
 ) -> None:
     settings = ASSISTANT._replace(improve_seconds=seconds)
-    pieces = parts.parts_of(parts.SolveRequest(problems, tmp_path / "rows.parquet", settings, ""))
-    assert pieces[0].piece.count == size
+    file_parts = parts.parts_of(parts.SolveRequest(problems, tmp_path / "rows.parquet", settings, ""))
+    assert file_parts[0].problem_slice.count == size
 
 
 class StoppedError(Exception):
@@ -127,7 +127,9 @@ def test_a_malformed_line_is_named_and_only_its_part_is_left_to_do(
     path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), *lines[5:]]))
-    with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All else is"):
+    with pytest.raises(
+        StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All other parts are"
+    ):
         solve_many(ASSISTANT, path, out)
     assert not out.exists()
     path.write_text("".join(lines))
@@ -173,7 +175,7 @@ def test_plans_lie_in_one_folder_and_very_many_in_one_a_part(
     files = sorted((tmp_path / "few").iterdir())
     assert len(files) == COUNT
     assert all(read_plan(file).problem_id == file.stem for file in files)
-    monkeypatch.setattr(parts, "FLAT", COUNT - 1)
+    monkeypatch.setattr(parts, "MOST_IN_ONE_FOLDER", COUNT - 1)
     solve_many(ASSISTANT, problems, tmp_path / "rows.parquet", tmp_path / "many")
     assert sorted(each.name for each in (tmp_path / "many").rglob("*.json")) == [each.name for each in files]
     assert len(list((tmp_path / "many").iterdir())) == -(-COUNT // SIZE)
