@@ -1,4 +1,4 @@
-"""The command ``route``: one drive over a map, from a pose through goals, made of local plans."""
+"""The command ``route``: one drive over a map, from a pose through goals, composed of local plans."""
 
 from __future__ import annotations
 
@@ -27,8 +27,13 @@ from tasks.settings.checks import check_known, check_picture
 from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
-WIDEST_M: Final = 10_000.0  # canonical metres: the cell look-up of collision checks grows with the area
-RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of an attempt's planning time
+WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
+RETRIEVAL: Final = (
+    "occupancy",
+    "encode",
+    "recall",
+    "check",
+)  # the parts of the planning time that a memory takes
 
 
 @dataclass
@@ -36,7 +41,7 @@ class _Solver:
     """Solves a route's local problems, and notes the planning time of each."""
 
     assistant: Assistant
-    scale: float
+    scale: float  # metres of the map in a canonical metre
     seconds: list[float] = field(default_factory=list)  # planning time of each attempt
 
     def recalled(self, problem: Problem) -> Attempt:
@@ -54,14 +59,14 @@ class _Solver:
         return attempt
 
 
-def _numbers_of(text: str, count: int, option: str, wanted: str) -> tuple[float, ...]:
+def _numbers_of(text: str, count: int, option: str, meaning: str) -> tuple[float, ...]:
     """The numbers in a text like ``1,2``. Raises UsageError unless there are ``count``, all finite."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         numbers = ()
     if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
-        raise UsageError(f"{option} {text!r}: give {wanted}, {count} numbers with commas between.")
+        raise UsageError(f"{option} {text!r}: give {meaning}, {count} numbers with commas between them.")
     return numbers
 
 
@@ -90,7 +95,7 @@ def drive_route(
     assistant
         Solves the local problems.
     settings
-        How the map is read, and its scale.
+        How to read the map, and the metres of the map in a canonical metre.
     out, drawing
         Where to write the plan and a picture, or None.
 
@@ -99,7 +104,7 @@ def drive_route(
     UsageError
         An option is malformed, or start or goal cannot be used.
     RunError
-        There is no route.
+        No route was found.
     PlanFaultError
         The independent judge refuses the route.
 
@@ -139,21 +144,22 @@ def drive_route(
     _check(route, plan, assistant)
     if out is not None:
         write_plan(out, _record(route, plan, world, assistant, solver, scale))
-    lines = _summary(route, plan, solver, assistant, scale, seconds)
+    summary = _summary(route, plan, solver, assistant, scale, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
 
-        figure = route_picture(world, route, goals_m, scale, lines[0], assistant.vehicle)
+        figure = route_picture(world, route, goals_m, scale, summary[0], assistant.vehicle)
         with whole_file(drawing) as temporary:
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
     Console(highlight=False).print(_table(route, assistant, scale))
-    print(*lines, sep="\n")
-    for label, path_written in (("plan", out), ("picture", drawing)):
-        if path_written is not None:
-            print(f"{label:8} {path_written}")
+    print(*summary, sep="\n")
+    for label, written_path in (("plan", out), ("picture", drawing)):
+        if written_path is not None:
+            print(f"{label:8} {written_path}")
 
 
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
+    """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
     line = f"No route over {world.name}: at ({x:.1f}, {y:.1f}) {stuck.why}"
     if stuck.attempts == 0:
@@ -173,7 +179,7 @@ def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
 def _record(
     route: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, solver: _Solver, scale: float
 ) -> PlanRecord:
-    """The plan in the map's frame; "searched" or "repaired" if any leg is, in this order."""
+    """The plan in the map's frame; the source is "searched" if any leg's is, else "repaired" if any is."""
     left, bottom, turn = world.origin
     in_map_frame = from_canonical(plan, Alignment((left / scale, bottom / scale), -turn))
     sources = [leg.source for leg in route.legs]
@@ -191,7 +197,7 @@ def _record(
 
 
 def _driven_m(leg: Leg, assistant: Assistant) -> float:
-    """Metres of a leg that follow its local plan."""
+    """The length of the part of a leg that follows its local plan, in canonical metres."""
     states = leg.states(assistant.vehicle)[leg.turning : leg.turning + leg.driving + 1]
     return Plan(states, leg.controls[: leg.driving]).length_m
 
@@ -220,7 +226,7 @@ def _table(route: Route, assistant: Assistant, scale: float) -> Table:
 def _summary(
     route: Route, plan: Plan, solver: _Solver, assistant: Assistant, scale: float, seconds: float
 ) -> list[str]:
-    """Lines about the whole route, the share that came from memory, and the planning times."""
+    """The lines to print: the whole route, the share that came from memory, the planning times."""
     legs = route.legs
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES

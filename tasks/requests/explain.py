@@ -39,7 +39,7 @@ def print_explanation(
     recalled
         The recalled plans, best first; each ``Plan`` is in the frame of the problem.
     scale
-        Metres of the problem in a canonical metre.
+        How many metres of the problem are one canonical metre.
 
     """
     print(_recall_line(attempt, memory, recalled))
@@ -60,7 +60,9 @@ def _recall_line(
     line = f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
     if not recalled:
         return f"{line}: none is worth trying"
-    free = sum(not (each.blocked.any() or each.goal_missed_m > 1e-9) for each, _ in recalled)
+    free = sum(
+        not (recollection.blocked.any() or recollection.goal_missed_m > 1e-9) for recollection, _ in recalled
+    )
     return f"{line}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
 
 
@@ -68,25 +70,26 @@ def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> Table
     table = Table("", "plan", "rank", "cells", "states", "first", "at", "use", box=None)
     for column in table.columns[:-1]:
         column.justify, column.no_wrap = "right", True
-    for order, (each, plan) in enumerate(recalled, start=1):
-        first = each.first_blocked
+    for position, (recollection, plan) in enumerate(recalled, start=1):
+        first = recollection.first_blocked
         x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
-        missed = f"ends {scale * each.goal_missed_m:.1f} m off the goal" if each.goal_missed_m > 1e-9 else ""
+        missed_m = recollection.goal_missed_m
+        missed = f"ends {scale * missed_m:.1f} m off the goal" if missed_m > 1e-9 else ""
         table.add_row(
-            f"{order}",
-            f"{each.plan}",
-            f"{each.encoder_rank}",
-            "-" if each.blocked_cells is None else f"{each.blocked_cells}",
-            f"{int(each.blocked.sum())} of {len(each.blocked)}",
+            f"{position}",
+            f"{recollection.plan}",
+            f"{recollection.encoder_rank}",
+            "-" if recollection.blocked_cells is None else f"{recollection.blocked_cells}",
+            f"{int(recollection.blocked.sum())} of {len(recollection.blocked)}",
             "-" if first is None else f"{first}",
             "-" if first is None else f"({x:.1f}, {y:.1f})",
-            USES[each.use] or missed,
+            USES[recollection.use] or missed,
         )
     return table
 
 
 def _times(attempt: Attempt) -> str:
-    """The parts of the planning time that took any, in order, and the whole."""
+    """The parts of the planning time that are not zero, in their order, and the whole, in milliseconds."""
     names = [field.name for field in fields(Attempt) if field.name.endswith("_seconds")]
     parts = {name: 1000.0 * float(getattr(attempt, name)) for name in names}
     whole = parts.pop("planning_seconds")

@@ -26,15 +26,15 @@ STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the 
 
 @dataclass(frozen=True)
 class InitialGuess:
-    """Where the first guess comes from: a plan file, a planner, or else a straight line."""
+    """Where the first guess comes from: a plan file, a planner, or a straight line if both are None."""
 
-    plan: Path | None
+    plan: Path | None  # a plan file
     planner: str | None
     vehicle: Vehicle
-    seed: int
+    seed: int  # of the planner
 
     def guess(self, problem: Problem) -> tuple[Plan, str]:
-        """The guess and the name of its planner. Raises RunError if there is no plan to begin with."""
+        """Return the guess and the name of its planner. Raises RunError if there is no plan to begin with."""
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
             if record.plan is None or len(record.plan.controls) == 0:
@@ -64,7 +64,7 @@ class InitialGuess:
 def initial_guess(
     plan_file: Path | None, planner: str | None, straight: bool, vehicle: str, seed: int
 ) -> InitialGuess:
-    """The first guess that the options choose; without any, a plan by Follow.
+    """The source of the first guess, from the options of the command; the default is a plan by Follow.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def initial_guess(
     planner
         The planner whose plan to begin with, or None.
     straight
-        Whether to begin with a straight line.
+        Whether to begin with a straight line from start to goal.
     vehicle
         The vehicle's name.
     seed
@@ -86,13 +86,13 @@ def initial_guess(
 
     """
     options = {"--plan": plan_file, "--planner": planner, "--straight": straight}
-    chosen = [option for option, value in options.items() if value]
-    if len(chosen) > 1:
-        raise UsageError(f"{' and '.join(chosen)} are given; give one of them.")
+    given = [option for option, value in options.items() if value]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)} are given; give one of them.")
     check_known("planner", [planner] if planner else [], tuple(PLANNERS))
     check_known("vehicle", [vehicle], VEHICLES)
     check_seed(seed)
-    return InitialGuess(plan_file, planner or (None if chosen else "follow"), vehicle_named(vehicle), seed)
+    return InitialGuess(plan_file, planner or (None if given else "follow"), vehicle_named(vehicle), seed)
 
 
 def optimise_one(
@@ -107,14 +107,14 @@ def optimise_one(
     problem_file
         The file; it must hold one problem.
     clearance_weight
-        Weight of the clearance in the objective, 0 or more.
+        Weight of the clearance in the objective, 0 or more; 0 asks for the least time alone.
     out, drawing
         Where to write the plan and a picture, or None.
 
     Raises
     ------
     UsageError
-        The weight or the picture's format is not possible.
+        The weight is negative or infinite, or the picture's format is unknown.
     RunError
         The file does not hold exactly one problem, or the optimisation does not converge.
 

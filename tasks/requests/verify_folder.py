@@ -1,4 +1,4 @@
-"""Verify: shards and archives are whole, stored plans are good, and attempts come out the same again."""
+"""Check a data folder: files are whole, stored plans are free, attempts have the same outcome again."""
 
 from __future__ import annotations
 
@@ -46,47 +46,64 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
 
-LABELS_EVERY: Final = 50  # hallucinated problems whose grid and labels are drawn again
+LABELS_EVERY: Final = 50  # one hallucinated problem in so many has its grid and labels made again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
-SHOWN: Final = 20  # faults listed
+MOST_FAULTS_PRINTED: Final = 20
 
-Findings = tuple[Counter[str], list[str]]  # what was checked, and what is wrong
-Job = Callable[[], Findings]
+Findings = tuple[Counter[str], list[str]]  # counts of what was checked, and a line for each fault
+Check = Callable[[], Findings]
 
 
 def verify_folder(folder: Path, sample: float, workers: int) -> None:
-    """Check a whole data folder and print what was checked; RunError when something is wrong."""
+    """Check a whole data folder, and print what was checked, with counts.
+
+    Parameters
+    ----------
+    folder
+        The data folder.
+    sample
+        The share of the attempted problems whose attempts are made again, 0 to 1.
+    workers
+        The number of worker processes.
+
+    Raises
+    ------
+    RunError
+        The folder holds no run, or something in it is wrong; the faults are printed.
+
+    """
     data = open_data_folder(folder)
-    jobs = [job for run in data.runs() for job in _jobs(data.place, run, sample)]
+    checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
     for name, vehicle in VEHICLES.items():
-        jobs += [partial(_experiences, path, vehicle) for path in gained_shards(data.gained(name))]
-    if not jobs:
+        checks += [partial(_experiences, path, vehicle) for path in gained_shards(data.gained(name))]
+    if not checks:
         raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
     checked: Counter[str] = Counter()
-    wrong: list[str] = []
+    faults_found: list[str] = []
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context) as pool:
-        for counts, found in pool.map(_do, jobs):
+    with ProcessPoolExecutor(min(workers, len(checks)), mp_context=context) as pool:
+        for counts, new_faults in pool.map(_run, checks):
             checked += counts
-            wrong += found
+            faults_found += new_faults
     for what, count in checked.items():
         print(f"{count:9,} {what}")
-    if wrong:
-        print(*wrong[:SHOWN], sep="\n", file=sys.stderr)
+    if faults_found:
+        print(*faults_found[:MOST_FAULTS_PRINTED], sep="\n", file=sys.stderr)
         raise RunError(
-            f"{len(wrong)} faults in {folder}; delete what is named and run the same command again."
+            f"{len(faults_found)} faults in {folder}; delete the files that are named, and repeat the "
+            "command that made them."
         )
     print("No fault found.")
 
 
-def _do(job: Job) -> Findings:
+def _run(check: Check) -> Findings:
     try:
-        return job()
+        return check()
     except (StorageError, PlanFaultError) as error:
         return Counter(), [str(error)]
 
 
-def _jobs(data: str, run: RunFolder, sample: float) -> Iterator[Job]:
+def _checks(data: str, run: RunFolder, sample: float) -> Iterator[Check]:
     settings = recorded_settings(run)
     vehicle = vehicle_named(settings.vehicle)
     for name in settings.memory_names:
@@ -126,18 +143,24 @@ def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) 
     free = labelled.free
     experiences = taught_experiences(run, settings, name)
     sweeps = sweep_plans([each.plan for each in experiences], vehicle_named(settings.vehicle))
-    made_for = labelled.plan_index
-    rows = np.arange(len(made_for))
-    solved = (made_for < 0) | free[rows, np.maximum(made_for, 0)]
-    wrong = [f"{path}: {problems[i].id} has a label that denies what it was made for" for i in rows[~solved]]
-    again = range(0, len(problems), LABELS_EVERY)
-    for i in again:
+    origin = labelled.plan_index  # [problems] the plan that each was made for, or negative
+    rows = np.arange(len(origin))
+    solved = (origin < 0) | free[rows, np.maximum(origin, 0)]
+    wrong = [
+        f"{path}: {problems[i].id} has a label that says the plan it was made for is not free"
+        for i in rows[~solved]
+    ]
+    repeated = range(0, len(problems), LABELS_EVERY)
+    for i in repeated:
         if (free_plans(sweeps, scene_of(problems[i])) != free[i]).any():
-            wrong.append(f"{path}: {problems[i].id} has other labels than its obstacles say")
+            wrong.append(f"{path}: {problems[i].id} has labels that do not fit its obstacles")
         if (pack(occupancy_of(problems[i])) != labelled.grids[i]).any():
-            wrong.append(f"{path}: {problems[i].id} has another grid than its obstacles say")
-    read = {"hallucinated problems read": len(problems), "of these, grids and labels drawn again": len(again)}
-    return Counter(read), wrong
+            wrong.append(f"{path}: {problems[i].id} has a grid that does not fit its obstacles")
+    counts = {
+        "hallucinated problems read": len(problems),
+        "of these, grids and labels drawn again": len(repeated),
+    }
+    return Counter(counts), wrong
 
 
 def _hallucinator(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
@@ -148,7 +171,7 @@ def _hallucinator(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
 def _recalls(path: Path) -> Findings:
     rows: list[dict[str, Any]] = _records(read_recalls([path]))
     wrong = [
-        f"{path}: {row['problem_id']} ranks {len(row['order'])} of {len(row['free'])} plans, or some twice"
+        f"{path}: {row['problem_id']} ranks {len(row['order'])} of {len(row['free'])} plans, or one twice"
         for row in rows
         if len({*row["order"]} & {*range(len(row["free"]))}) != min(len(row["free"]), LONGEST_ORDER)
     ]
@@ -162,13 +185,13 @@ def _encoder(folder: Path, vehicle: Vehicle) -> Findings:
 
 def _memory(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
     memory = load_memory(run.memory(name), vehicle)
-    kept = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
-    same = len(kept) == len(memory.plans) and all(
-        np.array_equal(ours.states, theirs.states) and np.array_equal(ours.controls, theirs.controls)
-        for ours, theirs in zip(kept, memory.plans, strict=True)
+    plans = [experience.plan for experience in read_experiences(run.experiences(name), vehicle)]
+    same = len(plans) == len(memory.plans) and all(
+        np.array_equal(plan.states, stored.states) and np.array_equal(plan.controls, stored.controls)
+        for plan, stored in zip(plans, memory.plans, strict=True)
     )
     wrong = [] if same else [f"{run.memory(name)}: its plans are not those of the experiences"]
-    return Counter({"memories read": 1, "plans of memories compared with experiences": len(kept)}), wrong
+    return Counter({"memories read": 1, "plans of memories compared with experiences": len(plans)}), wrong
 
 
 def _champion(run: RunFolder, name: str, vehicle: Vehicle) -> Findings:
@@ -180,24 +203,26 @@ def _attempts(
     data: str, settings: RunSettings, run: RunFolder, name: str, path: Path, sample: float
 ) -> Findings:
     rows = _records(read_attempts(path))
-    drawn = held_back if path.is_relative_to(run.judged) else source_of
-    source, vehicle = drawn(data, settings, name), vehicle_named(settings.vehicle)
+    problem_source = held_back if path.is_relative_to(run.judged) else source_of
+    source, vehicle = problem_source(data, settings, name), vehicle_named(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
     wrong = [
         f"{path}: a plan for {row['problem_id']} was never checked" for row in solved if not row["verified"]
     ]
     memories = {
-        (name, made): load_memory((run.memory if made == settings.run_name else run.champion)(name), vehicle)
-        for name, made in {(row["memory"], row["run_id"]) for row in rows if row["memory"]}
+        (name, run_id): load_memory(
+            (run.memory if run_id == settings.run_name else run.champion)(name), vehicle
+        )
+        for name, run_id in {(row["memory"], row["run_id"]) for row in rows if row["memory"]}
     }
-    again = plans = 0
+    attempts_repeated = plans_checked = 0
     workspace = Workspace()
-    for place, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
+    for position, (identity, attempts) in enumerate(groupby(rows, key=itemgetter("problem_id"))):
         if generator(settings.seed, "verify", identity).random() >= sample:
             continue
-        problem = source.problem("test", int(path.stem) * CHUNK_PROBLEMS + place)
+        problem = source.problem("test", int(path.stem) * CHUNK_PROBLEMS + position)
         if problem.id != identity:
-            wrong.append(f"{path}: {identity} is not where it should be, {problem.id} is")
+            wrong.append(f"{path}: {identity} is in the place of {problem.id}")
             continue
         for row in attempts:
             memory = memories[row["memory"], row["run_id"]] if row["memory"] else None
@@ -213,22 +238,22 @@ def _attempts(
                 workspace=workspace,
             )
             check_attempt(problem, attempt, set(), vehicle)
-            again += 1
-            plans += attempt.solved
+            attempts_repeated += 1
+            plans_checked += attempt.solved
             if not same_outcome(attempt, row, vehicle):
-                wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} comes out otherwise")
+                wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} ends otherwise now")
     return Counter(
         {
             "attempts read": len(rows),
             "plans of attempts checked by FCL when they were made": len(solved),
-            "attempts made again": again,
-            "plans of these re-simulated and checked by FCL": plans,
+            "attempts made again": attempts_repeated,
+            "plans of these re-simulated and checked by FCL": plans_checked,
         }
     ), wrong
 
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Rows with None where pandas has its NaN."""
+    """The rows as dicts, with None instead of pandas' NaN."""
     return [
         {
             str(name): None if isinstance(value, float) and value != value else value
