@@ -1,8 +1,8 @@
-"""Closed by default: a server listens on loopback only, unless a password is set.
+"""Who may use our servers: by default they listen on loopback only, and on other addresses with a password.
 
-The password is set by ``MOTION_MEMORY_AUTH=user:password`` in the environment, and nowhere else. All our
-servers, those of Prefect and MLflow included, then ask for it, and our clients send it. A server that always
-needs a password makes one if none is set, in a file that only its owner can read.
+The password is set by ``MOTION_MEMORY_AUTH=user:password`` in the environment, and nowhere else. Then all our
+servers ask for it, those of Prefect and MLflow too, and our clients send it. A server that always needs a
+password makes one if none is set, in a file that only its owner can read.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ USER: Final = "motion-memory"
 
 
 def auth() -> str | None:
-    """The ``user:password`` that servers ask for, or None.
+    """The ``user:password`` that servers ask for, or None if none is set.
 
-    Raises UsageError, which does not show the value, if it is malformed.
+    Raises UsageError if the variable is malformed; the message does not show the value.
     """
     value = os.environ.get(AUTH)
     if not value:
@@ -50,7 +50,7 @@ def auth_environment() -> dict[str, str]:
 
 
 def new_secret(file: Path) -> str:
-    """A ``user:password`` that nobody can guess, in a new file that only its owner can read."""
+    """Make a ``user:password`` that nobody can guess; write it to a new file that only its owner can read."""
     secret = f"{USER}:{secrets.token_urlsafe(32)}"
     file.unlink(missing_ok=True)  # a program that has the old file open does not see the new secret
     with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as sink:
@@ -59,18 +59,20 @@ def new_secret(file: Path) -> str:
 
 
 def hosts() -> frozenset[str]:
-    """Other names of the servers, such as that of a proxy in front of them: MOTION_MEMORY_HOSTS=a,b."""
+    """The other names of the servers, from MOTION_MEMORY_HOSTS=a,b; for instance the name of a proxy."""
     return frozenset(name.strip() for name in os.environ.get(HOSTS, "").split(",") if name.strip())
 
 
 def check_address(host: str) -> None:
-    """Raise UsageError if other machines reach ``host`` and no password is set."""
+    """Raise UsageError if other machines can reach the address ``host`` and no password is set."""
     if not _is_loopback(host) and auth() is None:
-        raise UsageError(f"Other machines reach {host}: set {AUTH}=user:password, or listen on 127.0.0.1.")
+        raise UsageError(
+            f"Other machines can reach {host}: set {AUTH}=user:password, or listen on 127.0.0.1."
+        )
 
 
 def access() -> str:
-    """Who may use a server, for its summary."""
+    """Who may use a server, in words, for the lines that the server prints."""
     return f"user and password of {AUTH}" if auth() else "every user of this machine"
 
 

@@ -1,10 +1,11 @@
-"""Connections that owe a request: how long a server waits for it, and how many of them it bears.
+"""Bounds on connections: how long a server waits for a request, and how many connections it keeps.
 
-Uvicorn waits for ever for the headers of a first request, and can only bound all connections together: then
-some silent ones have everybody else answered 503. Here whoever does not send whole headers in time is closed.
-Where connections are too many, some make room, first those that never asked, then those that asked before,
-then those that are still sending or reading; always those that have been at it longest. A connection whose
-request is being answered never makes room.
+Uvicorn waits for ever for the headers of a first request. It can only bound the number of all connections,
+and then a few silent ones make it answer everybody else with 503. Here a connection that does not send whole
+headers in time is closed. If there are too many connections, some are closed to make room: first those that
+never sent a request, then those between two requests, then those that are still sending or reading; within
+each group those that have been in that state longest. A connection whose request is being answered is never
+closed.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from typing import Any, Final
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-MOST: Final = 2_000  # connections of a process, some 30 MB; whoever is closed comes again, which costs more
-SHARE: Final = 10  # one of so many makes room at once: to look for it costs as much as to accept
+MOST: Final = 2_000  # connections of a process, some 30 MB; with fewer, clients that are closed come again
+SHARE: Final = 10  # a tenth is closed at once, since choosing one costs as much as accepting one
 HEADER_SECONDS: Final = 10.0  # for the headers of a first request
 IDLE_SECONDS: Final = 30.0  # from an answer to the headers of the next request
 
@@ -34,28 +35,28 @@ def allow_files() -> None:
 
 
 class TimedProtocol(H11Protocol):
-    """A connection that is closed if it owes a request for too long, or longest of too many."""
+    """A connection that is closed if its request is overdue, or to make room for others."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._timer: TimerHandle | None = None  # runs while it owes the headers of a request
-        self._unread = math.inf  # bytes of the answer before, when it was last looked at
-        self._since = self.loop.time()
+        self._timer: TimerHandle | None = None  # runs while the headers of a request are awaited
+        self._unread = math.inf  # bytes of the last answer that were unread at the last look
+        self._since = self.loop.time()  # when the present state began
 
-    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as Uvicorn's own
-        """Wait for a request; if connections are too many now, have some make room."""
+    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as in Uvicorn
+        """Wait for a request; if there are too many connections now, close some."""
         super().connection_made(transport)
         self._watch()
         if len(self.connections) > min(MOST, files_allowed() // 2):
             self._make_room()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Wait no longer."""
+        """Stop waiting."""
         self._forget()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Go on waiting unless this completes the headers of a request."""
+        """Stop waiting if this completes the headers of a request."""
         super().data_received(data)
         self._watch()
 
@@ -65,9 +66,9 @@ class TimedProtocol(H11Protocol):
         self._watch()
 
     def _watch(self) -> None:
-        cycle: Any = self.cycle  # which Uvicorn's type does not say to be None at first
+        cycle: Any = self.cycle  # None before the first request, though Uvicorn's type does not say so
         answered = cycle is None or cycle.response_complete
-        if not answered or self.transport.get_protocol() is not self:  # which a WebSocket has of its own
+        if not answered or self.transport.get_protocol() is not self:  # a WebSocket has its own protocol
             self._forget()
         elif self._timer is None:
             self._wait(HEADER_SECONDS if cycle is None else IDLE_SECONDS)
@@ -84,15 +85,15 @@ class TimedProtocol(H11Protocol):
             self._timer = None
 
     def _expire(self) -> None:
-        """Close it, unless the answer before is still being read."""
-        before, self._unread = self._unread, self.transport.get_write_buffer_size()
-        if 0 < self._unread < before:
+        """Close the connection, unless the client is still reading the last answer."""
+        last_unread, self._unread = self._unread, self.transport.get_write_buffer_size()
+        if 0 < self._unread < last_unread:
             self._wait(IDLE_SECONDS)
         else:
             self.transport.abort()
 
     def _rank(self) -> int | None:
-        """How soon it makes room, the lower the sooner; None: never."""
+        """The order in which connections are closed, lowest first; None if this one must not be closed."""
         cycle: Any = self.cycle
         if cycle is None:
             return 0

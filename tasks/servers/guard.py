@@ -1,4 +1,4 @@
-"""Refuse requests to our servers by a foreign name, from foreign pages, or without the password."""
+"""Refuse requests that name another host, that come from pages of other sites, or that lack the password."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-OPEN: Final = ("/ping", "/health")  # anybody may know that a server is alive
+OPEN: Final = ("/ping", "/health")  # whoever asks may know that a server is alive
 _ADDED: Final = {  # headers of each answer, so that other sites can neither read it nor show it in a frame
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
@@ -25,22 +25,23 @@ _SHARED: Final = "access-control-"  # headers that let other sites read answers 
 class Guard:
     """Protects an ASGI application from pages of other sites, and from users without the password.
 
-    A web page can make the browser send requests to any address, loopback included. Two headers that the page
-    cannot choose reveal it: Origin is the page's own address, Host is the name that it called. A foreign Host
-    means DNS rebinding: the name of the page's site was made to point at this machine.
+    A web page can make the browser send requests to any address, loopback included. Two headers reveal such a
+    request, and the page cannot choose them: Origin is the address of the page, Host is the name of the
+    server that the page asked for. A Host that is not ours means DNS rebinding: the name of the page's site
+    was made to point at this machine.
     """
 
     def __init__(self, app: ASGIApp, secret: str | None = None, names: Collection[str] = ()) -> None:
-        """Guard an application.
+        """Guard an ASGI application.
 
         Parameters
         ----------
         app
             The application to protect.
         secret
-            The ``user:password`` to ask for (HTTP Basic), or None.
+            The ``user:password`` to ask for (HTTP Basic); None asks for none.
         names
-            Other names of the server, besides its address.
+            Names by which clients may call the server, besides its address.
 
         """
         self._app = app
@@ -64,13 +65,11 @@ class Guard:
         headers = Headers(scope=scope)
         hosts = headers.getlist("host")
         if len(hosts) != 1 or not self._is_own(hosts[0], scope):
-            why = (
-                "Ask this server by its own address, or add the name to MOTION_MEMORY_HOSTS where it starts."
-            )
+            why = "Use this server's own address, or start it with the name in MOTION_MEMORY_HOSTS."
             return _refusing(400, "BAD_REQUEST", why)
         own_pages = (f"http://{hosts[0]}", f"https://{hosts[0]}")
         if any(origin not in own_pages for origin in headers.getlist("origin")):
-            return _refusing(403, "PERMISSION_DENIED", "Pages of other sites may not ask this server.")
+            return _refusing(403, "PERMISSION_DENIED", "Pages of other sites may not use this server.")
         if not self._is_authorized(scope, headers):
             refusal = _refusing(401, "UNAUTHENTICATED", "Give user and password (HTTP Basic).")
             refusal.headers["WWW-Authenticate"] = 'Basic realm="motion-memory"'
@@ -80,17 +79,17 @@ class Guard:
     def _is_own(self, host: str, scope: Scope) -> bool:
         """Whether a Host header names the address that was connected to, or one of the server's names."""
         name, colon, port = host.rpartition(":")
-        called = _address(name if colon and port.isdigit() else host)
+        requested = _address(name if colon and port.isdigit() else host)
         server = _address((scope.get("server") or ("",))[0])
-        if called in self._names or called == server:
+        if requested in self._names or requested == server:
             return True
-        return _is_loopback(server) and (called == "localhost" or _is_loopback(called))
+        return _is_loopback(server) and (requested == "localhost" or _is_loopback(requested))
 
     def _is_authorized(self, scope: Scope, headers: Headers) -> bool:
         if self._credentials is None or (scope["path"] in OPEN and scope.get("method") == "GET"):
             return True
-        given = headers.getlist("authorization")
-        scheme, _, credentials = (given[0] if len(given) == 1 else "").partition(" ")
+        values = headers.getlist("authorization")
+        scheme, _, credentials = (values[0] if len(values) == 1 else "").partition(" ")
         return scheme.lower() == "basic" and hmac.compare_digest(
             credentials.strip().encode("latin-1"), self._credentials
         )
@@ -100,7 +99,7 @@ Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 def _address(name: str) -> Address | str:
-    """An IP address in whatever notation, or any other name in lower case."""
+    """The IP address that a name stands for in any notation, or else the name in lower case."""
     try:
         address = ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
     except ValueError:
@@ -117,9 +116,9 @@ def _refusing(status: int, code: str, message: str) -> Response:
 
 
 def _closed(send: Send) -> Send:
-    """Add headers to answers by which browsers keep them from other sites."""
+    """Wrap ``send`` so that answers have headers which keep pages of other sites from reading them."""
 
-    async def closed(message: Message) -> None:
+    async def send_closed(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             for name in {name for name in headers if name.startswith(_SHARED)}:
@@ -128,4 +127,4 @@ def _closed(send: Send) -> Send:
                 headers.setdefault(name, value)
         await send(message)
 
-    return closed
+    return send_closed

@@ -1,4 +1,4 @@
-"""Worker processes of one ASGI application behind one port: bound first, opened when the first is ready."""
+"""Serve an ASGI application by worker processes at one port, which opens when the first of them is ready."""
 
 from __future__ import annotations
 
@@ -15,52 +15,75 @@ from tasks.settings.errors import RunError, UsageError
 if TYPE_CHECKING:
     from uvicorn import Config
 
-READY_SECONDS: Final = 300.0  # to load, and to compile where nothing was compiled before
-STOP_SECONDS: Final = 5  # for requests that are being answered
-HEALTH_SECONDS: Final = 60  # a worker that does not stir for so long is replaced
+READY_SECONDS: Final = (
+    300.0  # for a worker to load its model, and to compile the kernels if they are not cached
+)
+STOP_SECONDS: Final = 5  # for the requests that are being answered at the end
+HEALTH_SECONDS: Final = 60  # a worker that does not answer for so long is replaced
 
 
 def bound(host: str, port: int) -> socket.socket:
-    """A socket bound to an address; nobody is let in before somebody listens.
+    """A socket bound to an address; connections are refused until a server listens on it.
 
-    UsageError: no such port. RunError: the address is in use, or not this machine's.
+    Parameters
+    ----------
+    host
+        The name or address of this machine.
+    port
+        The port; 0 takes a free one.
+
+    Raises
+    ------
+    UsageError
+        There is no such port.
+    RunError
+        The address is in use, or is not an address of this machine.
+
     """
     if not 0 <= port <= 65_535:
-        raise UsageError(f"Port {port}: give one up to 65535, or 0 for a free one.")
+        raise UsageError(f"Port {port}: give one from 1 to 65535, or 0 for a free one.")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        place = socket.socket(family, kind, protocol)
-        place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        place.bind(address)
+        listener = socket.socket(family, kind, protocol)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind(address)
     except OSError as error:
         raise RunError(
             f"Port {port} of {host} cannot be used ({error.strerror}); give another one."
         ) from None
-    return place
+    return listener
 
 
-def address_of(place: socket.socket) -> str:
-    """Where a bound socket is reached: ``http://127.0.0.1:5001``."""
-    host, port = place.getsockname()[:2]
+def address_of(listener: socket.socket) -> str:
+    """The address of a bound socket, like ``http://127.0.0.1:5001``."""
+    host, port = listener.getsockname()[:2]
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 def end_with_parent() -> None:
-    """Have this process end when the one that started it does, even by kill -9."""
+    """End this process when the one that started it ends, even by kill -9."""
     parent = multiprocessing.parent_process()
 
-    def follow() -> None:
+    def wait_and_exit() -> None:
         if parent is not None:
             parent.join()
             os._exit(1)
 
-    threading.Thread(target=follow, daemon=True).start()
+    threading.Thread(target=wait_and_exit, daemon=True).start()
 
 
 def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
-    """How Uvicorn is to serve what ``app`` makes; connections that owe a request are not waited for.
+    """The configuration of Uvicorn for an application, with our bounds on connections (``TimedProtocol``).
 
-    Also lets this process open as many files as its connections need.
+    This also lets the process open as many files as its connections need.
+
+    Parameters
+    ----------
+    app
+        Makes the ASGI application; with several workers it must be importable.
+    workers
+        The number of worker processes.
+
     """
     from uvicorn import Config
 
@@ -82,16 +105,31 @@ def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
 
 
 def serve_with(
-    app: Callable[[], Any], place: socket.socket, workers: int, on_ready: Callable[[], None]
+    app: Callable[[], Any], listener: socket.socket, workers: int, on_ready: Callable[[], None]
 ) -> None:
-    """Have workers make ``app`` (importable) and serve it until Ctrl-C; one that dies is replaced.
+    """Serve an application by worker processes until Ctrl-C; a worker that dies is replaced.
 
-    RunError: one could not get ready.
+    Parameters
+    ----------
+    app
+        An importable function that makes the ASGI application; each worker calls it.
+    listener
+        The bound socket.
+    workers
+        The number of worker processes.
+    on_ready
+        Called once, when all workers are ready.
+
+    Raises
+    ------
+    RunError
+        A worker died before it was ready, or took too long.
+
     """
     from uvicorn.supervisors import Multiprocess
 
     class Workers(Multiprocess):
-        """Uvicorn's supervisor, which says when all are ready, or that one will not be."""
+        """Uvicorn's supervisor; it also notes whether all workers got ready."""
 
         failed = False
 
@@ -104,16 +142,16 @@ def serve_with(
                 self.should_exit.set()
 
         def _are_ready(self) -> bool:
-            last = time.monotonic() + READY_SECONDS
+            deadline = time.monotonic() + READY_SECONDS
             waiting = list(self.processes)
-            while waiting and not self.signal_queue and time.monotonic() < last:
-                if not all(each.process.is_alive() for each in waiting):
+            while waiting and not self.signal_queue and time.monotonic() < deadline:
+                if not all(worker.process.is_alive() for worker in waiting):
                     return False
-                waiting = [each for each in waiting if not each.is_ready(timeout=0.2)]
+                waiting = [worker for worker in waiting if not worker.is_ready(timeout=0.2)]
                 time.sleep(0.05)
             return not waiting
 
-    supervisor = Workers(config_of(app, workers), [place])
+    supervisor = Workers(config_of(app, workers), [listener])
     supervisor.run()
     if supervisor.failed:
-        raise RunError("The server did not get ready; what its workers printed says why.")
+        raise RunError("The server did not get ready; the lines above, from its workers, say why.")

@@ -1,7 +1,8 @@
 """Prefect's server behind the guard.
 
 ``python -m tasks.servers.prefect_app FOLDER SOCKET`` runs the server of a data folder at a port that a
-command has opened, and ends when no command uses the server any more.
+command has opened (``SOCKET`` is the number of its file descriptor). It ends when no command uses the server
+any more.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from tasks.servers.users import is_used, locked
 
 
 def prefect_app() -> Guard:
-    """Prefect's server, which itself asks for the password in PREFECT_SERVER_API_AUTH_STRING."""
+    """Prefect's server behind the guard; it checks the password in PREFECT_SERVER_API_AUTH_STRING itself."""
     from prefect.server.api.server import create_app
 
     return Guard(create_app(), names=hosts())
@@ -32,7 +33,7 @@ def _serve(folder: Path, listener: socket.socket) -> None:
 
     server = Server(Config(prefect_app, factory=True, log_level="error", timeout_graceful_shutdown=1))
 
-    def watch() -> None:
+    def stop_when_unused() -> None:
         while True:
             time.sleep(POLL_SECONDS)
             with locked(folder):
@@ -44,9 +45,9 @@ def _serve(folder: Path, listener: socket.socket) -> None:
         time.sleep(STOP_SECONDS)
         os._exit(0)
 
-    threading.Thread(target=watch, daemon=True).start()
+    threading.Thread(target=stop_when_unused, daemon=True).start()
     server.run(sockets=[listener])
-    os._exit(0)  # at once: Python takes seconds to exit, in which `watch` no longer runs
+    os._exit(0)  # at once: Python takes seconds to exit, and the thread no longer runs then
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 """A command's own Prefect server, on loopback, with its files in the data folder.
 
 The server is a child process (``tasks.servers.prefect_app``) that watches the commands registered with it.
-When the last of them has ended, even by kill -9, it stops. A command that finds a server running shares it.
-When the server dies, a command starts it again at the same address, with the same password, and goes on.
-Each server has a new password, in a file that only the owner can read.
+It stops when the last of them has ended, even by kill -9. A command that finds a server running shares it. If
+the server dies, a command starts it again at the same address, with the same password, and goes on. Each new
+server has a new password, in a file that only the owner can read.
 """
 
 from __future__ import annotations
@@ -27,15 +27,13 @@ from tasks.settings.environment import environment
 
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
-STOP_SECONDS: Final = 0.8  # then the child exits at once, which SQLite survives
+STOP_SECONDS: Final = 0.8  # to stop in order; then the child exits at once, which SQLite survives
 
-RESTARTS: Final = 2  # without an answer in between
-PORT_SECONDS: Final = 5.0  # for which the port of a dead server may be taken
+RESTARTS: Final = 2  # in a row, without an answer in between
+PORT_SECONDS: Final = 5.0  # how long another process may hold the port of a dead server
 HOST: Final = "127.0.0.1"
-CLIENT: Final = (
-    "PREFECT_API_URL",
-    "PREFECT_API_AUTH_STRING",
-)  # variables that make a process a client of the server
+# Variables that make a process a client of the server.
+CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")
 URL, SECRET, LOG = "server.url", "server.auth", "server.log"  # files of the server's folder
 
 # Set before Prefect, MLflow, Dask or a BLAS is imported, unless the user has set them.
@@ -51,15 +49,15 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_READ_BATCH_SIZE": "50",
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_FLUSH_INTERVAL": "1",
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
-    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command reports a failure once, in one line
-    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server has missed is no failure
-    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # states are enough; logs would cost one request for each task
+    "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command itself reports a failure, in one line
+    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server missed is no failure
+    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # logs would cost one request for each task; states are enough
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
     "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
     "MLFLOW_LOGGING_LEVEL": "ERROR",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",
-    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # it cleans up after a killed process: no news
+    "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # it cleans up after killed processes
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -71,12 +69,12 @@ ENVIRONMENT: Final = {
 class LocalServer:
     """A server that runs or is starting."""
 
-    url: str  # of the API, http://127.0.0.1:<port>/api
-    folder: Path  # of its files: ``prefect`` in the data folder
+    url: str  # address of the API, http://127.0.0.1:<port>/api
+    folder: Path  # the folder of its files, ``prefect`` in the data folder
 
     @property
     def port(self) -> int:
-        """The port of the API and of the pages."""
+        """The port of the server, for its API and its pages."""
         return int(self.ui_url.rpartition(":")[2])
 
     @property
@@ -116,9 +114,10 @@ class LocalServer:
 
 
 def set_environment(data: Path) -> None:
-    """Set quiet and private defaults for the libraries that a command uses, with their files in ``data``.
+    """Set environment variables that keep the libraries quiet and private, and their files in a data folder.
 
-    A password (``tasks.servers.access``) is set for Prefect's and MLflow's servers and clients too.
+    Variables that are set already stay as they are. If servers need a password (``tasks.servers.access``), it
+    is set for Prefect's and MLflow's servers and clients.
     """
     home = data / "prefect"
     home.mkdir(0o700, parents=True, exist_ok=True)
@@ -133,10 +132,10 @@ def set_environment(data: Path) -> None:
 
 @contextmanager
 def local_server(data: Path) -> Iterator[LocalServer | None]:
-    """Share or start the server of a data folder, and make this process its client.
+    """Share or start the server of a data folder, and make this process its client while the context lasts.
 
-    Yields the server, which needs some 5 s to start (``LocalServer.wait``), or None if PREFECT_API_URL names
-    another one.
+    Yields the server, or None if PREFECT_API_URL names another one. A new server needs some 5 s to start:
+    ``LocalServer.wait`` waits for it.
     """
     set_environment(data)
     if os.environ.get("PREFECT_API_URL"):
@@ -146,26 +145,26 @@ def local_server(data: Path) -> Iterator[LocalServer | None]:
     with locked(folder):
         server, listener = _join(folder)
         user = register(folder)
-    left = threading.Event()
-    threading.Thread(target=_keep, args=(server, listener, left), daemon=True).start()
+    done = threading.Event()
+    threading.Thread(target=_keep, args=(server, listener, done), daemon=True).start()
     try:
         with environment(**server.environment):
             yield server
     finally:
-        left.set()
+        done.set()
         _leave(folder, user)
 
 
 def running_server(data: Path) -> LocalServer | None:
-    """The server of a data folder that runs or is starting, or None."""
+    """The server of a data folder, if one runs or is starting; else None."""
     folder = data / "prefect"
     return LocalServer((folder / URL).read_text(), folder) if is_held(folder / URL) else None
 
 
 def _join(folder: Path) -> tuple[LocalServer, socket.socket | None]:
-    """The server that other commands use, or a new one and its open port.
+    """The server that other commands use and None, or a new server and its open port.
 
-    If the server of other commands has died, they start it again.
+    If the server of other commands has died, they start it again, so no new one is needed here.
     """
     if is_held(folder / URL) or is_used(folder):
         return LocalServer((folder / URL).read_text(), folder), None
@@ -178,7 +177,7 @@ def _join(folder: Path) -> tuple[LocalServer, socket.socket | None]:
 
 
 def _start(server: LocalServer, listener: socket.socket) -> None:
-    """Start the server in a child process at an open port."""
+    """Start the server in a child process, at a port that is open already."""
     folder = server.folder
     with (folder / URL).open("w") as state, (folder / LOG).open("ab") as sink:
         state.write(server.url)
@@ -189,7 +188,9 @@ def _start(server: LocalServer, listener: socket.socket) -> None:
             env=os.environ
             | {
                 "PREFECT_SERVER_API_AUTH_STRING": server.secret,
-                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),  # as in this process
+                "PYTHONPATH": os.pathsep.join(
+                    path or os.getcwd() for path in sys.path
+                ),  # the same modules as here
             },
             stdin=subprocess.DEVNULL,
             stdout=sink,
@@ -197,44 +198,44 @@ def _start(server: LocalServer, listener: socket.socket) -> None:
             pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock until it ends
             start_new_session=True,  # Ctrl-C ends the command; the server then stops by itself
         )
-    threading.Thread(target=child.wait, daemon=True).start()  # no zombie is left if it ends first
+    threading.Thread(target=child.wait, daemon=True).start()  # so that a dead child leaves no zombie
 
 
-def _keep(server: LocalServer, listener: socket.socket | None, left: threading.Event) -> None:
-    """Start the server again whenever it dies, until this command has left it.
+def _keep(server: LocalServer, listener: socket.socket | None, done: threading.Event) -> None:
+    """Start the server again whenever it dies, until this command no longer uses it.
 
-    As long as a command holds the port open, clients that connect meanwhile wait for the next server.
+    While a command keeps the port open, clients that connect wait for the next server.
     """
-    deaths = 0  # without an answer in between
+    deaths = 0  # since the server last answered
     refusals = 0  # of the port, one after another
-    while not left.wait(POLL_SECONDS):
+    while not done.wait(POLL_SECONDS):
         if is_held(server.folder / URL):
             refusals = 0
             deaths = 0 if deaths and is_healthy(server.url) else deaths
             continue
         with locked(server.folder):
-            if is_held(server.folder / URL) or left.is_set():  # another command was faster
+            if is_held(server.folder / URL) or done.is_set():  # another command was faster
                 continue
             try:
                 listener = listener or socket.create_server((HOST, server.port))
-            except OSError as error:  # mostly the command that has the port, which starts the server itself
+            except OSError as error:  # usually another command has the port and starts the server itself
                 refusals += 1
                 if refusals * POLL_SECONDS > PORT_SECONDS:
                     _give_up(server, f"died, and cannot be started again: {error.strerror}")
                 continue
             deaths += 1
             if deaths > RESTARTS:
-                _give_up(server, "dies again and again")
-            print("The local Prefect server died; it is started again.", file=sys.stderr)
+                _give_up(server, "died several times in a row")
+            print("The local Prefect server died; starting it again.", file=sys.stderr)
             _start(server, listener)
     if listener is not None:
         listener.close()
 
 
 def _give_up(server: LocalServer, reason: str) -> None:
-    """End this process, which otherwise would wait for the server for minutes."""
+    """End this process; otherwise it would wait minutes for the server."""
     print(
-        f"motion-memory: The local Prefect server {reason}; see {server.folder / LOG}. What is finished is "
+        f"motion-memory: The local Prefect server {reason}; see {server.folder / LOG}. Finished work is "
         "kept; the same command goes on from here.",
         file=sys.stderr,
         flush=True,
@@ -243,8 +244,8 @@ def _give_up(server: LocalServer, reason: str) -> None:
 
 
 def _leave(folder: Path, user: IO[str]) -> None:
-    """Stop being a user; the last user waits for the server to end."""
-    with (folder / URL).open("a") as state:  # the child still holds it after it removed the name
+    """Register this command as no longer using the server; the last one waits for the server to end."""
+    with (folder / URL).open("a") as state:  # the child holds its lock even after it has removed the file
         Path(user.name).unlink(missing_ok=True)
         user.close()
         deadline = time.monotonic() + STOP_SECONDS + 4 * POLL_SECONDS

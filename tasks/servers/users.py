@@ -1,4 +1,4 @@
-"""Users of the server of a folder: each holds a lock on a file, which the kernel releases when it dies."""
+"""Which processes use the server of a folder. Each locks a file, which the kernel unlocks when it dies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ USERS: Final = "users"  # folder of one file for each process that uses the serv
 
 
 def register(folder: Path) -> IO[str]:
-    """Register this process as a user of the server of ``folder``, until the file that is returned closes."""
+    """Register this process as a user of the server of ``folder``; closing the returned file ends that."""
     (folder / USERS).mkdir(parents=True, exist_ok=True)
     user = (folder / USERS / str(os.getpid())).open("w")
     fcntl.flock(user, fcntl.LOCK_EX)
@@ -21,7 +21,7 @@ def register(folder: Path) -> IO[str]:
 
 
 def is_used(folder: Path) -> bool:
-    """Whether a registered command is alive; files of dead ones are removed."""
+    """Whether any registered process is alive. The files of dead ones are removed."""
     entries = list((folder / USERS).glob("*"))
     for entry in entries:
         if not is_held(entry):
@@ -30,7 +30,7 @@ def is_used(folder: Path) -> bool:
 
 
 def is_held(path: Path) -> bool:
-    """Whether a living process holds the lock on a file; the kernel releases the locks of dead ones."""
+    """Whether a living process has locked the file at ``path``; False if there is no such file."""
     try:
         with path.open() as file:
             return is_locked(file)
@@ -39,7 +39,7 @@ def is_held(path: Path) -> bool:
 
 
 def is_locked(file: IO[str]) -> bool:
-    """Whether another open file holds the lock of this one."""
+    """Whether the file is locked through another file object, of this or another process."""
     try:
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -50,7 +50,7 @@ def is_locked(file: IO[str]) -> bool:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keep other processes from starting or ending the server of ``folder``."""
+    """Keep other processes from starting or ending the server of ``folder`` while the context lasts."""
     with (folder / "server.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield

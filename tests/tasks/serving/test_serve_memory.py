@@ -112,7 +112,7 @@ def test_what_cannot_be_served_is_one_line(memory: Path, tmp_path: Path) -> None
         port = str(taken.getsockname()[1])
         for options, told in (
             ([str(memory), "--port", port], f"Port {port} of 127.0.0.1 cannot be used"),
-            ([str(memory), "--port", "99999"], "Port 99999: give one up to 65535"),
+            ([str(memory), "--port", "99999"], "Port 99999: give one from 1 to 65535"),
             ([str(tmp_path)], "holds no memory"),
             ([str(memory), "--vehicle", "car-1-trailer"], "made for vehicle car"),
         ):
