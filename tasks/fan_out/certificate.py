@@ -1,4 +1,4 @@
-"""A certificate for the local cluster of one command: kept in memory, and of no use to anybody else."""
+"""A certificate for the local cluster of one command; it is only kept in memory."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Security: Any = distributed.Security  # Dask has no types
 
 
 def own_certificate() -> Any:
-    """Dask's settings for encryption with a new key and a certificate that the key has signed.
+    """Make a new key and a certificate signed with it; return Dask's settings for encryption with them.
 
-    Like ``Security.temporary``, but valid since yesterday: with that one, a clock that is set back while a
-    command runs ends every new connection of its workers.
+    This is like ``Security.temporary``, but the certificate is valid from yesterday on. Otherwise workers
+    could open no new connection if the clock is set back while a command runs.
     """
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes, serialization

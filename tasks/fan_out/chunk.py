@@ -1,4 +1,4 @@
-"""A chunk: a piece of a stage that can be sent anywhere, with all that it takes to do it there."""
+"""A chunk: a piece of a stage, with all that a worker on any machine needs to do it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from tasks.settings.run_settings import RunSettings
 
 
 class Piece(Protocol):
-    """What a worker does at once."""
+    """A piece of work that one worker does."""
 
     @property
     def class_name(self) -> str:
-        """What it is a piece of, such as a problem class."""
+        """The name of what it is a piece of, for instance a problem class."""
 
     @property
     def index(self) -> int:
-        """Its position among the pieces of the same class."""
+        """Its position among the pieces of the same class, counted from 0."""
 
     @property
     def key(self) -> str:
@@ -33,7 +33,7 @@ class Piece(Protocol):
 
     @property
     def result(self) -> Path:
-        """The file that keeps its result; the name contains the key."""
+        """The file that keeps its result; the file's name contains the key."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class Chunk:
     data: str  # the data folder: a path, or s3://bucket/folder
     settings: RunSettings
     class_name: str  # a problem class, or the name of a memory
-    index: int  # position among the stage's chunks of this class, and number of its shard
-    first: int  # first problem, plan or epoch of the chunk
-    last: int  # one past its last
+    index: int  # position among the stage's chunks of this class, from 0; also the number of its shard
+    first: int  # number of its first problem, plan or epoch
+    last: int  # one more than the number of its last
     key: str  # digest of everything that its rows depend on
 
     @property
@@ -64,7 +64,7 @@ class Chunk:
         return self.run.result(self.class_name, self.key)
 
     def shard(self, table: Table) -> Path:
-        """Its own file of a table."""
+        """The file of a table that the chunk writes."""
         return self.run.shard(table, self.class_name, self.index)
 
 
@@ -72,7 +72,7 @@ class Cut(NamedTuple):
     """How the work on one class is cut into chunks. The cut must not depend on the number of workers."""
 
     total: int  # problems, plans or epochs
-    size: int  # of them in a chunk; the last chunk may have fewer
+    size: int  # how many of them are in a chunk; the last chunk may have fewer
     inputs: Sequence[Any]  # JSON values that the rows depend on, besides stage, class and code
 
 
@@ -82,7 +82,7 @@ def chunks_of(stage: str, data: str, settings: RunSettings, class_name: str, cut
     Args:
         stage: name of the stage.
         data: the data folder.
-        settings: those of the run.
+        settings: the settings of the run.
         class_name: a problem class, or the name of a memory.
         cut: how many items there are, and how many of them make a chunk.
 

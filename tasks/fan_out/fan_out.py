@@ -1,4 +1,4 @@
-"""The fan-out: chunks to Dask workers that survive a killed one, with a live progress bar."""
+"""The fan-out: give chunks to Dask workers, give them again if a worker is lost, and show the progress."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from tasks.settings.run_settings import RunSettings
 
 SETTINGS: Final = Path(__file__).with_name("dask.yaml")
 CONNECT_SECONDS: Final = 5
-RECONNECT_SECONDS: Final = 120  # for which a scheduler may be away
-LOSSES_ALLOWED: Final = 5  # of a scheduler within a stage
+RECONNECT_SECONDS: Final = 120  # how long a scheduler may be away
+LOSSES_ALLOWED: Final = 5  # how often a scheduler may be lost within a stage
 CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
-AHEAD: Final = 200  # chunks that wait for a worker: enough that none waits, few enough for any memory
-LOST: Final = ("cancelled", "lost")  # of a chunk whose scheduler is gone
-LOOK_SECONDS: Final = 1.0  # between two looks at what is partly done, which reads files
+AHEAD: Final = 200  # chunks submitted at a time: enough for all workers, few enough for any memory
+LOST: Final = ("cancelled", "lost")  # states of a chunk whose scheduler is gone
+LOOK_SECONDS: Final = 1.0  # between two looks at partly done chunks, which read files
 
 Client: Any = distributed.Client  # Dask has no types
 LocalCluster: Any = distributed.LocalCluster
@@ -52,26 +52,29 @@ class ChunkError(RunError):
 
 @contextmanager
 def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[Any]:
-    """Yield what a ``Client`` connects to: the cluster around this call, the given scheduler, or a new one.
+    """Yield a cluster that all flows inside this context share.
 
-    Every flow inside shares it. A new cluster is local, and only this process and its workers can use it:
-    they alone have its certificate.
+    It is the cluster of an outer context if there is one, else that of the given scheduler, else a new one. A
+    new cluster is local; only this process and its workers have its certificate, so nobody else can use it.
 
     Args:
-        workers: processes of one thread in a new cluster; by default one a core.
-        scheduler: address of a scheduler; by default $MOTION_MEMORY_SCHEDULER.
+        workers: number of worker processes of a new cluster, each with one thread; by default one per core.
+        scheduler: address of a Dask scheduler; by default $MOTION_MEMORY_SCHEDULER.
+
+    Yields:
+        what a Dask ``Client`` connects to.
 
     Raises:
         RuntimeError: no scheduler answers at the address, or it does not accept this client's certificate.
         UsageError: the address and Dask's settings disagree on encryption.
 
     """
-    around = _shared.get()
-    if around is not None:
-        yield around
+    outer = _shared.get()
+    if outer is not None:
+        yield outer
         return
-    given = scheduler or default_scheduler()
-    with _connected(given) if given else _local(workers or int(CPU_COUNT)) as shared:
+    address = scheduler or default_scheduler()
+    with _connected(address) if address else _local(workers or int(CPU_COUNT)) as shared:
         token = _shared.set(shared)
         try:
             yield shared
@@ -80,8 +83,8 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
 
 
 def task_runner() -> Any:
-    """The task runner of a flow: it looks for the shared cluster when the first task is submitted."""
-    shared: Any = cluster  # entered by the runner, which is all that it wants of a cluster
+    """The task runner of a flow; it uses the shared cluster from the first submitted task on."""
+    shared: Any = cluster  # the runner only enters it as a context
     return DaskTaskRunner(cluster_class=shared, client_kwargs={"timeout": RECONNECT_SECONDS})
 
 
@@ -101,11 +104,11 @@ def _connected(address: str) -> Iterator[str]:
 
 
 def _check_encryption(address: str) -> None:
-    security = Security()  # what Dask's settings say
+    security = Security()  # from Dask's settings
     encrypted = address.startswith("tls://")
     if encrypted and not security.tls_client_cert:
         raise UsageError(
-            redacted(f"{address} needs a certificate: name it in Dask's settings (docs/runbook.md).")
+            redacted(f"{address} needs a certificate: name one in Dask's settings (docs/runbook.md).")
         )
     if security.require_encryption and not encrypted:
         raise UsageError(
@@ -128,47 +131,54 @@ def _local(workers: int) -> Iterator[Any]:
         try:
             yield local
         finally:
-            _kill(local)  # what was wanted of them is written; leaving politely takes seconds
+            _kill(local)  # all results are written; ending workers in order takes seconds
             _close(local)
 
 
 def _settings() -> dict[str, Any]:
-    """The settings of ``dask.yaml``, by their dotted names."""
+    """The settings in ``dask.yaml``, by their dotted names."""
 
-    def named(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    def flattened(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         for name, value in values.items():
             if isinstance(value, dict):
-                yield from named(f"{prefix}{name}.", value)
+                yield from flattened(f"{prefix}{name}.", value)
             else:
                 yield f"{prefix}{name}", value
 
-    return dict(named("", yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))))
+    return dict(flattened("", yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))))
 
 
 def _kill(local: Any) -> None:
     for nanny in local.workers.values():
-        nanny.close_gracefully()  # that is: do not start it again
-        with suppress(AttributeError, ProcessLookupError):  # between two workers there is no process
+        nanny.close_gracefully()  # so that it is not started again
+        with suppress(
+            AttributeError, ProcessLookupError
+        ):  # while a worker is being replaced there is no process
             nanny.process.process.kill()
 
 
 def _close(local: Any) -> None:
-    with suppress(TimeoutError):  # what is left then dies with this process
+    with suppress(TimeoutError):  # the rest ends with this process
         local.close(timeout=CLOSE_SECONDS)
 
 
 def run_stage(stage: Stage[Result], data: str, settings: RunSettings) -> dict[Chunk, Result]:
-    """Do the chunks of a stage on the flow's workers; those of which nothing has changed are not done again.
+    """Do the chunks of a stage on the flow's workers, except those that are done already.
 
-    How many chunks a stage has may follow from the results of the first ones: it is asked again until no
-    chunk is left.
+    The number of chunks may depend on the results of the first ones, so the stage is asked for its chunks
+    again until none is left.
+
+    Args:
+        stage: the stage.
+        data: the data folder.
+        settings: the settings of the run.
 
     Returns:
-        the result of every chunk, in the order of the chunks.
+        the result of each chunk, in the order of the chunks.
 
     Raises:
         ChunkError: a chunk failed.
-        RunError: the scheduler went away.
+        RunError: the scheduler went away for too long or too often.
 
     """
     results: dict[Chunk, Result] = {}
@@ -178,16 +188,20 @@ def run_stage(stage: Stage[Result], data: str, settings: RunSettings) -> dict[Ch
 
 
 def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Result]:
-    """Do pieces of work on the flow's workers, but for those that are done already.
+    """Do the pieces of a job on the flow's workers, except those that are done already.
 
-    A scheduler that goes away and comes back is given anew what it had not finished.
+    If the scheduler goes away and comes back, unfinished pieces are submitted again.
+
+    Args:
+        job: says how to do a piece, and whether it is done.
+        pieces: the pieces.
 
     Returns:
         the results, in the order of the pieces.
 
     Raises:
-        ChunkError: a piece failed; the others are not waited for.
-        RunError: the scheduler went away.
+        ChunkError: a piece failed; the others are not awaited.
+        RunError: the scheduler went away for too long or too often.
 
     """
     task, sizes = piece_task(job), [job.units(piece) for piece in pieces]
@@ -199,14 +213,14 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
         waiting = deque(range(len(pieces)))
         pending: dict[int, Any] = {}
         units_done = units_begun = losses = 0
-        looked = time.monotonic()
+        last_look = time.monotonic()
         while len(done) < len(pieces):
             for i in [waiting.popleft() for _ in range(min(len(waiting), AHEAD - len(pending)))]:
-                kept = job.kept(pieces[i])
-                if kept is None:
+                done_before = job.kept(pieces[i])
+                if done_before is None:
                     pending[i] = task.submit(pieces[i])
                 else:
-                    done[i] = kept
+                    done[i] = done_before
                     units_done += sizes[i]
             ended = [i for i, future in pending.items() if future.wrapped_future.done()]
             lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
@@ -220,17 +234,17 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
                 else:
                     done[i] = _result(future, pieces[i], job.title)
                     units_done += sizes[i]
-            if time.monotonic() - looked >= LOOK_SECONDS:
+            if time.monotonic() - last_look >= LOOK_SECONDS:
                 units_begun = units_done + sum(job.units_done(pieces[i]) for i in pending)
-                looked = time.monotonic()
+                last_look = time.monotonic()
             show(max(units_done, min(units_begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
-    record_load(job.title, [each.work for each in done.values() if each.work is not None])
+    record_load(job.title, [piece.work for piece in done.values() if piece.work is not None])
     return [done[i].result for i in range(len(pieces))]
 
 
 def _wait_for_scheduler(client: Any, losses: int) -> None:
-    """Wait until the client has the scheduler again; RunError if it gave up, or lost it too often."""
+    """Wait until the client is connected again. Raises RunError if it gave up or was cut off too often."""
     while client.status == "connecting":
         time.sleep(POLL_SECONDS)
     if client.status != "running" or losses > LOSSES_ALLOWED:

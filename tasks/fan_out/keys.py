@@ -9,11 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-PACKAGES: Final = ("planners", "storage", "tasks")  # an edit in one of them makes every chunk anew
+PACKAGES: Final = ("planners", "storage", "tasks")  # after an edit in one of them all chunks are made again
 
 
 def key_of(*inputs: Any) -> str:
-    """A digest of JSON values and of the sources that turn them into rows."""
+    """A digest of JSON values, and of all source files that turn them into rows."""
     text = json.dumps([sources_digest(), *inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:24]
 
@@ -25,7 +25,7 @@ def sources_digest() -> str:
     for package in PACKAGES:
         spec = find_spec(package)
         if spec is None or spec.origin is None:
-            raise ImportError(f"Package {package} is not there; install motion-memory again.")
+            raise ImportError(f"Package {package} is missing; install motion-memory again.")
         root = Path(spec.origin).parent
         for file in sorted(root.rglob("*.py")):
             digest.update(f"{package}/{file.relative_to(root)}\0".encode())

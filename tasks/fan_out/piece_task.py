@@ -1,4 +1,4 @@
-"""A piece of work as a Prefect task, which is tried again if it failed for a reason that may pass."""
+"""A piece of work as a Prefect task, which is tried again if the reason of its failure may pass."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from prefect.tasks import Task, exponential_backoff
 from storage.errors import StorageError, UnreachableError
 from tasks.fan_out.stage import AnyPiece, Done, Job, Result
 
-RETRIES: Final = 3  # of a piece that failed because of a disk, a network or a storage
-FIRST_WAIT_SECONDS: Final = 2.0  # each further wait is twice as long
+RETRIES: Final = 3  # of a piece that failed because of a disk, a network or object storage
+FIRST_WAIT_SECONDS: Final = 2.0  # each later wait is twice as long
 
 
 def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
-    """The task that does a piece of a job, and keeps its result.
+    """The Prefect task that does a piece of a job and keeps its result.
 
-    It tries again after growing waits when storage does not answer; a fault of the piece itself would only
-    happen again.
+    If storage does not answer, the task is tried again, with growing waits. Other failures would only happen
+    again, so they are final.
     """
     name = job.do.__name__.replace("_", "-")
 
@@ -33,7 +33,7 @@ def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
         name=name,
         task_run_name=f"{name} {{chunk.class_name}} {{chunk.index}}",
         cache_policy=NO_CACHE,
-        persist_result=False,  # a worker's own disk would keep it, where no other worker looks
+        persist_result=False,  # Prefect would keep it on the worker's own disk
         retries=RETRIES,
         retry_delay_seconds=exponential_backoff(FIRST_WAIT_SECONDS),
         retry_jitter_factor=0.5,
@@ -42,7 +42,8 @@ def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
 
 
 def _may_pass(_task: object, _run: object, state: State[Any]) -> bool:
-    """Whether the reason for which a piece failed may be gone the next time."""
+    """Whether the reason of a failure may have passed the next time."""
     error = state.data
-    lost = (UnreachableError, OSError)
-    return isinstance(error, lost) or (isinstance(error, StorageError) and isinstance(error.__cause__, lost))
+    passing = (UnreachableError, OSError)
+    is_wrapped = isinstance(error, StorageError) and isinstance(error.__cause__, passing)
+    return isinstance(error, passing) or is_wrapped

@@ -1,4 +1,4 @@
-"""How far work has come, shown on the error stream."""
+"""Show the progress of work on the error stream."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from typing import Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-LINE_SECONDS: Final = 5.0  # between lines of progress where there is no terminal
+LINE_SECONDS: Final = 5.0  # between two lines of progress, if the stream is no terminal
 
 
 @contextmanager
 def progress(description: str, total: int = 0, ended: bool = True) -> Iterator[Callable[..., None]]:
-    """Show a bar with the time left on a terminal, and a line now and then elsewhere.
+    """Show a bar with the time left on a terminal; elsewhere, print a line every few seconds.
 
     Args:
         description: what is being done.
-        total: how many items there are, if that is known.
-        ended: whether to print a line at the end even of work that took less time than is between two lines.
+        total: number of items; 0 if it is not known yet.
+        ended: whether to print a line at the end of work that was too short for any other line.
 
     Yields:
-        what to call with the number of items that are done, and of how many if that was not known before.
+        a function to call with the number of finished items, and with the number of all if ``total`` was 0.
 
     """
     console = Console(file=sys.stderr)
@@ -35,15 +35,15 @@ def progress(description: str, total: int = 0, ended: bool = True) -> Iterator[C
             row = bar.add_task(description, total=total)
             yield lambda done, of=total: bar.update(row, completed=done, total=of)
         return
-    told = began
+    last_line = began
     complete = not ended
 
-    def tell(done: int, of: int = total) -> None:
-        nonlocal told, complete
+    def print_line(done: int, of: int = total) -> None:
+        nonlocal last_line, complete
         now = time.monotonic()
-        if now - told >= LINE_SECONDS or (done == of and not complete):
-            told, complete = now, done == of
+        if now - last_line >= LINE_SECONDS or (done == of and not complete):
+            last_line, complete = now, done == of
             left = f", {(now - began) / done * (of - done):.0f} s left" if 0 < done < of else ""
             console.print(f"{description}: {done} of {of} after {now - began:.0f} s{left}", highlight=False)
 
-    yield tell
+    yield print_line

@@ -1,4 +1,4 @@
-"""How far long work has come, as an artifact of its Prefect flow."""
+"""Show the progress of long work as an artifact of its Prefect flow."""
 
 from __future__ import annotations
 
@@ -8,49 +8,53 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-EVERY_SECONDS: Final = 10.0  # shorter work gets no artifact; each update is a request
+EVERY_SECONDS: Final = (
+    10.0  # from one update to the next, as each is a request; shorter work gets no artifact
+)
 
 Show = Callable[[int], Any]
 
 
 @contextmanager
 def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show]:
-    """Report progress to Prefect, and to something else besides.
+    """Report progress to Prefect, and pass it on to another function.
 
     Args:
         description: what is being done.
-        total: how many items there are.
-        show: called with the number of items that are done, also if Prefect does not answer.
+        total: number of items.
+        show: called with the number of finished items, also if Prefect does not answer.
 
     Yields:
-        what to call with the number of items that are done.
+        a function to call with the number of finished items.
 
     """
     from prefect import artifacts
 
-    made: Any = None
-    told, answers = time.monotonic(), True
+    artifact_id: Any = None
+    last_update, answers = time.monotonic(), True
 
-    def tell(done: int) -> None:
-        nonlocal made, told, answers
+    def update(done: int) -> None:
+        nonlocal artifact_id, last_update, answers
         show(done)
-        if not answers or not total or time.monotonic() - told < EVERY_SECONDS:
+        if not answers or not total or time.monotonic() - last_update < EVERY_SECONDS:
             return
-        told, share = time.monotonic(), 100.0 * done / total
+        last_update, share = time.monotonic(), 100.0 * done / total
         try:
-            if made is None:
-                made = artifacts.create_progress_artifact(share, artifact_key(description), description)
+            if artifact_id is None:
+                artifact_id = artifacts.create_progress_artifact(
+                    share, artifact_key(description), description
+                )
             else:
-                artifacts.update_progress_artifact(made, share)
-        except Exception:  # the work is what counts, and the bar shows it
+                artifacts.update_progress_artifact(artifact_id, share)
+        except Exception:  # the work goes on without, and the bar shows it
             answers = False
 
-    yield tell
-    if made is not None and answers:
-        told = -EVERY_SECONDS
-        tell(total)
+    yield update
+    if artifact_id is not None and answers:
+        last_update = -EVERY_SECONDS
+        update(total)
 
 
 def artifact_key(name: str) -> str:
-    """The key of an artifact, made of a name."""
+    """The key of an artifact, made from any name: lower-case letters, digits and dashes."""
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

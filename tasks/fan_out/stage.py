@@ -38,7 +38,7 @@ class Done(NamedTuple, Generic[Result]):
 
 @dataclass(frozen=True, kw_only=True)
 class Job(Generic[AnyPiece, Result]):
-    """Work that is done piece by piece, by any number of workers.
+    """Work that any number of workers do piece by piece.
 
     Each piece writes one output, and keeps a small result beside it. Doing a piece again replaces both with
     the same content.
@@ -47,28 +47,28 @@ class Job(Generic[AnyPiece, Result]):
     name: str  # part of keys, and shown on the progress bar
     do: Callable[[AnyPiece], Result]
     output: Callable[[AnyPiece], Path]  # what ``do`` writes
-    is_whole: Callable[[Path, str], bool] = shard_is_done  # whether an output is there, made from a key
+    is_whole: Callable[[Path, str], bool] = shard_is_done  # whether an output exists and was made from a key
     result: type[Any] = NoneType  # what ``do`` returns: a named tuple of JSON values, or nothing
-    units: Callable[[AnyPiece], int]  # what a piece counts on the progress bar
-    unit: str = ""  # of the progress bar, where it counts neither problems nor plans
-    units_done: Callable[[AnyPiece], int] = lambda piece: 0  # of a piece that is being worked on
+    units: Callable[[AnyPiece], int]  # how many units of the progress bar a piece has
+    unit: str = ""  # name of these units, unless they are problems or plans
+    units_done: Callable[[AnyPiece], int] = lambda piece: 0  # how many are done of a piece that a worker has
 
     @property
     def title(self) -> str:
-        """Its name on the progress bar and in errors."""
+        """The name of the job on the progress bar and in errors."""
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
     def is_written(self, piece: AnyPiece) -> bool:
-        """Whether the output of a piece is there, made from the same inputs by the same code."""
+        """Whether the output of a piece exists and was made from the same inputs by the same code."""
         return self.is_whole(self.output(piece), piece.key)
 
     def kept(self, piece: AnyPiece) -> Done[Result] | None:
-        """What a piece left that was done before; None if it has to be done, or done again."""
+        """The result of a piece that was done before; None if the piece has to be done."""
         values = _read_if_whole(piece.result) if self.is_written(piece) else None
         return None if values is None else Done(self.result(**values), None)
 
     def run(self, piece: AnyPiece) -> Done[Result]:
-        """Do a piece, and keep its result once its output is written."""
+        """Do a piece; keep its result once its output is written."""
         began = time.monotonic()
         with looking_once():
             result = self.do(piece)
@@ -80,31 +80,33 @@ class Job(Generic[AnyPiece, Result]):
 class Stage(Job[Chunk, Result]):
     """A stage of a run: work on each of its classes, or on each of its memories."""
 
-    cut: Callable[[str, RunSettings, str], Cut]  # of the work on a class, given data folder, settings, class
+    cut: Callable[[str, RunSettings, str], Cut]  # how a class is cut, from data folder, settings and class
     units: Callable[[Chunk], int] = lambda chunk: chunk.last - chunk.first
     classes: Callable[[RunSettings], Sequence[str]] = attrgetter("class_names")
 
     def chunks(self, data: str, settings: RunSettings) -> list[Chunk]:
         """The chunks of all classes."""
         with looking_once():
-            return [c for name in self.classes(settings) for c in self.chunks_of(data, settings, name)]
+            return [
+                chunk for name in self.classes(settings) for chunk in self.chunks_of(data, settings, name)
+            ]
 
     def chunks_of(self, data: str, settings: RunSettings, class_name: str) -> list[Chunk]:
         """The chunks of one class."""
         return chunks_of(self.name, data, settings, class_name, self.cut(data, settings, class_name))
 
     def keys(self, data: str, settings: RunSettings, class_name: str) -> list[str]:
-        """The keys of one class's chunks: what a later stage that reads their rows depends on."""
+        """The keys of one class's chunks, on which a later stage depends if it reads their rows."""
         return [chunk.key for chunk in self.chunks_of(data, settings, class_name)]
 
 
 def mark_done(folder: Path, key: str) -> None:
-    """Note beside a folder, which cannot carry a key itself, what it was made from."""
+    """Write the key of a folder into a file beside it, as a folder cannot carry one."""
     write_json(_mark(folder), {"key": key})
 
 
 def is_marked(folder: Path, key: str) -> bool:
-    """Whether a folder is there, and was made from what ``key`` stands for."""
+    """Whether a folder exists and its key, written by ``mark_done``, is ``key``."""
     return bool(_read_if_whole(_mark(folder)) == {"key": key}) and is_there(folder)
 
 
@@ -113,7 +115,7 @@ def _mark(folder: Path) -> Path:
 
 
 def _read_if_whole(path: Path) -> Any:
-    """The value in a JSON file; None if it is missing or damaged, so that its chunk is done again."""
+    """The value in a JSON file; None if the file is missing or damaged, so that its chunk is done again."""
     try:
         return read_json(path)
     except UnreachableError:

@@ -14,39 +14,39 @@ import psutil
 
 
 class Work(NamedTuple):
-    """What a worker spent on one chunk."""
+    """The time and memory that a worker took for one chunk."""
 
-    worker: str  # host and process
-    began: float  # seconds on a clock of that machine that nobody sets
-    ended: float
-    memory_bytes: int  # that the worker held then
+    worker: str  # host and process id
+    began: float  # seconds of ``time.monotonic`` on that machine
+    ended: float  # the same
+    memory_bytes: int  # held by the worker at the end
 
 
 class Load(NamedTuple):
-    """What the workers of a fan-out spent on its chunks, and on waiting between them."""
+    """How long the workers of a fan-out were busy with chunks, and how much memory they held."""
 
-    what: str
-    chunks: int  # done now, not before
-    workers: int  # that did some of them
-    busy_seconds: float  # in chunks, over all workers
-    span_seconds: float  # from each worker's first chunk to the end of its last, over all workers
-    first_bytes: int  # held by a worker after its first chunk, at most
-    last_bytes: int  # after its last, at most
+    what: str  # name of the fan-out
+    chunks: int  # number of chunks that were done now, not before
+    workers: int  # number of workers that did them
+    busy_seconds: float  # within chunks, summed over workers
+    span_seconds: float  # from each worker's first chunk to the end of its last, summed over workers
+    first_bytes: int  # the most memory that a worker held after its first chunk
+    last_bytes: int  # the most memory that a worker held after its last chunk
 
     @property
     def orchestration(self) -> float:
-        """Share of the workers' time, from first to last chunk, that they spent in no chunk."""
+        """The share of ``span_seconds`` that the workers spent between chunks."""
         return 1.0 - self.busy_seconds / self.span_seconds if self.span_seconds else 0.0
 
 
 def work_since(began: float) -> Work:
-    """The work on a chunk that this process began at a time of ``time.monotonic`` and ends now."""
+    """The work on a chunk that ends now; this process began it at ``began`` of ``time.monotonic``."""
     worker = f"{platform.node()}-{os.getpid()}"
     return Work(worker, began, time.monotonic(), psutil.Process().memory_info().rss)
 
 
 def load_of(what: str, works: Sequence[Work]) -> Load:
-    """The load of a fan-out called ``what``, summed over its chunks."""
+    """The load of the fan-out named ``what``, from the work on its chunks."""
     by_worker: dict[str, list[Work]] = {}
     for work in sorted(works, key=lambda work: work.began):
         by_worker.setdefault(work.worker, []).append(work)
@@ -55,14 +55,14 @@ def load_of(what: str, works: Sequence[Work]) -> Load:
         len(works),
         len(by_worker),
         sum(work.ended - work.began for work in works),
-        sum(own[-1].ended - own[0].began for own in by_worker.values()),
-        max((own[0].memory_bytes for own in by_worker.values()), default=0),
-        max((own[-1].memory_bytes for own in by_worker.values()), default=0),
+        sum(chunks[-1].ended - chunks[0].began for chunks in by_worker.values()),
+        max((chunks[0].memory_bytes for chunks in by_worker.values()), default=0),
+        max((chunks[-1].memory_bytes for chunks in by_worker.values()), default=0),
     )
 
 
 def total_load(loads: Sequence[Load]) -> Load | None:
-    """The load of several fan-outs, one after another; None if there are none."""
+    """The load of several fan-outs that ran one after another; None if the sequence is empty."""
     if not loads:
         return None
     return Load(
@@ -91,7 +91,7 @@ def recorded_loads() -> Iterator[list[Load]]:
 
 
 def record_load(what: str, works: Sequence[Work]) -> None:
-    """Add a fan-out called ``what``, if it did any work, to the list of ``recorded_loads`` around it."""
+    """Add the load of the fan-out named ``what`` to the enclosing ``recorded_loads``, if it did any work."""
     loads = _recorded.get()
     if loads is not None and works:
         loads.append(load_of(what, works))
