@@ -1,9 +1,9 @@
-"""MLflow's scoring server around a memory, with a guard before it: a bad request gets one clear line.
+"""MLflow's scoring server for a memory, with its requests checked first: a bad one gets one clear line.
 
 ``/invocations`` takes MLflow's protocol as JSON (``dataframe_split``, ``dataframe_records``, ``instances`` or
 ``inputs``, and ``params``); MLflow parses it and enforces the signature. ``/ping``, ``/health`` and
-``/version`` are MLflow's own. Its server alone answers some bad requests with 500 or a stack trace, bounds
-nothing, and spends most of its time on writing numbers.
+``/version`` are MLflow's own. MLflow's server by itself answers some bad requests with 500 or a stack trace,
+has no bounds on requests, and spends most of its time on writing numbers.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from storage.fields import check_fields, parse_json, short
 from tasks.tracking.memory_model import TOP_K
 
 PATH: Final = "/invocations"
-MOST_BYTES: Final = 8 << 20  # of a request
-MOST_HELD: Final = 1 << 30  # bytes of all requests together
-MOST_PLANS: Final = 1_000  # problems times top k of a request: some 30 MB of answer
+MOST_BYTES: Final = 8 << 20  # in a request
+MOST_HELD: Final = 1 << 30  # bytes, of all requests together
+MOST_PLANS: Final = 1_000  # problems times top_k in a request; the answer then has some 30 MB
 BODY_SECONDS: Final = 20.0  # for a whole request to arrive
-LONGEST: Final = 400  # characters of a message
+LONGEST_MESSAGE: Final = 400  # characters
 FORMATS: Final = ("dataframe_split", "dataframe_records", "instances", "inputs")
 
 
 class RefusedError(Exception):
-    """A request that is not answered: its HTTP status, and one line that says why and what to do."""
+    """A request is refused, with an HTTP status and one line that says why and what to do."""
 
     def __init__(self, status: int, message: str) -> None:
-        """Shorten the line where it quotes much of the request."""
+        """Join the message to one line, and shorten it if it quotes much of the request."""
         line = " ".join(message.split()).encode("utf-8", "replace").decode()
-        super().__init__(line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}...")
+        super().__init__(line if len(line) <= LONGEST_MESSAGE else f"{line[: LONGEST_MESSAGE - 3]}...")
         self.status = status
 
 
 class Scoring:
-    """The ASGI application of a model."""
+    """The ASGI application that answers requests to a model."""
 
     def __init__(self, model: PyFuncModel) -> None:
         self._model = model
@@ -49,7 +49,7 @@ class Scoring:
         self._held = 0  # bytes of all requests that are arriving or being answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request; one line of JSON for what is refused."""
+        """Answer a request; a refused one gets one line of JSON."""
         if scope["type"] != "http" or scope["path"] != PATH or scope["method"] != "POST":
             await self._mlflow(scope, receive, send)
             return
@@ -68,8 +68,11 @@ class Scoring:
         await send({"type": "http.response.body", "body": content})
 
     def answer(self, body: bytes) -> bytes:
-        """The answer to a body, ``{"predictions": [a row a plan]}``. RefusedError: it is no good."""
-        table, top_k = self._asked(body)
+        """Answer the body of a request with ``{"predictions": [...]}``, a row for each plan.
+
+        Raises RefusedError if the body is malformed, asks for too much, or holds a bad problem.
+        """
+        table, top_k = self._parsed(body)
         try:
             plans = cast("pd.DataFrame", self._model.predict(table, {"top_k": top_k}))
         except MlflowException as error:
@@ -92,35 +95,39 @@ class Scoring:
                     if len(body) > MOST_BYTES:
                         raise _too_long()
                     if self._held > MOST_HELD:
-                        raise RefusedError(503, "Too much is asked by too many at once; ask again.")
+                        raise RefusedError(
+                            503, "Too many requests are arriving at once; send this one again later."
+                        )
                     more = message.get("more_body", False)
         except TimeoutError:
             raise RefusedError(408, f"The request did not arrive within {BODY_SECONDS:g} s.") from None
 
-    def _asked(self, body: bytes) -> tuple[pd.DataFrame, int]:
-        """The table of problems, and how many plans each is to get."""
+    def _parsed(self, body: bytes) -> tuple[pd.DataFrame, int]:
+        """The table of problems in a body, and the number of plans wanted for each."""
         try:
-            asked = parse_json(body, "The body")
-            if not isinstance(asked, dict):
-                raise ValueError(f"is {short(asked)}, wanted was an object with one of {', '.join(FORMATS)}")
-            check_fields(list(asked), (*FORMATS, "params"))
+            content = parse_json(body, "The body")
+            if not isinstance(content, dict):
+                raise ValueError(
+                    f"is {short(content)}, wanted was an object with one of {', '.join(FORMATS)}"
+                )
+            check_fields(list(content), (*FORMATS, "params"))
         except StorageError as error:
             raise RefusedError(400, str(error)) from None
         except ValueError as error:
             raise RefusedError(400, f"The body {error}.") from None
-        given = [name for name in FORMATS if name in asked]
-        if len(given) != 1:
-            told = ", ".join(given) or "none of them"
-            raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {told}.")
-        top_k = _top_k(asked.get("params"))
+        formats = [name for name in FORMATS if name in content]
+        if len(formats) != 1:
+            got = ", ".join(formats) or "none of them"
+            raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {got}.")
+        top_k = _top_k(content.get("params"))
         try:
             schema = self._model.metadata.get_input_schema()  # type: ignore[no-untyped-call]
-            table = scoring_server.infer_and_parse_data({given[0]: asked[given[0]]}, schema)
+            table = scoring_server.infer_and_parse_data({formats[0]: content[formats[0]]}, schema)
             if not isinstance(table, pd.DataFrame):
                 table = pd.DataFrame(table)
             check_fields(table.columns.tolist(), ("problem",))
-        except Exception as error:  # MLflow and pandas have one of their own for each kind of nonsense
-            raise RefusedError(400, f"{given[0]} is no table of problems: {error}") from None
+        except Exception as error:  # MLflow and pandas raise many kinds of errors here
+            raise RefusedError(400, f"{formats[0]} is not a table of problems: {error}") from None
         if len(table) * top_k > MOST_PLANS:
             raise RefusedError(
                 413,

@@ -1,4 +1,4 @@
-"""What each stage of a run leaves in MLflow."""
+"""Log the stages of a run in MLflow: parameters, metrics, models, figures and data sets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tasks.tracking.parameters import parameters_of
 
 COMPARED: Final = ("controls", "planning-times", "retrieval")  # pictures on the parent run
 
-_SHOWN = (
+_SUMMARY_METRICS = (
     "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
     "collision_checks",
 )  # fmt: skip
@@ -39,15 +39,24 @@ _SHOWN = (
 
 @functools.cache
 def tracker(data: str) -> Tracker:
-    """The tracker of a data folder; the first call begins to connect."""
+    """The tracker of a data folder. The first call starts to connect, in the background."""
     return Tracker(open_data_folder(data))
 
 
 @contextmanager
 def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
-    """The parent run: settings as parameters and tags, where and from which commit it was made.
+    """Open the parent run in MLflow while the context lasts, and yield its id.
 
-    What it brings forth is among its children; the figures by which runs are compared are its own, too.
+    It gets the settings as parameters, and tags that say on which machine and from which commit it was made.
+    Its stages are child runs; the metrics by which runs are compared are logged on the parent too.
+
+    Parameters
+    ----------
+    data
+        The data folder.
+    settings
+        The settings of the run.
+
     """
     tags = {"commit": commit(), "host": platform.node(), "learned": settings.learned}
     tags |= {name: str(getattr(settings, name)) for name in ("vehicle", "preset", "objective", "difficulty")}
@@ -58,7 +67,16 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
 
 
 def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Trained]) -> None:
-    """One child run for each encoder: parameters, metrics of every epoch, the data it learned from."""
+    """Log a child run for each trained encoder: parameters, metrics of each epoch, and its training data.
+
+    Parameters
+    ----------
+    data, settings
+        The data folder and the settings of the run.
+    trained
+        What training left, by chunk.
+
+    """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in trained.items():
         with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
@@ -76,7 +94,18 @@ def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Train
 def log_memories(
     data: str, settings: RunSettings, built: Mapping[Chunk, Built], retrieval: pd.DataFrame
 ) -> None:
-    """Each memory as a model that its training brought forth, what it recalls as metrics, and all curves."""
+    """Log each memory as a model on the child run of its training, with its metrics and curves of recall.
+
+    Parameters
+    ----------
+    data, settings
+        The data folder and the settings of the run.
+    built
+        What building the memories left, by chunk.
+    retrieval
+        The retrieval table of the run, a row for each memory, protocol and recall.
+
+    """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in built.items():
         name = chunk.class_name
@@ -92,7 +121,7 @@ def log_memories(
 
 
 def log_report(data: str, settings: RunSettings, report: Report) -> None:
-    """The benchmark's child run: every figure of the summary as a metric, figures and tables as artifacts."""
+    """Log the benchmark as a child run: the summary as metrics, pictures and tables as artifacts."""
     log, run = tracker(data), run_folder(data, settings)
     key = key_of([chunk.key for chunk in BENCHMARK.chunks(data, settings)])
     _log_headline(data, settings, headline(report.summary, report.retrieval), COMPARED)
@@ -103,25 +132,25 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
             log.artifacts(run_id, path)
         if log.is_logged(run_id, key):
             return
-        rows: dict[str, float] = {}
+        metrics: dict[str, float] = {}
         for row in report.summary.to_dict("records"):
-            place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
-            rows |= {f"{place}/{name}": row[name] for name in _SHOWN}
-        rows |= _retrieval_metrics(report.retrieval)
-        log.metrics(run_id, [{name: value for name, value in rows.items() if math.isfinite(value)}])
+            prefix = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
+            metrics |= {f"{prefix}/{name}": row[name] for name in _SUMMARY_METRICS}
+        metrics |= _retrieval_metrics(report.retrieval)
+        log.metrics(run_id, [{name: value for name, value in metrics.items() if math.isfinite(value)}])
         log.dataset(run_id, "attempts", run.results, key, "benchmark")
         log.mark_logged(run_id, key)
 
 
 def _log_headline(
-    data: str, settings: RunSettings, figures: Mapping[str, float], pictures: Sequence[str]
+    data: str, settings: RunSettings, metrics: Mapping[str, float], pictures: Sequence[str]
 ) -> None:
-    """On the parent run, if there is one: figures, pictures and the data that it rests on."""
+    """Log metrics, pictures and the experiences on the parent run, if there is one."""
     log, run = tracker(data), run_folder(data, settings)
     parent = log.find(settings.run_name, "run")
     if parent is None:
         return
-    log.metrics(parent, [figures])
+    log.metrics(parent, [metrics])
     for picture in pictures:
         log.artifacts(parent, run.figure(picture, "png"), "figures")
     for name in settings.class_names:
@@ -140,7 +169,24 @@ def log_judgement(
     markdown: str,
     attempts: Sequence[pd.DataFrame],
 ) -> None:
-    """One child run for each memory that was judged: the verdict, every figure, the attempts it rests on."""
+    """Log a child run for a judged memory: the verdict, all numbers, and the attempts that it rests on.
+
+    Parameters
+    ----------
+    data, settings
+        The data folder and the settings of the run.
+    memory
+        The name of the memory.
+    verdict
+        The verdict, in the words of the registry.
+    judgement
+        The comparison with the champion; None if there was none.
+    markdown
+        The verdict with its reasons, for people.
+    attempts
+        The attempts of the champion, which are none if there was no champion, and those of the challenger.
+
+    """
     log, run = tracker(data), run_folder(data, settings)
     key = key_of(judged_key(data, settings, memory))
     with _child(data, settings, f"judge {memory}") as run_id:
@@ -151,43 +197,52 @@ def log_judgement(
         if judgement is not None:
             log.metrics(run_id, [_judgement_metrics(judgement)])
         with scratch_folder() as scratch:
-            told = scratch / "verdict.md"
-            told.write_text(markdown, encoding="utf-8")
-            log.artifacts(run_id, told)
-        problems = {str(each) for side in attempts for each in side["problem_id"].unique()}
+            verdict_file = scratch / "verdict.md"
+            verdict_file.write_text(markdown, encoding="utf-8")
+            log.artifacts(run_id, verdict_file)
+        problems = {str(identity) for rows in attempts for identity in rows["problem_id"].unique()}
         log.metrics(run_id, [{"problems": float(len(problems))}])
         log.dataset(run_id, f"judged-{memory}", run.judged, key, "promotion")
         log.mark_logged(run_id, key)
 
 
 def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
-    figures = {name: float(getattr(judgement, name)) for name in ("reduction", "low", "high")}
+    metrics = {name: float(getattr(judgement, name)) for name in ("reduction", "low", "high")}
     for row in judgement.columns.to_dict("records"):
-        place = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
+        prefix = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
         names = ("champion_ms", "ms", "reduction", "champion_solved", "solved", "champion_hits", "hits")
-        figures |= {f"{place}/{name}": float(row[name]) for name in names}
-    return figures
+        metrics |= {f"{prefix}/{name}": float(row[name]) for name in names}
+    return metrics
 
 
 def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
-    """Every figure of the retrieval table under a name of its own."""
-    rows: dict[str, float] = {}
+    """The numbers of the retrieval table, each as a metric with its own name."""
+    metrics: dict[str, float] = {}
     for row in retrieval.to_dict("records"):
-        place = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}/{row['recall']}"
+        prefix = f"{row['panel']}/memory-{row['memory']}/{row['protocol']}/{row['recall']}"
         numbers = {
             str(name).replace("@", "-"): value for name, value in row.items() if isinstance(value, float)
         }
-        rows |= {f"{place}/{name}": value for name, value in numbers.items() if math.isfinite(value)}
-    return rows
+        metrics |= {f"{prefix}/{name}": value for name, value in numbers.items() if math.isfinite(value)}
+    return metrics
 
 
 def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
-    """The name of a training: with several seeds it says which."""
+    """The name of a training stage, with the seed if there are several."""
     return f"train {class_name}" + (f" seed {seed}" if settings.learning.seeds > 1 else "")
 
 
 def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None:
-    """One run for the sweep, and in it a child for each variant: parameters, metrics of every epoch."""
+    """Log a run for the sweep, with a child for each variant: parameters, and metrics of each epoch.
+
+    Parameters
+    ----------
+    data, settings
+        The data folder and the settings of the run.
+    chunks
+        The finished chunks of the sweep, one for each variant.
+
+    """
     log = tracker(data)
     with _child(data, settings, "sweep") as parent:
         for chunk in chunks:
@@ -196,11 +251,11 @@ def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None
             with log.run(settings.run_name, stage, {}, parent=parent) as run_id:
                 if log.is_logged(run_id, chunk.key):
                     continue
-                found = ("hit@1", "hit@5", "seconds")
-                log.parameters(run_id, {name: value for name, value in row.items() if name not in found})
+                results = ("hit@1", "hit@5", "seconds")
+                log.parameters(run_id, {name: value for name, value in row.items() if name not in results})
                 log.metrics(run_id, epochs, step="epoch")
                 log.metrics(
-                    run_id, [{f"of_oracle_{name.replace('@', '_')}": row[name] for name in found[:2]}]
+                    run_id, [{f"of_oracle_{name.replace('@', '_')}": row[name] for name in results[:2]}]
                 )
                 log.mark_logged(run_id, chunk.key)
 

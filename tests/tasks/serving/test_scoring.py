@@ -109,7 +109,7 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
         (
             b'{"dataframe_split": {"columns": ["problem", "problem"], "data": [["x", "y"]]}}',
             400,
-            "dataframe_split is no table of problems",
+            "dataframe_split is not a table of problems",
         ),
         (b"\xef\xbb\xbf{}", 400, "byte order mark"),
         (b"{}".decode().encode("utf-16"), 400, "not text in UTF-8"),
@@ -119,7 +119,7 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
             400,
             "'obstacles' more than",
         ),
-        (b'{"dataframe_records": 7}', 400, "dataframe_records is no table"),
+        (b'{"dataframe_records": 7}', 400, "dataframe_records is not a table"),
         (b'{"dataframe_records": [{"problem": 7}]}', 400, "roblem"),
         (b'{"dataframe_records": [{"problem": NaN}]}', 400, "roblem"),
         (request("{"), 400, "Problem 1: it is not valid JSON"),
