@@ -10,8 +10,7 @@ from contextlib import contextmanager
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
     """Only ``gc.collect`` collects garbage inside, and only of what was made inside."""
-    gc.collect()
-    gc.freeze()
+    gc.freeze()  # garbage too: looking for it first takes longer than a small batch of attempts
     gc.disable()
     try:
         yield

@@ -19,6 +19,13 @@ from tests.worlds import SHARED
 ROOT: Final = Path(__file__).parents[2]
 TUTORIAL: Final = ROOT / "docs" / "tutorial.md"
 ANY_LINES: Final = "…"  # in what is shown of a command's lines
+SMALLER: Final = {  # in the tutorial's commands: the same in a minute
+    "--preset laptop": "--preset smoke",
+    "runs/laptop-": "runs/smoke-",
+    "--problems 1000": "--problems 100",
+    "--problems 500": "--problems 50",
+    "--test-problems 300": "--test-problems 10",
+}
 _STEP: Final = re.compile(r"^```sh\n(.*?)^```\n(?:\s*^```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(pictures/([^)]+)\)")
 _OF_THIS_MACHINE: Final = (
@@ -41,6 +48,14 @@ class Step(NamedTuple):
 def steps() -> list[Step]:
     """The tutorial's, in order."""
     return [Step(commands, shown or "") for commands, shown in _STEP.findall(TUTORIAL.read_text("utf-8"))]
+
+
+def smaller(step: Step) -> Step:
+    """The same commands with fewer problems and experiences."""
+    commands = step.commands
+    for written, instead in SMALLER.items():
+        commands = commands.replace(written, instead)
+    return step._replace(commands=commands)
 
 
 def pictures() -> list[str]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import psutil
 
 ROOT = Path(__file__).parents[2]
-LOOK_SECONDS = 0.05
+LOOK_SECONDS = 0.25  # looking takes processor time from what is looked at
 
 
 class Port(NamedTuple):
