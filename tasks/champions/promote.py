@@ -1,4 +1,4 @@
-"""Change champions by hand: approve a challenger, or go back to the champion before."""
+"""Change champions: make a judged challenger champion, or go back to the champion before."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ import pytest
 from tests.docs.tutorial import as_anywhere, begin, do, is_shown, picture_in, pictures, smaller, steps
 from tests.worlds import SHARED
 
-
 needs_worlds = pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
 
 

@@ -1,8 +1,8 @@
 """The kernels that each kind of vehicle implements, in a file of its own.
 
 A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s). The two
-controls are constant during a step. A new kind of vehicle needs its settings in ``vehicle``, a file here and
-an entry in ``dynamics.KINDS``.
+controls are constant during a step. A new kind of vehicle needs its settings in ``vehicle``, a file here, an
+entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is asked for (docs/architecture.md).
 """
 
 from __future__ import annotations
