@@ -9,7 +9,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
 from tasks.stages.curate import CURATE
 from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
-from tasks.stages.read_worlds import READ_WORLDS, tell_skipped
+from tasks.stages.read_worlds import READ_WORLDS, print_skipped
 
 
 @stage_flow
@@ -17,7 +17,7 @@ def collect(settings: RunSettings, data: str) -> None:
     """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""
     keep_settings(data, settings)
     worlds = run_stage(READ_WORLDS, data, settings)
-    tell_skipped(worlds.values())
+    print_skipped(worlds.values())
     run_stage(COLLECT, data, settings)
     run_stage(CURATE, data, settings)
     run_stage(IMPROVE, data, settings)

@@ -215,6 +215,6 @@ def _may_pass(error: Any) -> bool:
         return status >= 500 or status in (408, 429)
     from boto3.exceptions import RetriesExceededError
 
-    known = _errors()
-    lost = (known.HTTPClientError, known.ConnectionError, known.IncompleteReadError, RetriesExceededError)
+    errors = _errors()
+    lost = (errors.HTTPClientError, errors.ConnectionError, errors.IncompleteReadError, RetriesExceededError)
     return isinstance(error, lost)

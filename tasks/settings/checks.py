@@ -1,4 +1,4 @@
-"""Checks of the values that a command is given; each raises a UsageError that names what is possible."""
+"""Check the values of a command's options; each check raises a UsageError that says what is possible."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from tasks.settings.errors import UsageError
 PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
 
 
-def check_known(kind: str, names: Iterable[str], known: Sequence[str] | Mapping[str, Any]) -> None:
-    """Refuse a name that is not known.
+def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mapping[str, Any]) -> None:
+    """Refuse a name that is not among the choices.
 
     Args:
         kind: what the names stand for, such as "planner".
-        names: those that were given.
-        known: those that there are.
+        names: the names that were given.
+        choices: the names that exist.
 
     Raises:
-        UsageError: one of the names is not known.
+        UsageError: one of the names is not among the choices.
 
     """
     for name in names:
-        if name not in known:
-            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(known)}.")
+        if name not in choices:
+            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(choices)}.")
 
 
 def check_count(what: str, count: int) -> None:
@@ -41,6 +41,6 @@ def check_seed(seed: int) -> None:
 
 
 def check_picture(path: Path | None) -> None:
-    """Refuse a path that does not end as a picture does."""
+    """Refuse a path that does not end like a picture."""
     if path is not None and path.suffix not in PICTURES:
-        raise UsageError(f"{path} is no picture's name. Known: {', '.join(PICTURES)}.")
+        raise UsageError(f"{path} is not the name of a picture. Known: {', '.join(PICTURES)}.")

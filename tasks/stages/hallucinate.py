@@ -1,4 +1,4 @@
-"""Hallucinate: for every stored plan many problems that it solves, each with its exact label vector."""
+"""Hallucinate: make many problems that each stored plan solves, with their exact label vectors."""
 
 from __future__ import annotations
 
@@ -37,25 +37,26 @@ CHUNK_PROBLEMS: Final = 5_000  # some seconds of work
 NO_PLAN: Final = "no-plan"
 NO_PLAN_SHARE: Final = 0.05  # problems that no plan solves, for each one that is made for a plan
 DRAWN: Final = "drawn"
-DRAWN_SHARE: Final = 1.0  # problems as the class has them, likewise
+DRAWN_SHARE: Final = 1.0  # problems drawn from the class as it is, likewise
 ORIGIN: Final = "origin"  # a problem that was collected
 
-Made = tuple[Problem, str]  # a hallucinated problem and its method
-Identity = tuple[str, bytes]  # of an experience
+MadeProblem = tuple[Problem, str]  # a problem, and the method that made it
+Identity = tuple[str, bytes]  # of an experience: id of the problem, states and controls of the plan
 
 
 class Hallucinated(NamedTuple):
-    """What came of a range of plans."""
+    """How many problems were made for a range of plans."""
 
     problems: int
-    taken: int  # plans whose problems the champion's run had made
+    copied_plans: int  # plans whose problems were copied from the champion's run
     plans: int
 
 
 def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
-    """Make problems for a range of experiences, problems that no plan solves, and plain draws of the class.
+    """Make problems for a range of experiences, problems that no plan solves, and ordinary ones of the class.
 
-    The plain draws are what a robot meets: labelled like the others, they teach which plans are free there.
+    Ordinary problems are like those that a robot meets. They are labelled like the others, so the encoder
+    learns from them which plans are free there.
     """
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
@@ -63,30 +64,33 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
     sweeps = sweep_plans([experience.plan for experience in experiences], chunk.vehicle)
     mixture = dict(settings.hallucination)
     weights = load_hallucinator(chunk.run.hallucinator(name), chunk.vehicle) if LEARNED in mixture else None
-    own = experiences[chunk.first : chunk.last]
-    taken = problems_of_champion(chunk, {identity_of(experience) for experience in own})
-    made: list[Made] = []
-    for experience in own:
-        theirs = taken.get(identity_of(experience))
-        if theirs is None:
+    chunk_experiences = experiences[chunk.first : chunk.last]
+    copied = problems_of_champion(chunk, {identity_of(experience) for experience in chunk_experiences})
+    problems: list[MadeProblem] = []
+    for experience in chunk_experiences:
+        around_plan = copied.get(identity_of(experience))
+        if around_plan is None:
             rng = generator(settings.seed, "hallucinate", name, experience.problem.id)
-            around = hallucinate(experience, mixture, source.draw, rng, weights)
-            theirs = [(experience.problem, ORIGIN), *islice(around, settings.problems_per_experience - 1)]
-        made += theirs
+            hallucinated = hallucinate(experience, mixture, source.draw, rng, weights)
+            around_plan = [
+                (experience.problem, ORIGIN),
+                *islice(hallucinated, settings.problems_per_experience - 1),
+            ]
+        problems += around_plan
     made_for = np.repeat(np.arange(chunk.first, chunk.last), settings.problems_per_experience)
     share = NO_PLAN_SHARE * settings.problems_per_experience
     first, last = round(share * chunk.first), round(share * chunk.last)
     for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
         unsolved = no_plan(sweeps, source.draw, rng, name, index, experiences[0].problem.bounds)
-        made.append((unsolved, NO_PLAN))
+        problems.append((unsolved, NO_PLAN))
     wanted = round(DRAWN_SHARE * settings.taught * settings.problems_per_experience)
     drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
     first, last = (drawn * i // settings.taught for i in (chunk.first, chunk.last))
-    made += [(source.problem("collect", index), DRAWN) for index in range(first, last)]
-    for_none = np.full(len(made) - len(made_for), -1)
-    write_labelled(chunk, made, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
-    return Hallucinated(len(made), len(taken), len(own))
+    problems += [(source.problem("collect", index), DRAWN) for index in range(first, last)]
+    for_none = np.full(len(problems) - len(made_for), -1)
+    write_labelled(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
+    return Hallucinated(len(problems), len(copied), len(chunk_experiences))
 
 
 def identity_of(experience: Experience) -> Identity:
@@ -94,61 +98,72 @@ def identity_of(experience: Experience) -> Identity:
     return experience.problem.id, experience.plan.states.tobytes() + experience.plan.controls.tobytes()
 
 
-def problems_of_champion(chunk: Chunk, wanted: AbstractSet[Identity]) -> dict[Identity, list[Made]]:
-    """What the run of the champion has made for some experiences, in its order.
+def problems_of_champion(chunk: Chunk, wanted: AbstractSet[Identity]) -> dict[Identity, list[MadeProblem]]:
+    """The problems that the champion's run has made for some experiences, in its order.
 
-    The same would be made again, since it depends on nothing but experience, settings and code. With learned
-    hallucination nothing is taken: its network depends on all experiences.
+    The same problems would be made again, since they depend only on the experience, the settings and the
+    code. With learned hallucination the dict is empty, because the network depends on all experiences.
+
+    Args:
+        chunk: the chunk that needs the problems.
+        wanted: the identities of its experiences.
+
+    Returns:
+        the problems of each experience that the champion's run has too.
+
     """
     champion, name = champion_run_of(chunk), chunk.class_name
     if champion is None or LEARNED in dict(chunk.settings.hallucination):
         return {}
-    ours, theirs = chunk.settings, champion.settings
-    if _inputs(ours, name) != _inputs(theirs, name):
+    settings, old_settings = chunk.settings, champion.settings
+    if _inputs(settings, name) != _inputs(old_settings, name):
         return {}
-    if name not in ours.classes and ours.wanted != theirs.wanted:
-        return {}  # from a map as many problems are cut as are wanted
+    if name not in settings.classes and settings.wanted != old_settings.wanted:
+        return {}  # the problems that are cut from a map depend on their number
     try:
-        identities = [identity_of(each) for each in taught_experiences(champion.folder, theirs, name)]
-        chunks = HALLUCINATE.chunks_of(chunk.data, theirs, name)
-    except StorageError:  # the run is not whole any more
+        old_experiences = taught_experiences(champion.folder, old_settings, name)
+        old_chunks = HALLUCINATE.chunks_of(chunk.data, old_settings, name)
+    except StorageError:  # files of the run are missing
         return {}
-    made: dict[Identity, list[Made]] = {}
-    for each in filter(HALLUCINATE.is_written, chunks):
-        if wanted.isdisjoint(identities[each.first : each.last]):
+    identities = [identity_of(experience) for experience in old_experiences]
+    problems: dict[Identity, list[MadeProblem]] = {}
+    for old_chunk in filter(HALLUCINATE.is_written, old_chunks):
+        if wanted.isdisjoint(identities[old_chunk.first : old_chunk.last]):
             continue
-        shard = each.shard("hallucinated")
+        shard = old_chunk.shard("hallucinated")
         made_for = read_labelled([shard]).plan_index.tolist()
         rows = zip(made_for, read_hallucinated_problems(shard), read_methods(shard), strict=True)
         for plan, problem, method in rows:
             if plan >= 0 and identities[plan] in wanted:
-                made.setdefault(identities[plan], []).append((problem, method))
-    return made
+                problems.setdefault(identities[plan], []).append((problem, method))
+    return problems
 
 
-def write_labelled(chunk: Chunk, made: Sequence[Made], made_for: Integers, sweeps: PlanSweeps) -> None:
+def write_labelled(
+    chunk: Chunk, made_problems: Sequence[MadeProblem], made_for: Integers, sweeps: PlanSweeps
+) -> None:
     """Write problems with their grids and labels as the shard of a chunk.
 
     Args:
         chunk: the chunk.
-        made: the problems, each with its method.
-        made_for: [len(made)] number of the plan that a problem was made for, or -1.
-        sweeps: the plans that the labels tell about.
+        made_problems: the problems, each with its method.
+        made_for: [problems] number of the plan that each problem was made for, or -1.
+        sweeps: the plans that the labels are about.
 
     Raises:
         RuntimeError: a plan does not solve a problem that was made for it.
 
     """
-    problems = [problem for problem, _ in made]
+    problems = [problem for problem, _ in made_problems]
     grids, free = label_problems(problems, sweeps)
-    denied = np.flatnonzero((made_for >= 0) & ~free[np.arange(len(problems)), made_for])
-    if len(denied):
-        raise RuntimeError(f"{problems[denied[0]].id} is not solved by the plan that it was made for")
+    unsolved = np.flatnonzero((made_for >= 0) & ~free[np.arange(len(problems)), made_for])
+    if len(unsolved):
+        raise RuntimeError(f"{problems[unsolved[0]].id} is not solved by the plan that it was made for")
     write_hallucinated(
         chunk.shard("hallucinated"),
         problems,
         plan_index=made_for,
-        methods=[method for _, method in made],
+        methods=[method for _, method in made_problems],
         grids=grids,
         labels=np.packbits(free, axis=1),
         plans=free.shape[1],
@@ -157,9 +172,9 @@ def write_labelled(chunk: Chunk, made: Sequence[Made], made_for: Integers, sweep
 
 
 def _inputs(settings: RunSettings, name: str) -> list[Any]:
-    """What problems around a plan depend on, besides the experience."""
-    made = [settings.seed, settings.problems_per_experience, settings.hallucination]
-    return [*made, *source_key(settings, name)]
+    """What the problems around a plan depend on, besides the experience."""
+    hallucination = [settings.seed, settings.problems_per_experience, settings.hallucination]
+    return [*hallucination, *source_key(settings, name)]
 
 
 def plans_at_once(settings: RunSettings) -> int:
@@ -181,9 +196,10 @@ HALLUCINATE: Final = Stage(
 )
 
 
-def tell_taken(results: Iterable[Hallucinated]) -> None:
-    """Say for how many plans the champion's run already had problems, if it had any."""
+def print_copied(results: Iterable[Hallucinated]) -> None:
+    """Print for how many plans problems were copied from the champion's run, if there are any."""
     results = list(results)
-    taken, plans = (sum(each[i] for each in results) for i in (1, 2))
-    if taken:
-        print(f"hallucinated anew for {plans - taken} of {plans} plans; the champion's run had the others'")
+    copied = sum(result.copied_plans for result in results)
+    plans = sum(result.plans for result in results)
+    if copied:
+        print(f"hallucinated anew for {plans - copied} of {plans} plans; the champion's run had the others'")

@@ -58,7 +58,7 @@ READ_WORLDS: Final = Stage(
 )
 
 
-def tell_skipped(results: Iterable[WorldsRead]) -> None:
+def print_skipped(results: Iterable[WorldsRead]) -> None:
     """List on the error stream the worlds that were left out, each with the reason."""
     skipped = [line for result in results for line in result.skipped]
     if skipped:

@@ -1,4 +1,4 @@
-"""Relabel: the hallucinated problems of each class, labelled for the plans of all classes together."""
+"""Relabel: label the hallucinated problems of each class for the plans of all classes together."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tasks.stages.keep_experiences import experiences_key
 
 
 def relabel_chunk(chunk: Chunk) -> None:
-    """Label one shard of one class for the plans of all classes: a shard of the combined memory."""
+    """Label a shard of one class for the plans of all classes, as a shard of the combined memory."""
     settings = chunk.settings
     origin = HALLUCINATE.chunks(chunk.data, settings)[chunk.index]
     shard = origin.shard("hallucinated")
@@ -25,9 +25,9 @@ def relabel_chunk(chunk: Chunk) -> None:
     made_for = read_labelled([shard]).plan_index
     experiences = taught_experiences(chunk.run, settings, COMBINED)
     sweeps = sweep_plans([experience.plan for experience in experiences], chunk.vehicle)
-    made = list(zip(read_hallucinated_problems(shard), read_methods(shard), strict=True))
+    problems = list(zip(read_hallucinated_problems(shard), read_methods(shard), strict=True))
     offsets = np.where(made_for >= 0, np.int32(offset), np.int32(0))
-    write_labelled(chunk, made, made_for + offsets, sweeps)
+    write_labelled(chunk, problems, made_for + offsets, sweeps)
 
 
 def _cut(data: str, settings: RunSettings, _: str) -> Cut:

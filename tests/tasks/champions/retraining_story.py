@@ -73,7 +73,7 @@ class Story:
 
         def again() -> tuple[int, list[bytes]]:
             results = run_stage(HALLUCINATE, self.data, third).values()
-            return sum(result.taken for result in results), [
+            return sum(result.copied_plans for result in results), [
                 path.read_bytes() for path in run.shards("hallucinated", CLASS)
             ]
 
