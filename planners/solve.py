@@ -147,7 +147,7 @@ def solve(
     if memory is not None:
         if memory.vehicle != vehicle:
             raise ValueError(
-                f"memory of {memory.class_name} was built for vehicle {name_of(memory.vehicle)}, asked was "
+                f"memory of {memory.class_name} was built for vehicle {name_of(memory.vehicle)}, expected "
                 f"{name_of(vehicle)}: build one for {name_of(vehicle)}"
             )
         fault = scale_fault(memory, problem.scale)

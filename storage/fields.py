@@ -69,8 +69,8 @@ def scale_of(value: object) -> float:
     scale = 1.0 if value is None else number_of(value, "scale")
     if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
         raise ValueError(
-            f"scale is {scale:g}; wanted are metres a canonical metre, "
-            f"from {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}"
+            f"scale is {scale:g}; expected {SMALLEST_SCALE:g} to {LARGEST_SCALE:g} metres for each canonical "
+            "metre"
         )
     return scale
 

@@ -28,6 +28,6 @@ def other_vehicle(where: object, made_for: str, wanted: Vehicle) -> StorageError
     """The error that ``where`` was ``made_for`` the vehicle of that name, but ``wanted`` for another."""
     advice = f"ask for --vehicle {made_for}" if made_for in VEHICLES else "this program knows no such vehicle"
     return StorageError(
-        f"{where} was made for vehicle {made_for}, wanted was {name_of(wanted)}; {advice}, or make one for "
-        "the vehicle wanted."
+        f"{where} was made for vehicle {made_for}, expected {name_of(wanted)}; {advice}, or make one for "
+        "the expected vehicle."
     )

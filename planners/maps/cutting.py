@@ -78,7 +78,7 @@ def cut_problems(
         if failures == MOST_FAILURES:
             break
     raise ValueError(
-        f"has room for {len(cuts)} {part} problems, wanted were {count}; ask for fewer, give a larger "
+        f"has room for {len(cuts)} {part} problems, expected {count}; ask for fewer, give a larger "
         "map, or another scale"
     )
 

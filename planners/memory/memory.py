@@ -79,6 +79,6 @@ def scale_fault(memory: Memory, scale: float) -> str | None:
         return None
     scales = " and ".join(f"{each:g}" for each in memory.scales)
     return (
-        f"memory of {memory.class_name} was made of problems of scale {scales}, asked was {scale:g}: make "
+        f"memory of {memory.class_name} was made of problems of scale {scales}, expected {scale:g}: make "
         "one of that scale"
     )

@@ -190,7 +190,7 @@ def _check(guess: Plan, settings: OptimiseSettings, vehicle: Vehicle) -> None:
     states, controls = guess.states, guess.controls
     if states.ndim != 2 or states.shape[1] != size or controls.shape != (len(states) - 1, 2):
         raise ValueError(
-            f"Guess has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
+            f"Guess has states {list(states.shape)} and controls {list(controls.shape)}; expected "
             f"[T, {size}] ({', '.join(state_names(vehicle))}) and [T - 1, 2]. Was it made for another robot?"
         )
     if len(controls) < 1 or not (np.isfinite(states).all() and np.isfinite(controls).all()):

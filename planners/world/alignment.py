@@ -42,7 +42,7 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
     distance = math.dist((x, y), goal)
     if not abs(distance - CANONICAL_DISTANCE) <= problem.goal_radius:
         raise ValueError(
-            f"Problem {problem.id}: start and goal are {distance:.2f} m apart, wanted"
+            f"Problem {problem.id}: start and goal are {distance:.2f} m apart, expected"
             f" {CANONICAL_DISTANCE:.2f} m within the goal radius {problem.goal_radius:g} m;"
             " cut longer ways into a chain of local goals."
         )

@@ -32,17 +32,15 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
         )
     x_min, y_min, x_max, y_max = problem.bounds
     if not (x_min < x_max and y_min < y_max):
-        return (
-            f"bounds {list(problem.bounds)} are inverted; wanted was [x_min, y_min, x_max, y_max] in metres"
-        )
+        return f"bounds {list(problem.bounds)} are inverted; expected [x_min, y_min, x_max, y_max] in metres"
     if max(x_max - x_min, y_max - y_min) > WIDEST_BOUNDS_M:
         return f"bounds {list(problem.bounds)} are wider than {WIDEST_BOUNDS_M:.0f} m; are they in metres?"
     if problem.goal_radius <= 0.0:
-        return f"goal_radius is {problem.goal_radius}; wanted was a length above 0 m"
+        return f"goal_radius is {problem.goal_radius}; expected a length above 0 m"
     distance = math.dist(problem.start[:2], problem.goal)
     if abs(distance - CANONICAL_DISTANCE) > problem.goal_radius:
         return (
-            f"start and goal are {distance:.2f} m apart, wanted was {CANONICAL_DISTANCE:.2f} m within the "
+            f"start and goal are {distance:.2f} m apart, expected {CANONICAL_DISTANCE:.2f} m within the "
             f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
         )
     if _entries(problem) > MOST_LISTED:

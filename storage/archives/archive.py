@@ -74,7 +74,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
     refuse_another(folder, header.get("vehicle"), vehicle)
     if header.get("grid") != GRID:
         raise StorageError(
-            f"{folder} was made for grids of {header.get('grid')!r} cells a side, wanted was {GRID}; "
+            f"{folder} was made for grids of {header.get('grid')!r} cells a side, expected {GRID}; "
             "build it again."
         )
     listed: dict[str, Any] = header["files"]

@@ -61,7 +61,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
 def _settings(described: object) -> TrainingSettings:
     """The settings that a header describes. Raises ValueError or TypeError if no training had such."""
     if not isinstance(described, dict):
-        raise ValueError(f"its settings are {short(described)}, wanted was an object")
+        raise ValueError(f"its settings are {short(described)}, expected an object")
     sizes = described["architecture"]
     others = {name: value for name, value in described.items() if name != "architecture"}
     for name, usual in asdict(TrainingSettings()).items():

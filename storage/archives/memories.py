@@ -147,16 +147,16 @@ def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) ->
 
 def _objective(value: object) -> str:
     if value not in OBJECTIVES:
-        raise ValueError(f"its objective is {short(value)}, wanted is one of {', '.join(OBJECTIVES)}")
+        raise ValueError(f"its objective is {short(value)}, expected one of {', '.join(OBJECTIVES)}")
     return str(value)
 
 
 def _metadata(value: object) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"its metadata are {short(value)}, wanted was an object")
+        raise ValueError(f"its metadata are {short(value)}, expected an object")
     scales = value.get("scales", [1.0])
     if not isinstance(scales, list) or not scales or len({scale_of(scale) for scale in scales}) < len(scales):
-        raise ValueError(f"its scales are {short(scales)}, wanted were distinct numbers")
+        raise ValueError(f"its scales are {short(scales)}, expected distinct numbers")
     return value
 
 

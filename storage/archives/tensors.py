@@ -40,7 +40,7 @@ def check_floats(tensors: Mapping[str, Array], shapes: Shapes) -> None:
         tensor = tensors[name]
         if tensor.dtype != np.float32 or tensor.shape != shape or np.isnan(tensor).any():
             raise ValueError(
-                f"{name} is {tensor.dtype} {list(tensor.shape)}, wanted were float32 numbers {list(shape)}"
+                f"{name} is {tensor.dtype} {list(tensor.shape)}, expected float32 numbers {list(shape)}"
             )
 
 

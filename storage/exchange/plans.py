@@ -76,7 +76,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
     fields = read_json(path)
     try:
         if not isinstance(fields, dict):
-            raise ValueError(f"holds {short(fields)}, wanted was the object of a plan")
+            raise ValueError(f"holds {short(fields)}, expected the object of a plan")
         check_fields(list(fields), FIELDS)
         made_for = text_of(fields.get("vehicle", name_of(CAR)), "vehicle")  # files were once of the car alone
         if made_for != name_of(vehicle):
@@ -96,7 +96,7 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
         names = state_names(vehicle)
         if (states.shape, controls.shape) != ((len(states), len(names)), (len(states) - 1, 2)):
             raise ValueError(
-                f"has states {list(states.shape)} and controls {list(controls.shape)}; wanted were "
+                f"has states {list(states.shape)} and controls {list(controls.shape)}; expected "
                 f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2]. was it recorded for another vehicle"
             )
         if number_of(fields["dt"], "dt") != vehicle.dt:

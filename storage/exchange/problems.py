@@ -103,11 +103,11 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     ``default_id``: its id if it has none. Raises ValueError, which says what is wrong with it.
     """
     if not isinstance(fields, Mapping):
-        raise ValueError(f"is {type(fields).__name__}, wanted was an object with {', '.join(_REQUIRED)}")
+        raise ValueError(f"is {type(fields).__name__}, expected an object with {', '.join(_REQUIRED)}")
     check_fields(list(fields), FIELDS)
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
-        raise ValueError(f"field {missing[0]} is missing; wanted are {', '.join(_REQUIRED)}")
+        raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")
     start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
     bounds = _numbers(fields, "bounds", 4)
     scale = scale_of(fields.get("scale"))

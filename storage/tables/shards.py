@@ -55,7 +55,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
     name = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
     if name != wanted:
         raise StorageError(
-            f"{path} holds table {name}, wanted was {wanted}; is it the right file, written by this version?"
+            f"{path} holds table {name}, expected {wanted}; is it the right file, written by this version?"
         )
     with sound(path):
         table = pq.read_table(
@@ -67,7 +67,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
         for field in table.schema:
             if field.name in schema.names and field.type != schema.field(field.name).type:
                 raise ValueError(
-                    f"column {field.name} holds {field.type}, wanted was {schema.field(field.name).type}"
+                    f"column {field.name} holds {field.type}, expected {schema.field(field.name).type}"
                 )
         return table
 

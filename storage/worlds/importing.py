@@ -73,7 +73,7 @@ def import_part(
     Raises StorageError if nothing can be read, or if a world is unfit and the settings are strict.
     """
     if part not in PARTS:
-        raise StorageError(f"{part!r} is not a part of worlds; wanted is one of {', '.join(PARTS)}.")
+        raise StorageError(f"{part!r} is not a part of worlds; expected one of {', '.join(PARTS)}.")
     settings = settings or ImportSettings()
     if source.is_map:
         return _of_map(source, part, settings, progress)

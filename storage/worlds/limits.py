@@ -28,7 +28,7 @@ def whole_number(word: str) -> int | None:
 def check_size(rows: int, columns: int) -> None:
     """Raise ValueError, the end of a sentence, if ``rows`` by ``columns`` cells are none or too many."""
     if rows < 1 or columns < 1:
-        raise ValueError(f"has {rows} x {columns} cells; wanted is at least one")
+        raise ValueError(f"has {rows} x {columns} cells; expected at least one")
     if rows * columns > MOST_CELLS:
         raise ValueError(
             f"has {rows} x {columns} cells, more than {MOST_CELLS:,}; cut it up or make its cells larger"
@@ -39,5 +39,5 @@ def check_resolution(metres: float) -> None:
     """Raise ValueError, the end of a sentence, if no map could have cells of so many ``metres``."""
     if not (math.isfinite(metres) and SMALLEST_CELL_M <= metres <= LARGEST_CELL_M):
         raise ValueError(
-            f"has resolution {metres:g}; wanted are metres a cell, {SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g}"
+            f"has resolution {metres:g}; expected {SMALLEST_CELL_M:g} to {LARGEST_CELL_M:g} m for each cell"
         )

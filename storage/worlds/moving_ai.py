@@ -101,7 +101,7 @@ def _rows(file: Path) -> list[list[str]]:
     rows = [line.split() for line in lines[1:] if line.strip()]
     for number, words in enumerate(rows, start=1):
         if len(words) != len(_SCENARIO):
-            raise ValueError(f"scenario {number} has {len(words)} words, wanted are {' '.join(_SCENARIO)}")
+            raise ValueError(f"scenario {number} has {len(words)} words, expected {' '.join(_SCENARIO)}")
     return rows
 
 

@@ -37,7 +37,7 @@ def read_grid(
     shapes = list(_shapes(file))
     if len(shapes) != 1 or len(shapes[0][1]) != 2:
         arrays = ", ".join(str(list(shape)) for _, shape in shapes[:5]) or "nothing"
-        raise ValueError(f"holds {arrays}; wanted was one array [rows, columns]")
+        raise ValueError(f"holds {arrays}; expected one array [rows, columns]")
     check_size(*shapes[0][1])
     cells = _occupied(_arrays(file)[0][1], unknown_is_occupied)
     return OccupancyMap(name, cells[::-1], metres)
@@ -54,7 +54,7 @@ def grid_worlds(
     shapes = list(_shapes(file))
     for name, shape in shapes:
         if shape[-2:] != (PIXELS, PIXELS) or len(shape) not in (2, 3):
-            raise ValueError(f"holds {name} {list(shape)}; wanted were worlds [n, {PIXELS}, {PIXELS}]")
+            raise ValueError(f"holds {name} {list(shape)}; expected worlds [n, {PIXELS}, {PIXELS}]")
     if sum(int(np.prod(shape)) for _, shape in shapes) > MOST_NUMBERS:
         raise ValueError(f"holds more than {MOST_NUMBERS:,} numbers; cut it into several files")
     number = 0
@@ -72,9 +72,7 @@ def _occupied(cells: Array, unknown_is_occupied: bool) -> Cells:
     occupied: Cells = cells == 1
     other = ~(unknown | occupied | (cells == 0))
     if other.any():
-        raise ValueError(
-            f"holds {cells[other][0]}; wanted are 0 (free), 1 (occupied) and -1 or NaN (unknown)"
-        )
+        raise ValueError(f"holds {cells[other][0]}; expected 0 (free), 1 (occupied) and -1 or NaN (unknown)")
     return occupied | unknown if unknown_is_occupied else occupied
 
 
@@ -102,7 +100,7 @@ def _shape(stream: IO[bytes]) -> tuple[int, ...]:
     else:
         shape, _, kind = np.lib.format.read_array_header_2_0(stream)
     if kind.kind not in "buif":
-        raise ValueError(f"it holds {kind}, wanted were numbers or bool")
+        raise ValueError(f"it holds {kind}, expected numbers or bool")
     return tuple(shape)
 
 

@@ -51,9 +51,9 @@ def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | N
 def _check_shape(picture: Image.Image, wanted: tuple[int, int] | None) -> None:
     columns, rows = picture.size
     if wanted is not None and picture.size != wanted:
-        raise _WrongPictureError(f"has {columns} x {rows} pixels, wanted were {wanted[0]} x {wanted[1]}")
+        raise _WrongPictureError(f"has {columns} x {rows} pixels, expected {wanted[0]} x {wanted[1]}")
     if picture.mode not in _MODES:
-        raise _WrongPictureError(f"is of kind {picture.mode}, wanted was grey, RGB or RGBA of 8 bits")
+        raise _WrongPictureError(f"is of kind {picture.mode}, expected grey, RGB or RGBA of 8 bits")
     try:
         check_size(rows, columns)
     except ValueError as error:

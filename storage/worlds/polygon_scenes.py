@@ -46,7 +46,7 @@ def _whole(words: Iterator[str], what: str) -> int:
     word = next(words, "")
     number = whole_number(word)
     if number is None:
-        raise ValueError(f"has {word[:20]!r} where {what} was wanted; is it cut off?")
+        raise ValueError(f"has {word[:20]!r} where {what} was expected; is it cut off?")
     return number
 
 
@@ -56,5 +56,5 @@ def _number(words: Iterator[str], polygon: int) -> float:
         return float(word)
     except ValueError:
         raise ValueError(
-            f"has {word[:20]!r} where a coordinate of polygon {polygon} was wanted; is it cut off?"
+            f"has {word[:20]!r} where a coordinate of polygon {polygon} was expected; is it cut off?"
         ) from None

@@ -41,7 +41,7 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
         raise ValueError("has no origin [x, y, yaw] in metres and radians")
     x, y, yaw = (_number(value, "origin") for value in origin)
     if not all(math.isfinite(value) and abs(value) <= FARTHEST_ORIGIN_M for value in (x, y, yaw)):
-        raise ValueError("has an origin that is not finite or not on earth; wanted is [x, y, yaw]")
+        raise ValueError("has an origin that is not finite or not on earth; expected [x, y, yaw]")
     picture = read_picture(_picture_file(file, fields["image"]), ("PNG", "PPM"))
     occupied, free = _judged(picture, fields)
     return OccupancyMap(name, (occupied if not unknown_is_occupied else ~free)[::-1], resolution, (x, y, yaw))
@@ -92,10 +92,10 @@ def _fields(file: Path) -> Mapping[str, Any]:
         reason = str(error).partition("\n")[0][:100]
         raise ValueError(f"is not YAML ({reason})") from None
     if not isinstance(fields, Mapping):
-        raise ValueError(f"is not the YAML of a map; wanted are {', '.join(_REQUIRED)}")
+        raise ValueError(f"is not the YAML of a map; expected {', '.join(_REQUIRED)}")
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
-        raise ValueError(f"lacks {missing[0]}; wanted are {', '.join(_REQUIRED)}")
+        raise ValueError(f"lacks {missing[0]}; expected {', '.join(_REQUIRED)}")
     return fields
 
 
@@ -118,7 +118,7 @@ def _picture_file(file: Path, image: object) -> Path:
 def _share(value: object, what: str) -> float:
     share = _number(value, what)
     if not 0.0 <= share <= 1.0:
-        raise ValueError(f"has {what} {share:g}; wanted is a share from 0 to 1")
+        raise ValueError(f"has {what} {share:g}; expected a share from 0 to 1")
     return share
 
 
@@ -129,4 +129,4 @@ def _number(value: object, what: str) -> float:
             raise ValueError
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"has {str(value)[:20]!r} as its {what}, wanted was a number") from None
+        raise ValueError(f"has {str(value)[:20]!r} as its {what}, expected a number") from None

@@ -107,9 +107,7 @@ class Scoring:
         try:
             content = parse_json(body, "The body")
             if not isinstance(content, dict):
-                raise ValueError(
-                    f"is {short(content)}, wanted was an object with one of {', '.join(FORMATS)}"
-                )
+                raise ValueError(f"is {short(content)}, expected an object with one of {', '.join(FORMATS)}")
             check_fields(list(content), (*FORMATS, "params"))
         except StorageError as error:
             raise RefusedError(400, str(error)) from None
@@ -141,7 +139,7 @@ def _top_k(params: Any) -> int:
     if params is None:
         return TOP_K
     if not isinstance(params, dict) or params.keys() - {"top_k"}:
-        raise RefusedError(400, f'params is {params!r}; wanted was {{"top_k": a number}}, or nothing.')
+        raise RefusedError(400, f'params is {params!r}; expected {{"top_k": a number}}, or nothing.')
     top_k = params.get("top_k", TOP_K)
     if type(top_k) is not int or not 1 <= top_k <= MOST_PLANS:
         raise RefusedError(400, f"top_k is {top_k!r}; give a number from 1 to {MOST_PLANS}.")

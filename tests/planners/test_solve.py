@@ -38,7 +38,7 @@ def memory():
 
 
 def test_a_memory_of_one_vehicle_is_not_used_for_another(memory):
-    with pytest.raises(ValueError, match="built for vehicle car, asked was car-1-trailer"):
+    with pytest.raises(ValueError, match="built for vehicle car, expected car-1-trailer"):
         solve(problem_of([]), "gust", "closed", 1, memory, vehicle=CAR_1_TRAILER)
 
 

@@ -86,7 +86,7 @@ class Learner:
         """
         if any(kept.shape != self._best.shape for kept in state):
             raise ValueError(
-                f"checkpoint has {[len(kept) for kept in state]} parameters, wanted were {len(self._best)}: "
+                f"checkpoint has {[len(kept) for kept in state]} parameters, expected {len(self._best)}: "
                 "was it made with the same settings?"
             )
         with torch.no_grad():

@@ -139,7 +139,7 @@ def train(
         )
     if warm is not None and architecture_of(warm) != settings.architecture:
         raise ValueError(
-            f"weights to begin with are of {architecture_of(warm)}, wanted was {settings.architecture}: "
+            f"weights to begin with are of {architecture_of(warm)}, expected {settings.architecture}: "
             "begin anew, or with the same sizes"
         )
     parts = split(plan_index, labels, settings.validation_share, settings.held_out_share)

@@ -59,7 +59,7 @@ def joined_triangles(shape: shapely.Polygon) -> list[Floats]:
 def _corners(polygon: Floats) -> Floats:
     """Round a polygon to float32 and leave out repeated points."""
     if len(polygon) < 3:
-        raise PolygonError(f"has {len(polygon)} points, wanted were at least 3; complete or remove it")
+        raise PolygonError(f"has {len(polygon)} points, expected at least 3; complete or remove it")
     farthest = float(np.abs(polygon).max())
     if not math.isfinite(farthest):
         raise PolygonError("has a coordinate that is not a finite number; correct it")

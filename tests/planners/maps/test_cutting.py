@@ -85,7 +85,7 @@ def test_a_wall_without_a_gap_joins_no_start_and_goal() -> None:
     occupied = np.zeros((128, 400), bool)
     occupied[:, ::40] = True
     world = OccupancyMap("cells", occupied, 1.0)
-    with pytest.raises(ValueError, match="has room for 0 train problems, wanted were 1"):
+    with pytest.raises(ValueError, match="has room for 0 train problems, expected 1"):
         cut_problems(world, surroundings_of(world), "train", 1, 1)
 
 

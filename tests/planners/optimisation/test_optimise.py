@@ -136,7 +136,7 @@ def test_a_blocked_start_and_a_start_in_the_goal_need_no_iterations() -> None:
 @pytest.mark.parametrize(
     ("guess", "says"),
     [
-        (Plan(np.zeros((3, 4)), np.zeros((2, 2))), r"wanted were \[T, 5\] \(x, y, heading"),
+        (Plan(np.zeros((3, 4)), np.zeros((2, 2))), r"expected \[T, 5\] \(x, y, heading"),
         (Plan(np.zeros((3, 5)), np.zeros((3, 2))), r"controls \[3, 2\]"),
         (Plan(np.zeros((1, 5)), np.zeros((0, 2))), "at least one step"),
         (Plan(np.full((2, 5), np.nan), np.zeros((1, 2))), "finite numbers"),

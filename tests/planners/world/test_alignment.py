@@ -99,7 +99,7 @@ def test_a_canonical_problem_stays_as_it_is() -> None:
 
 def test_a_wrong_distance_is_refused_in_one_line() -> None:
     problem = replace(problem_class("curves").draw(0, 0), goal=(60.0, 60.0))
-    with pytest.raises(ValueError, match=r"84\.85 m apart, wanted 70\.71 m") as refusal:
+    with pytest.raises(ValueError, match=r"84\.85 m apart, expected 70\.71 m") as refusal:
         to_canonical(problem)
     assert "\n" not in str(refusal.value)
 

@@ -69,7 +69,7 @@ def test_a_plan_is_only_read_for_its_vehicle(tmp_path: Path, name: str) -> None:
     assert same_plan(read.plan, plan(20, 3, vehicle))
     for other in VEHICLES:
         if other != name:
-            with pytest.raises(StorageError, match=f"for vehicle {name}, wanted was {other}; ask for"):
+            with pytest.raises(StorageError, match=f"for vehicle {name}, expected {other}; ask for"):
                 read_plan(path, VEHICLES[other])
 
 
@@ -81,7 +81,7 @@ def test_a_plan_that_names_no_vehicle_is_the_cars(tmp_path: Path) -> None:
     del found["vehicle"]
     path.write_text(json.dumps(found))
     assert read_plan(path).vehicle == CAR
-    with pytest.raises(StorageError, match="for vehicle car, wanted was car-1-trailer"):
+    with pytest.raises(StorageError, match="for vehicle car, expected car-1-trailer"):
         read_plan(path, CAR_1_TRAILER)
 
 

@@ -150,8 +150,8 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"start": [0, 0, 1e300]}, "farther"),
         ({"goal": [80, 50]}, "94.34 m apart"),
         ({"scale": 2.0}, "divided by scale 2: start and goal are 35.36 m apart"),
-        ({"scale": 0}, "scale is 0; wanted"),
-        ({"scale": math.nan}, "scale is nan; wanted"),
+        ({"scale": 0}, "scale is 0; expected"),
+        ({"scale": math.nan}, "scale is nan; expected"),
         ({"scale": "large"}, "scale must hold numbers"),
         ({"goal_radius": 0}, "goal_radius is 0"),
         ({"goal_radius": -1.0}, "goal_radius is -1"),
@@ -200,7 +200,7 @@ def test_a_bad_problem_is_one_line_with_file_place_and_id(
 @pytest.mark.parametrize("value", ["[]", "3", "null", '"w"', "[[1, 2]]"])
 def test_what_is_no_object_is_no_problem(tmp_path: Path, value: str) -> None:
     (tmp_path / "p.json").write_text(value)
-    with pytest.raises(StorageError, match="wanted was an object"):
+    with pytest.raises(StorageError, match="expected an object"):
         read_problems(tmp_path / "p.json")
 
 

@@ -93,7 +93,7 @@ def test_nothing_learned_and_another_vehicle_are_told_in_a_line(tmp_path: Path) 
     with pytest.raises(StorageError, match="nothing that was learned; solve problems with --learn first"):
         take_snapshot(tmp_path, "now", CAR)
     add(tmp_path, [experience(1)])
-    with pytest.raises(StorageError, match="was made for vehicle car, wanted was car-1-trailer"):
+    with pytest.raises(StorageError, match="was made for vehicle car, expected car-1-trailer"):
         take_snapshot(tmp_path, "now", CAR_1_TRAILER)
 
 

@@ -99,7 +99,7 @@ def test_a_folder_or_a_table_of_another_kind_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "t.parquet"
     write_table(path, table(3))
     other = SCHEMA.with_metadata({"schema": "numbers/2"})
-    with pytest.raises(StorageError, match=r"holds table numbers/1, wanted was numbers/2"):
+    with pytest.raises(StorageError, match=r"holds table numbers/1, expected numbers/2"):
         read_table(path, other)
     pq.write_table(pa.table({"n": [1]}), path)
     with pytest.raises(StorageError, match="holds table an unknown one"):

@@ -74,7 +74,7 @@ def test_states_are_as_wide_as_the_vehicle_needs(tmp_path: Path, vehicle: Vehicl
 @pytest.mark.parametrize("wanted", [*OTHERS, CAR._replace(width=1.2)])
 def test_experiences_of_another_vehicle_are_refused_by_name(tmp_path: Path, wanted: Vehicle) -> None:
     store(tmp_path / "e.parquet", [Experience(problem_with(), plan(3))])
-    with pytest.raises(StorageError, match="was made for vehicle car, wanted was ") as error:
+    with pytest.raises(StorageError, match="was made for vehicle car, expected ") as error:
         read_experiences(tmp_path / "e.parquet", wanted)
     assert name_of(wanted) in str(error.value)
     assert "--vehicle car" in str(error.value)

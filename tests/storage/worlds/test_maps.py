@@ -174,7 +174,7 @@ def _link(folder: Path) -> None:
         ({"resolution": 0}, None, "has resolution 0"),
         ({"resolution": 1e9}, None, "has resolution 1e+09"),
         ({"resolution": "wide"}, None, "has 'wide' as its resolution"),
-        ({"resolution": True}, None, "as its resolution, wanted was a number"),
+        ({"resolution": True}, None, "as its resolution, expected a number"),
         ({"resolution": None}, None, "lacks resolution"),
         ({"origin": [math.nan, 0, 0]}, None, "origin that is not finite"),
         ({"origin": [0, 0, math.inf]}, None, "origin that is not finite"),
@@ -241,7 +241,7 @@ def test_what_is_no_yaml_of_a_map_is_told_in_one_line(tmp_path: Path, text: str,
         ("type octile\nheight -2\nwidth 2\nmap\n..\n..\n", "no whole number as its height"),
         ("type octile\nheight 99999999999\nwidth 2\nmap\n..\n", "no whole number as its height"),
         ("type octile\nheight 999999\nwidth 999999\nmap\n..\n", "more than 25,000,000"),
-        ("type octile\nheight 0\nwidth 0\nmap\n", "wanted is at least one"),
+        ("type octile\nheight 0\nwidth 0\nmap\n", "expected at least one"),
     ],
 )
 def test_a_bad_moving_ai_map_is_told_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
@@ -273,9 +273,9 @@ def test_bad_numpy_files_are_told_in_one_line(tmp_path: Path) -> None:
     file = tmp_path / "a.npy"
     for values, reason in [
         (np.array([[{}]], object), "holds object"),
-        (np.zeros((3, 4), "M8[s]"), "wanted were numbers or bool"),
-        (np.zeros(3), "wanted was one array"),
-        (np.zeros((0, 3)), "wanted is at least one"),
+        (np.zeros((3, 4), "M8[s]"), "expected numbers or bool"),
+        (np.zeros(3), "expected one array"),
+        (np.zeros((0, 3)), "expected at least one"),
         (np.array([[0.3]]), "holds 0.3"),
         (np.array([[7]]), "holds 7"),
         (np.array([[np.inf]]), "holds inf"),
@@ -290,7 +290,7 @@ def test_bad_numpy_files_are_told_in_one_line(tmp_path: Path) -> None:
         file.write_bytes(damaged)
         assert "no whole NumPy file" in told(file) or "more than" in told(file)
     np.savez(tmp_path / "b.npz", one=CELLS, two=CELLS)
-    assert "wanted was one array" in told(tmp_path / "b.npz")
+    assert "expected one array" in told(tmp_path / "b.npz")
     np.savez(tmp_path / "b.npz", one=np.broadcast_to(np.int8(0), (5_001, 5_000)))
     assert "more than 25,000,000" in told(tmp_path / "b.npz")
     with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:

@@ -138,7 +138,7 @@ def test_bad_pictures_are_skipped_each_with_its_reason(mixed: Path) -> None:
     assert sorted(reasons, key=int) == ["3", "4", "5", "6", "7", "8", "9", "11", "12", "13"]
     assert "start footprint" in reasons["3"]
     assert "goal centre" in reasons["4"]
-    assert "201 x 200 pixels, wanted were 201 x 201" in reasons["5"]
+    assert "201 x 200 pixels, expected 201 x 201" in reasons["5"]
     assert "of kind I;16" in reasons["12"]
     assert "a file" in reasons["11"]
     assert all("no whole PNG" in reasons[name] for name in ("6", "7", "8", "9", "13"))

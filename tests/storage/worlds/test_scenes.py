@@ -42,10 +42,10 @@ def test_scenes_of_polygons_are_covered_exactly(
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "has '' where the number of polygons was wanted"),
-        ("x", "has 'x' where the number of polygons was wanted"),
+        ("", "has '' where the number of polygons was expected"),
+        ("x", "has 'x' where the number of polygons was expected"),
         ("-1", "has '-1' where"),
-        ("1\n3\n1 1 2 1 2", "has '' where a coordinate of polygon 1 was wanted"),
+        ("1\n3\n1 1 2 1 2", "has '' where a coordinate of polygon 1 was expected"),
         ("1\n9999999\n1 1", "where a coordinate of polygon 1"),
         ("1\n3\n1 1 2 1 2 nan", "polygon 1 has a coordinate that is not a finite number"),
         ("1\n2\n1 1 2 1", "polygon 1 has 2 points"),
@@ -74,7 +74,7 @@ def test_stacks_of_cells_are_worlds_like_pictures(tmp_path: Path) -> None:
     assert "goal centre" in reason
     np.save(tmp_path / "woods.npy", stack[:, 1:])
     ((_, reason),) = imported(tmp_path / "woods.npy").skipped
-    assert "wanted were worlds [n, 201, 201]" in reason
+    assert "expected worlds [n, 201, 201]" in reason
 
 
 def test_problem_files_keep_their_problems_and_list_the_bad_ones(tmp_path: Path) -> None:

@@ -119,8 +119,8 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide, at scale 1"),
         (["--from", "8,6,0", "--to", "150,190", "--assist", "open"], 2, "needs --memory"),
         (["--from", "8,6,0", "--to", "150,190", "--picture", "r.txt"], 2, "r.txt is not the name of a"),
-        (["--from", "8,6,0", "--to", "150,190", "--memory", "small"], 1, "of scale 0.5, asked was 1"),
-        (["--from", "8,6,0", "--to", "9,60", "--scale", "0.5", "--memory", "unsaid"], 1, "of scale 1, asked"),
+        (["--from", "8,6,0", "--to", "150,190", "--memory", "small"], 1, "of scale 0.5, expected 1"),
+        (["--from", "8,6,0", "--to", "9,60", "--scale", "0.5", "--memory", "unsaid"], 1, "of scale 1, exp"),
         (["--from", "8,6,0", "--to", "150,190", "--memory", "small", "--vehicle", "differential-drive"], 1,
          "differential-drive"),
     ],
@@ -141,7 +141,7 @@ def test_a_memory_is_refused_for_a_problem_of_another_scale(
     write_problems(tmp_path / "p.json", [problem_with()])
     asked = ["plan", str(tmp_path / "p.json"), "--assist", "closed", "--memory", str(town / "small")]
     assert call(asked) == 1
-    assert "was made of problems of scale 0.5, asked was 1" in capsys.readouterr().err
+    assert "was made of problems of scale 0.5, expected 1" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")

@@ -105,7 +105,7 @@ def test_threads_do_not_disturb_each_other(planner: RobotPlanner) -> None:
 def test_it_is_refused_what_it_is_not_for(memory: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="Unknown planner 'prm'"):
         load_planner(memory, planner="prm")
-    with pytest.raises(StorageError, match="made for vehicle car, wanted was car-1-trailer"):
+    with pytest.raises(StorageError, match="made for vehicle car, expected car-1-trailer"):
         load_planner(memory, vehicle="car-1-trailer")
     with pytest.raises(StorageError, match="holds no memory"):
         load_planner(tmp_path)

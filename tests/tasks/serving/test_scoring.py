@@ -97,7 +97,7 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
     [
         (b"", 400, "The body is not valid JSON"),
         (b"{", 400, "The body is not valid JSON"),
-        (b"[]", 400, "wanted was an object with one of dataframe_split"),
+        (b"[]", 400, "expected an object with one of dataframe_split"),
         (b"{}", 400, "got none of them"),
         (b'{"inputs": ["a"], "instances": ["b"]}', 400, "got instances, inputs"),
         (b'{"dataframe_records": [{"question": "x"}]}', 400, "unknown field 'question'"),
@@ -123,7 +123,7 @@ def test_each_form_of_the_protocol_gets_the_same_answer(client: Client, envelope
         (b'{"dataframe_records": [{"problem": 7}]}', 400, "roblem"),
         (b'{"dataframe_records": [{"problem": NaN}]}', 400, "roblem"),
         (request("{"), 400, "Problem 1: it is not valid JSON"),
-        (request("[]"), 400, "Problem 1: is list, wanted was an object"),
+        (request("[]"), 400, "Problem 1: is list, expected an object"),
         (request("{}", "{}"), 400, "Problem 1: field start is missing"),
         (request("[" * 100_000), 400, "Problem 1: it is not valid JSON"),
         (b'{"inputs":' + b"[" * 100_000, 400, "The body is not valid JSON"),

@@ -90,15 +90,13 @@ def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, 
         plan = read_plan(path, CAR_1_TRAILER).plan
         assert plan is not None
         assert plan.states.shape[1] == 6
-        with pytest.raises(StorageError, match="for vehicle car-1-trailer, wanted was car"):
+        with pytest.raises(StorageError, match="for vehicle car-1-trailer, expected car"):
             read_plan(path)
 
 
 def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
     settings = AssistantSettings(PLANNER, "open", 3, str(run.path), 1, "car")
-    with pytest.raises(
-        StorageError, match="made for vehicle car-1-trailer, wanted was car; ask for --vehicle"
-    ):
+    with pytest.raises(StorageError, match="made for vehicle car-1-trailer, expected car; ask for --vehicle"):
         solve_many(settings, problems, tmp_path / "rows.parquet", None)
 
 

@@ -85,7 +85,7 @@ def test_a_logged_memory_is_found_by_any_of_its_names(at_home: dict[str, str], p
     original = load_from(str(Path(at_home["data"]).parent / "archive"), CAR)
     assert np.array_equal(memory.masks, original.masks)
     assert np.array_equal(memory.plans[0].states, original.plans[0].states)
-    with pytest.raises(StorageError, match="made for vehicle car, wanted was car-1-trailer"):
+    with pytest.raises(StorageError, match="made for vehicle car, expected car-1-trailer"):
         load_from(at_home[place], CAR_1_TRAILER)
 
 
@@ -188,7 +188,7 @@ def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
     ("text", "reason"),
     [
         ("{", "Problem 1: it is not valid JSON"),
-        ("[]", "Problem 1: is list, wanted was an object"),
+        ("[]", "Problem 1: is list, expected an object"),
         ("{}", "Problem 1: field start is missing"),
         (json.dumps(fields_of(worlds.problem_of([])) | {"goal": [9.0, 9.0]}), "cut a longer route"),
     ],
