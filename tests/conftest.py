@@ -1,9 +1,53 @@
 """Strict by default: floating-point faults raise, and the same examples are drawn on every machine."""
 
+import os
+from pathlib import Path
+from typing import Final
+
 import numpy as np
+import pytest
 from hypothesis import settings
 
 np.seterr(all="raise", under="ignore")
 # compiling a kernel takes seconds, so a deadline would only measure the first call
 settings.register_profile("strict", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("strict")
+
+TESTS: Final = Path(__file__).parent
+LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/testing.md)
+    "flows/test_run.py",
+    "docs/test_tutorial.py",
+    "flows/cli/test_closed_commands.py",
+    "tasks/requests/test_solve_many.py",
+    "tasks/champions/test_conclude.py",
+    "tasks/fan_out/test_fan_out.py",
+    "tasks/servers/test_prefect_server.py",
+    "tasks/serving/test_serve_memory.py",
+    "dashboards/web/test_browser.py",
+    "tasks/tracking/test_memory_model.py",
+    "planners/memory/encoder/test_training.py",
+    "tasks/servers/test_connections.py",
+    "tasks/champions/test_promote.py",
+    "storage/archives/test_damaged_archives.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let each process begin with some of the longest files: short tests then fill what is left at the end.
+
+    Each of n processes is given the next n-th of the tests, and takes from the others when it is done.
+    """
+    processes = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    files: dict[Path, list[pytest.Item]] = {TESTS / name: [] for name in LONGEST}
+    short = [item for item in items if item.path not in files]
+    for item in items:
+        if item.path in files:
+            files[item.path].append(item)
+    share = -(-len(items) // processes)
+    ordered: list[pytest.Item] = []
+    for process in range(processes):
+        mine = [item for of_file in list(files.values())[process::processes] for item in of_file]
+        filled = max(0, share - len(mine))
+        ordered += [*mine, *short[:filled]]
+        short = short[filled:]
+    items[:] = [*ordered, *short]
