@@ -27,14 +27,14 @@ from tests.trials.kills.trial import Trial, killed
 
 VICTIMS: Final = ("command", "worker", "server", "scheduler")
 MOMENTS: Final = {  # how often each victim is killed: a hundred times in all
-    "import-worlds": (7, 0, 0, 0),
-    "promote": (7, 0, 0, 0),
-    "rollback": (7, 0, 0, 0),
-    "solve": (6, 4, 4, 0),
-    "build-memory": (5, 3, 3, 0),
-    "run": (8, 5, 5, 4),
-    "retrain": (8, 5, 5, 3),
-    "serve": (4, 4, 3, 0),
+    "import-worlds": (10, 0, 0, 0),
+    "promote": (10, 0, 0, 0),
+    "rollback": (10, 0, 0, 0),
+    "solve": (11, 9, 9, 0),
+    "build-memory": (8, 6, 6, 0),
+    "run": (8, 2, 2, 1),
+    "retrain": (2, 1, 1, 1),
+    "serve": (1, 1, 1, 0),
 }
 OUTCOMES: Final = ("went on", "goes on", "was done")
 
