@@ -63,6 +63,11 @@ class Memory:
         return forward_of(self.weights)
 
     @functools.cached_property
+    def durations(self) -> Floats32:
+        """How long each plan takes to drive, ``[N]`` seconds."""
+        return np.array([plan.duration_s for plan in self.plans], np.float32)
+
+    @functools.cached_property
     def heading(self) -> float | None:
         """The heading (radians) that all stored plans begin with; None if they do not agree."""
         headings = self.sweeps.first_poses[:, 2]

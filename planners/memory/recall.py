@@ -32,8 +32,9 @@ CANDIDATES: Final = 256  # plans that the encoder picks for hybrid
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
 TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
 CHECKED_EARLY: Final = 64  # of these, the least blocked: if they are blocked, the others mostly are, too
-CHECKED_DRAWN: Final = 8  # plans checked from the drawing; if all are blocked, a planner will need the scene
+CHECKED_DRAWN: Final = 32  # plans checked from the drawing; if all are blocked, a planner will need the scene
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
+LIKELY_CELLS: Final = 16  # blocked cells: of plans with more, one in a hundred is free
 
 
 class Recalled(NamedTuple):
@@ -84,7 +85,7 @@ def recall(
             return early
         spent = early.checks
     most = {"mask": k, "hybrid": candidates, "exhaustive": count}.get(strategy, k)
-    worth = count  # how many of the ranked plans may be returned
+    worth = likely = count  # how many of the ranked plans may be returned, and how many are likely to be free
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "centroid":
@@ -94,10 +95,12 @@ def recall(
     else:
         narrowed = strategy == "hybrid" and candidates < count
         among = by_encoder(memory, view, candidates, never_none=True) if narrowed else None
-        order, worth = by_cells(memory, view, among)
+        order, ends = by_cells(memory, view, among)
+        worth, likely = int(ends[WORTH_CELLS]), int(ends[LIKELY_CELLS])
         order = order[: min(most, worth) if strategy == "mask" else most]
+    tries = shortest_first(memory, order, likely)
     view.lap("recall")
-    free, checks = first_check(memory, view, order, as_stored)
+    free, checks = first_check(memory, view, tries, as_stored)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
 
 
@@ -105,9 +108,19 @@ def among_the_first(memory: Memory, view: View, k: int) -> Recalled:
     """Recall from the first plans of a large memory, by blocked cells, for a problem of their heading."""
     ranking = rank_by_cells(memory.masks[:TRIED_EARLY], view.bits, view.workspace)
     order = ranking.order[: min(CHECKED_EARLY, int(ranking.ends[WORTH_CELLS]))]
+    tries = shortest_first(memory, order, int(ranking.ends[LIKELY_CELLS]))
     view.lap("recall")
-    free, checks = first_check(memory, view, order, as_stored=True)
+    free, checks = first_check(memory, view, tries, as_stored=True)
     return Recalled(_with(free, order[:k].tolist(), k), free, checks)
+
+
+def shortest_first(memory: Memory, order: Integers, likely: int) -> Integers:
+    """Order the first ``likely`` plans of ``order [n]`` by driving time, the shortest first.
+
+    The others follow as they stand, the least blocked first.
+    """
+    head = order[:likely]
+    return np.concatenate((head[np.argsort(memory.durations[head], kind="stable")], order[likely:]))
 
 
 def _with(free: int, head: list[int], k: int) -> tuple[int, ...]:
@@ -137,12 +150,15 @@ def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> 
     return best if never_none or scores[0] <= scores[-1] else best[:0]
 
 
-def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, int]:
-    """Rank all plans, or those ``among [n]``, the least blocked first; and how many are worth recalling."""
+def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, Integers]:
+    """Rank all plans, or those ``among [n]``, the least blocked first.
+
+    Returns the plans in this order, and how many of them have at most 0, 1, ... blocked cells.
+    """
     masks = memory.masks if among is None else memory.masks[among]
     ranking = rank_by_cells(masks, view.bits, view.workspace)
     order = ranking.order if among is None else among[ranking.order]
-    return order, int(ranking.ends[WORTH_CELLS])
+    return order, ranking.ends
 
 
 def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) -> tuple[int, int]:

@@ -12,10 +12,19 @@ from scipy.spatial.distance import cdist
 from planners.memory.build_memory import build_memory
 from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
+from planners.memory.plans.cell_masks import rank_by_cells
 from planners.memory.plans.fit import free_plans
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
 from planners.memory.ranking.scores import best_plans
-from planners.memory.recall import MOST_EXHAUSTIVE, RECALLS, WORTH_CELLS, default_recall, rank, recall
+from planners.memory.recall import (
+    LIKELY_CELLS,
+    MOST_EXHAUSTIVE,
+    RECALLS,
+    WORTH_CELLS,
+    default_recall,
+    rank,
+    recall,
+)
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import bits_of, occupancy_of
 from planners.world.randomness import generator
@@ -107,6 +116,27 @@ def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
     if found.free >= 0:
         assert found.free in found.plans
         assert off or free_in(memory, problem)[found.free]
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(["centroid", "mask", "random"]))
+def test_no_free_plan_among_those_recalled_drives_shorter(memory, problem_in, seed, k, strategy):
+    problem = problem_in(seed)
+    found = recalled_by(memory, problem, strategy, k)
+    if found.free >= 0:
+        free = [i for i in found.plans if free_in(memory, problem)[i]]
+        assert memory.durations[found.free] == memory.durations[free].min()
+
+
+@given(seed=SEEDS, k=st.integers(1, 12), count=st.integers(0, 12))
+def test_of_plans_with_few_blocked_cells_exhaustive_finds_the_one_that_drives_shortest(
+    memory, problem_in, seed, k, count
+):
+    problem = problem_in(seed, count)
+    few = rank_by_cells(memory.masks, View(problem).bits).cells <= LIKELY_CELLS
+    likely = free_in(memory, problem) & few
+    if likely.any():
+        free = recalled_by(memory, problem, "exhaustive", k).free
+        assert memory.durations[free] == memory.durations[likely].min()
 
 
 @given(seed=SEEDS, k=st.integers(1, 12), count=st.integers(0, 12))
