@@ -67,6 +67,19 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
     ), alignment
 
 
+def mirrored(problem: Problem) -> Problem:
+    """Mirror a canonical problem in its diagonal, which makes another one that is as hard."""
+    (x, y, heading), goal = problem.start, problem.goal
+    x_min, y_min, x_max, y_max = problem.bounds
+    return replace(
+        problem,
+        start=(y, x, 0.5 * math.pi - heading),
+        goal=(goal[1], goal[0]),
+        bounds=(y_min, x_min, y_max, x_max),
+        obstacles=obstacles_of([[piece[:, ::-1] for piece in group] for group in _groups(problem)]),
+    )
+
+
 def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
     """Move a plan back into the frame of its problem. Controls are the same in every frame."""
     cos, sin = math.cos(-alignment.turn), math.sin(-alignment.turn)

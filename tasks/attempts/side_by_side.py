@@ -1,10 +1,14 @@
-"""Side by side: all attempts at a problem one after another, and their plans checked."""
+"""Side by side: every contestant attempts every problem, at a time when neither is in the caches.
+
+A robot plans for each problem once, with other work in between. So two attempts at a problem are never made
+in a row, and before each attempt other data fill the caches.
+"""
 
 from __future__ import annotations
 
 import gc
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from planners.memory.memory import Memory
 from planners.solve import Attempt, solve
@@ -13,12 +17,10 @@ from planners.world.randomness import generator
 from planners.world.workspace import Workspace
 from tasks.attempts.attempt_rows import attempt_row, check_attempt
 from tasks.attempts.compile_assists import compile_assists
-from tasks.attempts.timing import no_garbage_collection
+from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import Source
 from tasks.settings.run_settings import Assist
-
-COLLECTED_EVERY: Final = 10  # problems; collecting garbage takes as long as some ten attempts
 
 MemoryOfRun = tuple[str, str]  # name of a memory, and the run that made it
 
@@ -40,7 +42,8 @@ def side_by_side(
 ) -> list[dict[str, Any]]:
     """Have every contestant attempt each problem of a chunk.
 
-    In which order they attempt a problem is drawn by its id, so that none of them always comes first.
+    All problems are attempted once before any is attempted again. In which order the contestants attempt a
+    problem is drawn by its id, so that none of them always comes first.
 
     Args:
         chunk: the range of test problems.
@@ -67,19 +70,24 @@ def side_by_side(
             workspace=workspace,
         )
 
-    rows: list[dict[str, Any]] = []
+    problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
+    turns = [generator(seed, "order", problem.id).permutation(len(contestants)) for problem in problems]
+    attempts: dict[tuple[int, int], Attempt] = {}
+    other_work = OtherWork()
     compile_assists(vehicle)
-    for contestant in contestants:  # code and caches are warm before the first time counts
-        attempt(source.problem("test", chunk.first), contestant)
+    for contestant in contestants:  # what is made when first needed is there before the first time counts
+        attempt(problems[-1], contestant)
     with no_garbage_collection():
-        for index in range(chunk.first, chunk.last):
-            problem = source.problem("test", index)
-            order = generator(seed, "order", problem.id).permutation(len(contestants))
-            attempts = {int(i): attempt(problem, contestants[i]) for i in order}
-            checked: set[bytes] = set()
-            for i, contestant in enumerate(contestants):
-                check_attempt(problem, attempts[i], checked, vehicle)
-                rows.append(attempt_row(attempts[i], contestant.memory, contestant.run, vehicle))
-            if index % COLLECTED_EVERY == 0:
-                gc.collect()
+        for turn in range(len(contestants)):
+            for number, problem in enumerate(problems):
+                who = int(turns[number][turn])
+                other_work()
+                attempts[number, who] = attempt(problem, contestants[who])
+            gc.collect()
+    rows: list[dict[str, Any]] = []
+    for number, problem in enumerate(problems):
+        checked: set[bytes] = set()
+        for i, contestant in enumerate(contestants):
+            check_attempt(problem, attempts[number, i], checked, vehicle)
+            rows.append(attempt_row(attempts[number, i], contestant.memory, contestant.run, vehicle))
     return rows

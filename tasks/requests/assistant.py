@@ -15,7 +15,7 @@ from planners.memory.plans.fit import turned
 from planners.memory.recall import RECALLS
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
-from planners.world.alignment import from_canonical, to_canonical
+from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
@@ -24,7 +24,7 @@ from storage.exchange.problems import read_problems
 from storage.places.files import whole_file
 from storage.places.mirror import folders_here
 from tasks.attempts.attempt_rows import check_attempt
-from tasks.attempts.timing import no_garbage_collection
+from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
 from tasks.settings.checks import check_known, check_picture, check_seed
@@ -115,19 +115,20 @@ class Assistant:
         return self._memories[address]
 
     def warm_up(self, problem: Problem) -> None:
-        """Attempt a problem at least once, and for ``WARM_SECONDS`` if it is quick, so that caches are warm.
+        """Attempt the mirror image of a problem at least once, and for ``WARM_SECONDS`` if it is quick.
 
-        As in the benchmark, each attempt follows a search of the same problem. The seeds differ from the one
-        that is timed later, because a processor would learn to predict the branches of one repeated attempt.
+        So the code and the memory are ready, as those of a robot that has planned before, but nothing of the
+        problem itself is in the caches when it is attempted.
         """
-        canonical, _ = to_canonical(problem)
+        other = mirrored(to_canonical(problem)[0])
         deadline = perf_counter() + WARM_SECONDS
         seed = self.seed
         while True:
-            attempts = [self.attempt(canonical, assist, seed + 1) for assist in (None, UNASSISTED.name)]
+            attempts = [self.attempt(other, assist, seed + 1) for assist in (None, UNASSISTED.name)]
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
                 break
             seed += 1
+        OtherWork()()
 
     def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:
         """Attempt a canonical problem, with another assist or seed if given; the plan is not checked."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -15,6 +16,7 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
 from planners.solve import WITHOUT_MEMORY, Attempt
 from planners.world.alignment import Alignment, from_canonical
+from planners.world.arrays import Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from storage.exchange.plans import PlanRecord, write_plan
@@ -22,6 +24,7 @@ from storage.places.files import whole_file
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt
+from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.settings.checks import check_known, check_picture
 from tasks.settings.errors import RunError, UsageError
@@ -127,13 +130,17 @@ def drive_route(
             f"{scale * WIDEST_M:,.0f} m; cut the map, or correct --scale or --resolution."
         )
     solver = _Solver(assistant, scale)
-    router = Router(
-        canonical, solver.recalled, solver.searched, assistant.vehicle, settings.tolerance_m / scale
-    )
+
+    def router_over(each: OccupancyMap) -> Router:
+        tolerance_m = settings.tolerance_m / scale
+        return Router(each, solver.recalled, solver.searched, assistant.vehicle, tolerance_m)
+
+    router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
     grid_goals = [world.grid_pose(*goal, 0.0)[:2] for goal in goals_m]
     request = ((x / scale, y / scale, heading), [(right / scale, up / scale) for right, up in grid_goals])
-    router.route(*request)  # compiles and fills caches before the time counts
+    _drive_mirrored(router_over, canonical, *request)
+    OtherWork()()
     solver.seconds.clear()
     began = time.perf_counter()
     route = router.route(*request)
@@ -156,6 +163,16 @@ def drive_route(
     for label, written_path in (("plan", out), ("picture", drawing)):
         if written_path is not None:
             print(f"{label:8} {written_path}")
+
+
+def _drive_mirrored(
+    router_over: Callable[[OccupancyMap], Router], world: OccupancyMap, start: Pose, goals: Sequence[Point]
+) -> None:
+    """Find the route of the mirrored map: the code is ready then, but no problem of the route is known."""
+    width = world.size[0]
+    x, y, heading = start
+    across = router_over(replace(world, occupied=world.occupied[:, ::-1].copy()))
+    across.route((width - x, y, math.pi - heading), [(width - goal_x, goal_y) for goal_x, goal_y in goals])
 
 
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:

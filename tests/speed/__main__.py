@@ -19,6 +19,7 @@ SECTIONS: Final = {
     "peers": "tests.speed.peers.comparison",
     "assists": "tests.speed.assists",
     "latency": "tests.speed.latency",
+    "cold_clock": "tests.speed.cold_clock",
     "one_problem": "tests.speed.one_problem",
     "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",

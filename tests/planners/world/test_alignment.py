@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.world.alignment import Alignment, from_canonical, scaled, to_canonical
+from planners.world.alignment import Alignment, from_canonical, mirrored, scaled, to_canonical
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
@@ -37,6 +37,26 @@ def elsewhere(problem: Problem, turn: float, x: float, y: float) -> Problem:
         bounds=(*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()),
         obstacles=obstacles_of([[moved(piece, turn, x, y)] for piece in problem.obstacles.pieces()]),
     )
+
+
+@given(angles, seeds)
+def test_a_mirrored_problem_has_the_mirrored_answer_and_mirrored_twice_is_itself(
+    turn: float, seed: int
+) -> None:
+    drawn = problem_class("random").draw(seed, 0)
+    start = (*drawn.start[:2], drawn.start[2] + turn)
+    problem = replace(drawn, start=start, bounds=(-7.0, -6.0, 57.0, 58.0))
+    other, back = mirrored(problem), mirrored(mirrored(problem))
+    assert (back.start, back.goal, back.bounds) == (
+        pytest.approx(problem.start),
+        problem.goal,
+        problem.bounds,
+    )
+    for piece, same, across in zip(
+        *(each.obstacles.pieces() for each in (problem, back, other)), strict=True
+    ):
+        assert set(map(tuple, same)) == set(map(tuple, piece))
+        assert set(map(tuple, across[:, ::-1])) == set(map(tuple, piece))
 
 
 @given(angles, places, places, seeds)
