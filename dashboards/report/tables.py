@@ -30,13 +30,14 @@ from storage.tables.configurations import configurations_in
 Row = Mapping[Any, Any]  # of a summary
 
 _HEADINGS: Final = (
-    "planner", "configuration", "solved", "mean", "median", "90 %", "reduction % [95 %]", "slower",
-    "hits", "checks",
+    "planner", "configuration", "solved", "mean", "reduction % [95 %]", "slower", "hits", "drives",
+    "sooner [95 %]",
 )  # fmt: skip
+_UNITS: Final = "planning in ms; solved, slower, hits in %; drives, sooner there in s"
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
-    "interquartile mean ms [95 %]", "recalled %", "collision checks",
+    "interquartile mean ms [95 %]", "driving s", "sooner s [95 %]", "recalled %", "collision checks",
 )  # fmt: skip
 _SWEEP_HEADINGS: Final = (
     "class", "rate", "channels", "hidden", "parameters", "hit@1", "hit@5", "seconds"
@@ -53,9 +54,7 @@ STAGE_HEADINGS: Final = (
 def summary_table(summary: pd.DataFrame) -> Group:
     """The ``summary`` of ``panels.summarise`` for a terminal of 110 columns or more: a table a panel."""
     titled = titled_rows(summary, _cells)
-    return titled_tables(
-        _HEADINGS, [(f"{title}; times in ms; solved, slower, hits in %", groups) for title, groups in titled]
-    )
+    return titled_tables(_HEADINGS, [(f"{title}; {_UNITS}", groups) for title, groups in titled])
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
@@ -171,27 +170,41 @@ def full_cells(row: Row, decimals: int) -> list[str]:
         NOTHING if math.isnan(row["slowdown"]) else f"{row['slowdown']:.2f} ×",
         p_value(row["p_value"]),
         *[time(name) for name in ("median", "p90", "interquartile_mean")],
+        *driving_cells(row, 2),
         NOTHING if row["assist"] == "none" else percent(row["recalled"]),
         count(row["collision_checks"]),
     ]
 
 
-def reduction_cell(row: Row) -> str:
+def reduction_cell(row: Row, decimals: int = 1) -> str:
     """The reduction in a ``row`` of a summary with its interval; a dash for the planner alone."""
     if row["assist"] == "none":
         return NOTHING
-    return with_interval(row["reduction"], row["reduction_low"], row["reduction_high"], 1)
+    return with_interval(row["reduction"], row["reduction_low"], row["reduction_high"], decimals)
+
+
+def driving_cells(row: Row, decimals: int = 1) -> list[str]:
+    """Mean driving time in a ``row`` of a summary, and how much sooner the robot is there with its interval.
+
+    ``decimals``: of the latter.
+    """
+    if math.isnan(row["driving_s"]):
+        return [NOTHING, NOTHING]
+    alone = row["assist"] == "none" or math.isnan(row["sooner_s"])
+    ends = (f"{row[name]:+.{decimals}f}" for name in ("sooner_low_s", "sooner_high_s"))
+    sooner = NOTHING if alone else f"{row['sooner_s']:+.{decimals}f} [{', '.join(ends)}]"
+    return [f"{row['driving_s']:.1f}", sooner]
 
 
 def _cells(row: Row, decimals: int) -> list[str]:
     """The figures of one configuration that fit a terminal."""
     return [
         percent(row["solved"]),
-        *[f"{row[column]:,.{decimals}f}" for column in ("mean_ms", "median_ms", "p90_ms")],
-        reduction_cell(row),
+        f"{row['mean_ms']:,.{decimals}f}",
+        reduction_cell(row, 0),
         percent(row["slower"]),
         NOTHING if row["assist"] == "none" else percent(row["recalled"]),
-        count(row["collision_checks"]),
+        *driving_cells(row),
     ]
 
 

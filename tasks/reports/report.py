@@ -49,7 +49,7 @@ from tasks.stages.sweep import sweep_rows
 
 COLUMNS: Final = 110  # width of tables that are not printed to a terminal
 NOT_NEEDED: Final = (
-    "recalled", "run_id", "vehicle", "verified", "seed", "nodes", "expansions", "length_m", "duration_s",
+    "recalled", "run_id", "vehicle", "verified", "seed", "nodes", "expansions", "length_m",
     "host", "commit",
 )  # fmt: skip
 MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared by their experiences

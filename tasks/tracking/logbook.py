@@ -33,7 +33,7 @@ COMPARED: Final = ("controls", "planning-times", "retrieval")  # pictures on the
 
 _SUMMARY_METRICS = (
     "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
-    "collision_checks",
+    "collision_checks", "driving_s", "sooner_s",
 )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from dashboards.cells import PLANNING_TIME, decimals_of, panel_title, percent, planner_title, with_interval
 from dashboards.palette import TIME_COLOURS, colour_of
-from dashboards.report.tables import reduction_cell
+from dashboards.report.tables import driving_cells, reduction_cell
 from dashboards.statistics.distributions import TIME_PARTS, time_split
 from dashboards.statistics.panels import COMBINED
 from dashboards.web.charts import Chart, Dot, Drawing, dots, stacks
@@ -186,7 +186,7 @@ def _tables(summary: pd.DataFrame, run: str) -> list[dict[str, Any]]:
                 "address": _problems_address(run, row),
                 "numbers": [
                     *[f"{row[name]:,.{decimals}f}" for name in ("mean_ms", "median_ms", "p90_ms")],
-                    percent(row["solved"]), reduction_cell(row), percent(row["slower"]),
+                    percent(row["solved"]), reduction_cell(row), percent(row["slower"]), *driving_cells(row),
                 ],
             }
             for row in rows.to_dict("records")

@@ -28,6 +28,7 @@ def test_intervals_hold_their_own_figure(seed: int, problems: int, speed_up: flo
     slack = 1e-9
     for _, row in summary.iterrows():
         assert row["mean_low_ms"] - slack <= row["mean_ms"] <= row["mean_high_ms"] + slack
+        assert row["sooner_low_s"] - slack <= row["sooner_s"] <= row["sooner_high_s"] + slack
         assert row["reduction_low"] - slack <= row["reduction"] <= row["reduction_high"] + slack
     assert only(summary, assist="none")["reduction"] == 0.0
 
@@ -51,6 +52,18 @@ def test_figures_are_those_of_a_plain_loop(attempt_rows: pd.DataFrame) -> None:
         assert row["recalled"] == pytest.approx(np.mean([a["source"] == "recalled" for a in mine]))
         without = 1e3 * sum(baseline[a["problem_id"]] for a in mine)
         assert row["reduction"] == pytest.approx(1.0 - sum(times) / without)
+        assert row["driving_s"] == pytest.approx(np.mean([a["duration_s"] for a in mine if a["solved"]]))
+        alone = {
+            a["problem_id"]: a["planning_seconds"] + a["duration_s"]
+            for a in chosen
+            if a["assist"] == "none" and a["solved"]
+        }
+        sooner = [
+            alone[a["problem_id"]] - a["planning_seconds"] - a["duration_s"]
+            for a in mine
+            if a["solved"] and a["problem_id"] in alone
+        ]
+        assert row["sooner_s"] == pytest.approx(np.mean(sooner), abs=1e-9)
         if row["assist"] == "none":
             assert np.isnan([row["slower"], row["slowdown"], row["p_value"]]).all()
             continue
