@@ -9,7 +9,7 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
-from planners.memory.plans.fit import ends_of, least_blocked, turned
+from planners.memory.plans.free import ends_of, least_blocked, turned
 from planners.search.repair import blocked_states
 from planners.solve import Attempt
 from planners.world.arrays import Flags

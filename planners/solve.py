@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from planners.memory.memory import Memory, scale_fault
-from planners.memory.plans.fit import ends_of, least_blocked, turned
+from planners.memory.plans.free import ends_of, least_blocked, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
 from planners.search.guides.grid_path import grid_path

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from planners.explanation import Recollection, recollections
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import turned
+from planners.memory.plans.free import turned
 from planners.search.query import Limits
 from planners.search.traces import Roads, Trace, last_roadmap, last_tree
 from planners.solve import WITHOUT_MEMORY, Attempt, solve

@@ -15,7 +15,7 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.ranking.inverted_lists import FROM_PLANS, list_readout
 from planners.memory.ranking.readout import NO_PLAN_ODDS, mean_embeddings, nearest_readout

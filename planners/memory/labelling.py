@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.world.arrays import Flags, Floats, Integers
 from planners.world.geometry.collision import build_scene

@@ -11,7 +11,7 @@ import numpy as np
 
 from planners.memory.encoder.encoder import Encoder, Weights, to_onnx
 from planners.memory.encoder.forward_pass import Forward, forward_of
-from planners.memory.plans.fit import START_TOLERANCE
+from planners.memory.plans.free import START_TOLERANCE
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.memory.ranking.inverted_lists import InvertedLists
 from planners.world.arrays import Floats32

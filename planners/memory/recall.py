@@ -20,7 +20,7 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.fit import ends_of, first_fitting, first_fitting_drawn
+from planners.memory.plans.free import ends_of, first_fitting, first_fitting_drawn
 from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
 from planners.world.arrays import Integers

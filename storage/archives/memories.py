@@ -18,7 +18,7 @@ from planners.memory.encoder.encoder import Architecture, architecture_of, to_on
 from planners.memory.encoder.training import OBJECTIVES
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans, sweeps_with
 from planners.memory.ranking.inverted_lists import lists_with
 from planners.world.arrays import Floats

@@ -81,11 +81,11 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
     for judged_version in judged_versions:
         version, verdict = judged_version.version, judged_version.verdict
         if verdict == FIRST and registry.aliased(version.name) is None:
-            registry.point(version)
+            registry.set_alias(version)
         elif verdict == PROMOTED:
             promote(registry, version)
         elif verdict == AWAITING:
-            registry.point(version, CHALLENGER)
+            registry.set_alias(version, CHALLENGER)
         registry.tagged(version, {"verdict": verdict})
     publish_judgements(
         run.settings.run_name, [(each.memory, each.summary, each.markdown) for each in judged_versions]

@@ -35,7 +35,7 @@ def promote(registry: Registry, challenger: Version) -> None:
             f"champion is {now} now and stays; the next retraining judges again."
         )
     registry.tagged(challenger, {"previous": champion.number})
-    registry.point(challenger)
+    registry.set_alias(challenger)
 
 
 def promote_awaiting(data: Path, memory: str | None) -> None:
@@ -109,7 +109,7 @@ def roll_back(data: Path, memory: str | None) -> None:
                 f"registry any more; version {champion.number} stays."
             )
         registry.tagged(champion, {"verdict": ROLLED_BACK})
-        registry.point(
+        registry.set_alias(
             before
         )  # last: a roll back killed before this line goes back one version when repeated
         print(f"{champion.name}: version {before.number} is champion again, was {champion.number}")

@@ -143,7 +143,7 @@ class Registry:
                 client.set_model_version_tag(version.name, str(version.number), _TAG + tag, text)
         return version._replace(tags={**version.tags, **texts})
 
-    def point(self, version: Version, alias: str = CHAMPION) -> None:
+    def set_alias(self, version: Version, alias: str = CHAMPION) -> None:
         """Point an alias at a version. This is the one step by which a champion changes."""
         with self._client() as client:
             client.set_registered_model_alias(version.name, alias, str(version.number))

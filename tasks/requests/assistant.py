@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from planners.explanation import recollections
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import turned
+from planners.memory.plans.free import turned
 from planners.memory.recall import RECALLS
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve

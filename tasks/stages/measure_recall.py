@@ -14,7 +14,7 @@ import numpy as np
 from planners.memory.encoder.training import TrainedEncoder
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.recall import rank
 from planners.world.arrays import Flags, Integers
 from planners.world.geometry.collision import scene_of

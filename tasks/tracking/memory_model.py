@@ -22,7 +22,7 @@ from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
 from planners.memory.memory import Memory, scale_fault
-from planners.memory.plans.fit import ends_of, plan_fits, turned
+from planners.memory.plans.free import ends_of, plan_fits, turned
 from planners.memory.ranking.scores import best_plans
 from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.classes.problem_classes import problem_class

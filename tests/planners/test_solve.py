@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.plans.fit import free_plans, turned
+from planners.memory.plans.free import free_plans, turned
 from planners.memory.recall import RECALLS
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan

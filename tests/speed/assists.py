@@ -27,7 +27,7 @@ from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.memory import Memory
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve

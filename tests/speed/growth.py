@@ -33,7 +33,7 @@ from rich.table import Table
 from threadpoolctl import threadpool_limits
 
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.recall import RECALLS, default_recall, recall
 from planners.world.arrays import Flags
 from planners.world.classes.problem_classes import problem_class

@@ -20,7 +20,7 @@ from rich.progress import track
 from rich.table import Table
 
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.recall import RECALLS, recall
 from planners.solve import solve
 from planners.world.classes.problem_classes import CLASSES, problem_class

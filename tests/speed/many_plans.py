@@ -12,7 +12,7 @@ from rich.progress import track
 from planners.memory.growth import grow
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.ranking.inverted_lists import list_readout
 from planners.solve import solve

@@ -24,7 +24,7 @@ from dashboards.web.parameters import Parameters, link
 from dashboards.web.world_svg import answer_layer, recalled_layer, world_svg
 from dashboards.world_outlines import checked
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import turned
+from planners.memory.plans.free import turned
 from planners.world.arrays import Floats32
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import GRID, occupancy_of

@@ -14,7 +14,7 @@ from planners.memory.hallucination.method import DrawObstacles, Method
 from planners.memory.hallucination.minimal import Minimal
 from planners.memory.hallucination.rearrange import Rearrange
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import ends_of, plan_fits
+from planners.memory.plans.free import ends_of, plan_fits
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from planners.memory.hallucination.method import DrawObstacles
 from planners.memory.hallucination.placing import obstacle_meets
-from planners.memory.plans.fit import free_plans, sweep_is_free
+from planners.memory.plans.free import free_plans, sweep_is_free
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.world.arrays import Bounds, Flags, Floats
 from planners.world.geometry.collision import build_scene

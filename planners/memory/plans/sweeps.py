@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.world.arrays import Floats, Indices, Integers
 from planners.world.jit import jit
 from planners.world.problem import Plan

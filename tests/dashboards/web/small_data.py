@@ -17,7 +17,7 @@ from dashboards.statistics.panels import summarise
 from dashboards.verdicts.drift import Usefulness, drifts
 from dashboards.web.memory_versions import MemoryVersion
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.solve import solve
 from planners.world.arrays import Flags
 from planners.world.classes.problem_classes import problem_class

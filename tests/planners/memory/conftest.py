@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import (

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from planners.memory.curation import AGAIN, ALIKE, choose, coverage, curate, similarity
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.solve import solve
 from planners.world.classes.problem_classes import problem_class

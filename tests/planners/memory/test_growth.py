@@ -13,7 +13,7 @@ from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.memory.growth import RIDGE, grow, moments_of, ridge_readout, scatter
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.ranking.readout import mean_embeddings
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of

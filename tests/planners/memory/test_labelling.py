@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.memory.labelling import label_problems
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of, pack

@@ -13,7 +13,7 @@ from planners.memory.build_memory import build_memory
 from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
 from planners.memory.ranking.scores import best_plans
 from planners.memory.recall import (

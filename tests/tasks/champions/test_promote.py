@@ -78,7 +78,7 @@ def test_champions_change_by_promotion_and_back_and_no_other_way(
     registry, data = registered.registry, registered.data
     first = registered.version("one", verdict=FIRST)
     assert registered.champion is None
-    registry.point(first)
+    registry.set_alias(first)
     second = registered.version("two", against=1, retraining=1)
     assert registered.version("two", against=1, retraining=1) == second  # the same again is no other
     assert [each.number for each in registry.versions(NAME)] == [1, 2]
@@ -92,7 +92,7 @@ def test_champions_change_by_promotion_and_back_and_no_other_way(
     with pytest.raises(RunError, match="no challenger awaits approval"):
         promote_awaiting(data, None)
     waiting = registered.version("four", against=2, retraining=3, verdict=AWAITING)
-    registry.point(waiting, CHALLENGER)
+    registry.set_alias(waiting, CHALLENGER)
     assert registered.champion == 2
     promote_awaiting(data, "trap")
     assert registered.champion == 4
@@ -114,10 +114,10 @@ def test_champions_change_by_promotion_and_back_and_no_other_way(
 
 def test_a_challenger_whose_champion_was_rolled_back_is_not_approved(registered: Registered) -> None:
     registry = registered.registry
-    registry.point(registered.version("one", verdict=FIRST))
+    registry.set_alias(registered.version("one", verdict=FIRST))
     promote(registry, registered.version("two", against=1, retraining=1))
     waiting = registered.version("three", against=2, retraining=2, verdict=AWAITING)
-    registry.point(waiting, CHALLENGER)
+    registry.set_alias(waiting, CHALLENGER)
     roll_back(registered.data, None)
     with pytest.raises(RunError, match="judged against version 2, but the champion is version 1 now"):
         promote_awaiting(registered.data, None)
@@ -128,7 +128,7 @@ def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_ag
     registered: Registered, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     registry = registered.registry
-    registry.point(registered.version("one", verdict=FIRST))
+    registry.set_alias(registered.version("one", verdict=FIRST))
     for against in (1, 2):
         promote(registry, registered.version(str(against), against=against, retraining=against))
     written: list[bool] = []
@@ -156,7 +156,7 @@ def test_a_champion_whose_promotion_was_killed_gets_its_verdict_by_the_next_retr
     registered: Registered,
 ) -> None:
     registry = registered.registry
-    registry.point(registered.version("one"))
+    registry.set_alias(registered.version("one"))
     settings = for_preset("smoke", classes=["trap"])
     assert runs_to_make(open_data_folder(registered.data), settings, registry) == []
     assert [each.tag("verdict") for each in registry.versions(NAME)] == [FIRST]

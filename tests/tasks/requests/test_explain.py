@@ -11,7 +11,7 @@ import pytest
 from flows.cli.main import call
 from planners.explanation import recollections
 from planners.memory.memory import Memory
-from planners.memory.plans.fit import turned
+from planners.memory.plans.free import turned
 from planners.solve import solve
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of

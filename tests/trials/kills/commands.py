@@ -46,7 +46,7 @@ def version(against, verdict):
     tags = {{"memory": "random", "against": against, "retraining": against, "verdict": verdict}}
     return registry.register("{NAME}", first.run_id, model, str(against), tags, "")
 promote(registry, version(1, PROMOTED))
-registry.point(version(2, AWAITING), CHALLENGER)
+registry.set_alias(version(2, AWAITING), CHALLENGER)
 """  # a second version is champion then, and a third awaits approval
 PROBLEMS: Final = 120
 STAGES: Final = ("collect", "hallucinate", "train")

@@ -15,7 +15,7 @@ from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.hallucination.placing import corridor_of, largest_stride, obstacle_meets
 from planners.memory.hallucination.rearrange import Rearrange, _rearranged
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, obstacles_of

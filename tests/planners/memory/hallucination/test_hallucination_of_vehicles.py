@@ -16,7 +16,7 @@ from planners.memory.hallucination.mixture import METHODS, hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults, prism

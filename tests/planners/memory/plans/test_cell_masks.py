@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.plans.cell_masks import MOST_CELLS, masks_of, rank_by_cells
-from planners.memory.plans.fit import free_plans
+from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import bits_of, grid_of, occupancy_of

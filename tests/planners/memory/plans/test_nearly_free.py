@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.fit import SHARE, ends_of, least_blocked, turned
+from planners.memory.plans.free import SHARE, ends_of, least_blocked, turned
 from planners.memory.plans.sweeps import coarse_to_fine, sweep_plans
 from planners.search.repair import blocked_states
 from planners.world.geometry.collision import scene_of

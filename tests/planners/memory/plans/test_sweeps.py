@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.fit import Ends, free_plans, plan_fits
+from planners.memory.plans.free import Ends, free_plans, plan_fits
 from planners.memory.plans.sweeps import coarse_to_fine, sweep_plans
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan

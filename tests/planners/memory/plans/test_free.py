@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.memory.plans.cell_masks import masks_of
-from planners.memory.plans.fit import ends_of, first_fitting, first_fitting_drawn, plan_fits
+from planners.memory.plans.free import ends_of, first_fitting, first_fitting_drawn, plan_fits
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of

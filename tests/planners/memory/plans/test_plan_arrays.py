@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.stored_plans import StoredPlans, store_plans
+from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.world.problem import Plan
 from planners.world.randomness import generator
 
