@@ -63,8 +63,6 @@ def recollections(
         blocked, _ = blocked_states(plan, view.scene, vehicle)
         cells = int(blocked_cells[number])
         missed = max(math.dist(plan.states[-1, :2], problem.goal) - problem.goal_radius, 0.0)
-        fits = attempt.source == "recalled" and not blocked.any() and missed <= 1e-9
-        is_answer = fits and not any(each.use == "answer" for each in looked_at)
         looked_at.append(
             Recollection(
                 number,
@@ -72,14 +70,18 @@ def recollections(
                 cells if as_stored and cells < MOST_CELLS else None,
                 blocked,
                 missed,
-                "answer" if is_answer else uses.get(number, ""),
+                uses.get(number, ""),
             )
         )
     return looked_at
 
 
 def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:
-    """The plan that the repair or the search went on from, and which of both."""
+    """The plan that is the answer, or that the repair or the search went on from, and which of these."""
+    if attempt.source == "recalled" and attempt.plan is not None:
+        heading, answer = problem.start[2], attempt.plan.states
+        recalled = {i: turned(memory.plans[i], heading).states for i in attempt.recalled}
+        return {i: "answer" for i, states in recalled.items() if np.array_equal(states, answer)}
     use = attempt.assist.removeprefix("random-")
     if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
         return {}

@@ -114,7 +114,8 @@ def solve(
 ) -> Attempt:
     """Solve a canonical problem: try stored plans first, as the assist says, then search.
 
-    ``none``: search only. ``closed``: return the first free plan of those that recall tries, else search.
+    ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
+    drives shortest, else search.
     ``open``: the same, but the search goes on from the free beginning of the least blocked of the recalled
     plans, guided by that plan and by a path over the grid. ``repair``: the same, but the blocked segments of
     that plan are planned anew; if this fails as ``open``. ``fresh``: search guided by a path over the grid.
