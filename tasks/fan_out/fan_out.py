@@ -119,15 +119,21 @@ def _check_encryption(address: str) -> None:
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
     with scratch_folder() as scratch, dask.config.set({**_settings(), "temporary-directory": str(scratch)}):
-        local = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            security=own_certificate(),
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            silence_logs="CRITICAL",
-        )
+        try:
+            local = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                security=own_certificate(),
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                silence_logs="CRITICAL",
+            )
+        except RuntimeError as error:  # Dask starts a worker again only once it has run
+            raise RunError(
+                "A worker process ended while it was starting. What is finished is kept; the same "
+                "command goes on from here."
+            ) from error
         try:
             yield local
         finally:

@@ -14,7 +14,7 @@ import dask
 import pytest
 
 from tasks.fan_out import fan_out
-from tasks.settings.errors import UsageError
+from tasks.settings.errors import RunError, UsageError
 
 ROOT = Path(__file__).parents[3]
 
@@ -91,4 +91,15 @@ def test_a_scheduler_that_cannot_be_reached_safely_is_wrong_use(
         pytest.raises(UsageError, match=told),
         fan_out.cluster(scheduler=address),
     ):
+        pass
+
+
+def test_a_worker_that_dies_while_it_starts_ends_the_command_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def dies(**_: Any) -> None:
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(fan_out, "LocalCluster", dies)
+    with pytest.raises(RunError, match="worker process ended"), fan_out.cluster(1):
         pass
