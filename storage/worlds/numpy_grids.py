@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from storage.worlds.limits import check_resolution, check_size
 from storage.worlds.pictures import PIXELS, problem_of_cells
 
 CELL_M: Final = 1.0
+LONGEST_HEADER: Final = 10_000  # bytes, NumPy's own limit; few arrays need more than 128
 MOST_NUMBERS: Final = 100_000_000  # in a stack of worlds: 2,475 of them
 Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 
@@ -94,11 +96,13 @@ def _shapes(file: Path) -> Iterator[tuple[str, tuple[int, ...]]]:
 
 
 def _shape(stream: IO[bytes]) -> tuple[int, ...]:
-    version = np.lib.format.read_magic(stream)
-    if version == (1, 0):
-        shape, _, kind = np.lib.format.read_array_header_1_0(stream)
-    else:
-        shape, _, kind = np.lib.format.read_array_header_2_0(stream)
+    is_first = np.lib.format.read_magic(stream) == (1, 0)
+    size = stream.read(2 if is_first else 4)
+    length = int.from_bytes(size, "little")
+    if length > LONGEST_HEADER:  # NumPy would read it all before it refuses: gigabytes, if zeros were packed
+        raise ValueError(f"its header claims {length:,} bytes, expected at most {LONGEST_HEADER:,}")
+    read = np.lib.format.read_array_header_1_0 if is_first else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(io.BytesIO(size + stream.read(length)))
     if kind.kind not in "buif":
         raise ValueError(f"it holds {kind}, expected numbers or bool")
     return tuple(shape)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +53,26 @@ def test_a_file_with_a_malformed_header_is_skipped_and_the_others_are_not(
     reasons = [reason for _, reason in found.skipped + other.skipped]
     assert len(reasons) == len(MALFORMED)
     assert all(reason and "\n" not in reason for reason in reasons)
+
+
+@pytest.mark.parametrize(
+    "beginning", [b"\x01\x00\xff\xff", b"\x02\x00" + b"\xff" * 4, b"\x03\x00\x00\x00\x00\x08"]
+)
+def test_a_header_that_claims_to_be_long_is_refused_unread(tmp_path: Path, beginning: bytes) -> None:
+    path = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.npy", "w") as member:
+        member.write(b"\x93NUMPY" + beginning)
+        for _ in range(40):
+            member.write(bytes(1_000_000))
+    tracemalloc.start()
+    try:
+        with pytest.raises(StorageError, match="header") as error:
+            source_at(path)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(error.value)
+    assert peak < 2_000_000
 
 
 @pytest.mark.filterwarnings("ignore:Reading `.npy`")
