@@ -138,7 +138,7 @@ def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:
             raise ValueError(f"obstacle {number} {error}") from None
     if groups is None:
         return obstacles_of(pieces)
-    if not isinstance(groups, list) or not all(isinstance(size, int) and size > 0 for size in groups):
+    if not isinstance(groups, list) or not all(type(size) is int and size > 0 for size in groups):
         raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
     if sum(groups) != len(pieces):
         raise ValueError(

@@ -14,6 +14,7 @@ from typing import Any, Final
 import yaml
 
 from planners.maps.occupancy_map import Cells, OccupancyMap
+from storage.fields import check_fields
 from storage.places.files import read_text
 from storage.worlds.limits import check_file, check_resolution
 from storage.worlds.picture_files import Picture, read_picture
@@ -26,6 +27,7 @@ _BROKEN: Final = (
     yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RecursionError,
 )  # fmt: skip
 _REQUIRED: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
+_FIELDS: Final = (*_REQUIRED, "negate", "mode")  # of map_server
 
 
 def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> OccupancyMap:
@@ -87,12 +89,14 @@ def _fields(file: Path) -> Mapping[str, Any]:
         aliases = any(
             isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)
         )
+        node = None if aliases else yaml.compose(text, Loader=yaml.SafeLoader)
         fields = None if aliases else yaml.safe_load(text)
     except _BROKEN as error:
         reason = str(error).partition("\n")[0][:100]
         raise ValueError(f"is not YAML ({reason})") from None
-    if not isinstance(fields, Mapping):
+    if not isinstance(fields, Mapping) or not isinstance(node, yaml.MappingNode):
         raise ValueError(f"is not the YAML of a map; expected {', '.join(_REQUIRED)}")
+    check_fields([key.value for key, _ in node.value], _FIELDS)
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"lacks {missing[0]}; expected {', '.join(_REQUIRED)}")

@@ -177,6 +177,7 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"obstacles": [box(50, 50).tolist()]}, "goal centre"),
         ({"groups": [2]}, "groups are of 2 polygons"),
         ({"groups": [0, 1]}, "groups must be counts"),
+        ({"groups": [True, 1]}, "groups must be counts"),
     ],
 )
 @pytest.mark.parametrize("ending", [".json", ".jsonl"])

@@ -193,6 +193,9 @@ def _link(folder: Path) -> None:
         ({"image": "x" * 5000}, None, "which no file can be called"),
         ({"image": "a\0b"}, None, "no picture's name"),
         ({"image": ["town.pgm"]}, None, "no picture's name"),
+        ({"resolutoin": 0.05}, None, "unknown field 'resolutoin' (nearest is 'resolution')"),
+        ({"Mode": "scale"}, None, "nearest is 'mode'"),
+        ({7: 1}, None, "unknown field '7'"),
         ({}, _no_picture, "which is not there"),
         ({}, _bomb, "no whole PNG or PPM picture"),
         ({}, _plain_bomb, "no whole PNG or PPM picture"),
@@ -210,6 +213,17 @@ def test_a_bad_ros_map_is_told_in_one_line(
     if change is not None:
         change(tmp_path / "in")
     assert reason in told(tmp_path / "in" / "town.yaml")
+
+
+@pytest.mark.parametrize("name", ["image", "resolution", "mode"])
+def test_a_field_that_is_there_twice_is_refused(tmp_path: Path, name: str) -> None:
+    write_ros(tmp_path / "town.yaml", CELLS, mode="trinary")
+    text = (tmp_path / "town.yaml").read_text()
+    line = next(line for line in text.splitlines() if line.startswith(name))
+    (tmp_path / "town.yaml").write_text(f"{text}{line}\n")
+    assert f"{name!r} more than once" in told(tmp_path / "town.yaml")
+    (tmp_path / "town.yaml").write_text(f'{text}"{name}": null\n')
+    assert f"{name!r} more than once" in told(tmp_path / "town.yaml")
 
 
 @pytest.mark.parametrize(
