@@ -17,6 +17,7 @@ from storage.places.data_folder import open_run
 from storage.places.files import whole_file
 from storage.tables.attempts import read_attempts
 from tasks.reports.report import NOT_NEEDED, console
+from tasks.settings.checks import check_outputs
 from tasks.settings.errors import UsageError
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings
@@ -32,7 +33,7 @@ def compare(runs: Sequence[Path], out: Path | None) -> None:
         out: where to write the comparison too: .md, .json or .csv.
 
     Raises:
-        UsageError: there are fewer than two runs, or ``out`` has another ending.
+        UsageError: there are fewer than two runs, or ``out`` has another ending or lies in a run's folder.
         StorageError: a folder is not a run, its settings were edited, or it has no attempt that one of the
             first run can be compared with.
 
@@ -43,6 +44,7 @@ def compare(runs: Sequence[Path], out: Path | None) -> None:
         raise UsageError(f"{out} ends in none of {', '.join(ENDINGS)}.")
     names = _names(runs)
     different = _different([recorded_settings(open_run(run)) for run in runs])
+    check_outputs(runs, [out])
     first = _attempts(runs[0])
     tables: dict[str, pd.DataFrame] = {}
     for name, run in zip(names[1:], runs[1:], strict=True):

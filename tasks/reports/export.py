@@ -15,7 +15,7 @@ from storage.places.mirror import fetch
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import attempt_frames, tables_below
 from tasks.reports.stage_times import stages_of
-from tasks.settings.checks import check_known
+from tasks.settings.checks import check_known, check_outputs
 from tasks.settings.errors import UsageError
 
 ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv"}
@@ -30,7 +30,7 @@ def export_run(folder: Path, form: str, out: Path) -> None:
         out: where to write them.
 
     Raises:
-        UsageError: another form, or a path that does not fit the form.
+        UsageError: another form, or a path that does not fit the form or lies in the run's folder.
         StorageError: the folder is not a run, or has no attempts.
 
     """
@@ -40,6 +40,7 @@ def export_run(folder: Path, form: str, out: Path) -> None:
     if form == "ompl" and out.exists():
         raise UsageError(f"{out} is there already; give a new folder for the logs.")
     run = open_run(folder)
+    check_outputs([folder], [out])
     folders = {path.parent for path in tables_below(run.results, "benchmark")}
     classes = {folder.name: folder for folder in sorted(folders)}
     if form == "ompl":

@@ -27,7 +27,7 @@ from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import check_known, check_picture, check_seed
+from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -99,6 +99,7 @@ class Assistant:
         self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
         needs_memory = assist not in WITHOUT_MEMORY and memory is not None
         self._address = _local_address(str(memory)) if needs_memory else None
+        self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
         self._memories: dict[str, Memory] = {}
         self.recall = recall
         self._workspace = Workspace()
@@ -189,11 +190,14 @@ def plan_one(
 
     Raises
     ------
+    UsageError
+        The picture's format is unknown, or an output would be written over an input.
     RunError
         The file does not hold exactly one problem, or no plan was found.
 
     """
     check_picture(drawing)
+    check_outputs([problem, *assistant.files], [out, drawing])
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")

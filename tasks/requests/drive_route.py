@@ -26,7 +26,7 @@ from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.attempt_rows import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
-from tasks.settings.checks import check_known, check_picture
+from tasks.settings.checks import check_known, check_outputs, check_picture
 from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
@@ -105,7 +105,7 @@ def drive_route(
     Raises
     ------
     UsageError
-        An option is malformed, or start or goal cannot be used.
+        An option is malformed, start or goal cannot be used, or an output would be written over an input.
     RunError
         No route was found.
     PlanFaultError
@@ -121,6 +121,7 @@ def drive_route(
     source = source_at(path, map_format)
     if not source.is_map:
         raise UsageError(f"{path} holds worlds; a route needs a map: .map, .yaml (ROS), .npy or .npz.")
+    check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = load_map(source, settings)
     scale = settings.scale
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)

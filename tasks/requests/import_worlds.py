@@ -21,7 +21,7 @@ from storage.places.files import whole_file, whole_folder
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.fan_out.progress import progress
-from tasks.settings.checks import check_count, check_known, check_picture, check_seed
+from tasks.settings.checks import check_count, check_known, check_outputs, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
@@ -121,7 +121,8 @@ def import_worlds(
     Raises
     ------
     UsageError
-        An option is not possible or would change nothing, or ``out`` holds something else.
+        An option is not possible or would change nothing, ``out`` holds something else, or an output would be
+        written over an input.
     RunError
         There is no problem to write, or two parts have a problem of the same id.
 
@@ -132,6 +133,7 @@ def import_worlds(
         raise UsageError(f"{out} is neither a folder's name nor ends in {', '.join(PROBLEM_FORMATS)}.")
     check_picture(drawing)
     source = source_at(path, source_format)
+    check_outputs([path] if path.is_dir() else source.contents(), [out, drawing])
     _refuse_unused(source, settings, drawing)
     if out.suffix == "":
         _refuse_foreign(out, source)

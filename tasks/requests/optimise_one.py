@@ -18,7 +18,7 @@ from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problems import read_problems
 from storage.places.files import whole_file
-from tasks.settings.checks import check_known, check_picture, check_seed
+from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
@@ -114,12 +114,14 @@ def optimise_one(
     Raises
     ------
     UsageError
-        The weight is negative or infinite, or the picture's format is unknown.
+        The weight is negative or infinite, the picture's format is unknown, or an output would be written
+        over an input.
     RunError
         The file does not hold exactly one problem, or the optimisation does not converge.
 
     """
     check_picture(drawing)
+    check_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], [out, drawing])
     if not 0.0 <= clearance_weight < float("inf"):
         raise UsageError(f"Clearance weight {clearance_weight}: give 0 or more.")
     problems = read_problems(problem_file, initial.vehicle)

@@ -30,6 +30,7 @@ from tasks.requests.problem_parts import (
     unfinished,
 )
 from tasks.servers.prefect_server import local_server
+from tasks.settings.checks import check_outputs
 from tasks.settings.errors import UsageError
 
 if TYPE_CHECKING:
@@ -72,14 +73,17 @@ def solve_many(
             so it may import Prefect. None solves everything in this process.
 
     Raises:
-        UsageError: ``out`` does not end in .parquet, or the settings contradict each other.
+        UsageError: ``out`` does not end in .parquet, the settings contradict each other, or an output would
+            be written over an input.
         StorageError: a problem is malformed, or two have the same id. All other parts are solved and kept,
             so once the problem is corrected the same command has little left to do.
 
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    Assistant(*settings)  # raises UsageError early
+    assistant = Assistant(*settings)  # raises UsageError early
+    plan_of_one = None if plans is None else plans / f"{problems.stem}.json"  # named by the id
+    check_outputs([problems, *assistant.files], [out, plans, plan_of_one])
     if learn is not None:
         open_data_folder(learn)
     compared = settings.memory is not None and not settings.improve_seconds

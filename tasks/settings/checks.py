@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -44,3 +45,30 @@ def check_picture(path: Path | None) -> None:
     """Refuse a path that does not end like a picture."""
     if path is not None and path.suffix not in PICTURES:
         raise UsageError(f"{path} is not the name of a picture. Known: {', '.join(PICTURES)}.")
+
+
+def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> None:
+    """Refuse to write over what is read.
+
+    Args:
+        inputs: the files that a command reads, and the folders of which it reads files.
+        outputs: where it would write; None stands for an output that is not wanted.
+
+    Raises:
+        UsageError: an output is an input by whatever name, or lies in a folder that is read.
+
+    """
+    read = [(path, Path(os.path.realpath(path))) for path in inputs]
+    for output in (output for output in outputs if output is not None):
+        for path, real in read:
+            if Path(os.path.realpath(output)).is_relative_to(real) or _is_one_file(path, output):
+                raise UsageError(
+                    f"{output} would be written over or into {path}, which is read; name another."
+                )
+
+
+def _is_one_file(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:  # one of them does not exist
+        return False

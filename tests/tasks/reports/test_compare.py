@@ -48,6 +48,13 @@ def runs(tmp_path: Path) -> list[Path]:
     return [_run(tmp_path / "one", labels, 0.02), _run(tmp_path / "two", triplet, 0.01)]
 
 
+def test_a_comparison_is_not_written_over_the_settings_of_a_run(runs: list[Path]) -> None:
+    before = (runs[1] / "settings.json").read_bytes()
+    with pytest.raises(UsageError, match="is read"):
+        compare(runs, runs[1] / "settings.json")
+    assert (runs[1] / "settings.json").read_bytes() == before
+
+
 def test_runs_are_compared_and_what_differs_is_said(
     runs: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

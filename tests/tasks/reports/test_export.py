@@ -52,6 +52,15 @@ def test_an_experiment_says_where_and_how_it_was_made(run: RunFolder, tmp_path: 
     assert json.loads(found[0][5]) == {"seed": 7}
 
 
+@pytest.mark.parametrize(
+    ("form", "name"), [("ompl", "logs"), ("planner-arena", "a.db"), ("csv", "retrieval.csv")]
+)
+def test_nothing_is_written_into_the_run(run: RunFolder, form: str, name: str) -> None:
+    with pytest.raises(UsageError, match="is read"):
+        export_run(run.path, form, run.path / name)
+    assert not (run.path / name).exists()
+
+
 def test_a_log_for_each_class(run: RunFolder, tmp_path: Path) -> None:
     export_run(run.path, "ompl", tmp_path / "logs")
     assert sorted(path.name for path in (tmp_path / "logs").iterdir()) == ["curves.log", "trap.log"]
