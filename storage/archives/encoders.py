@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.encoder.encoder import Architecture, weight_shapes
+from planners.memory.encoder.encoder import Architecture, embedding_bound, weight_shapes
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import read_archive, write_archive
@@ -47,9 +47,11 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
         rows = (len(tensors["biases"]), settings.architecture.dimensions)
         readout = {"centroids": rows, "vectors": rows, "biases": rows[:1], "popularity": (rows[0] - 1,)}
         check_floats(tensors, shapes | readout)
+        weights = {name.removeprefix(_WEIGHT): tensors[name] for name in shapes}
+        embedding_bound(weights)
         return TrainedEncoder(
             settings=settings,
-            weights={name.removeprefix(_WEIGHT): tensors[name] for name in shapes},
+            weights=weights,
             **{name: tensors[name] for name in _FLOATS},
             history=history,
             held_out=held_out,

@@ -1,8 +1,7 @@
 """Memories on disk: archives of the encoder, its readout, and the plans as plain arrays.
 
 Small arrays are safetensors. Those that grow with the plans lie in ``.npy`` files, which stay on the disk
-until they are used. ``encoder.onnx`` is the same network for other programs; recall makes its own from the
-weights.
+until they are used.
 """
 
 from __future__ import annotations
@@ -14,14 +13,20 @@ from typing import Any, Final
 
 import numpy as np
 
-from planners.memory.encoder.encoder import Architecture, architecture_of, to_onnx, weight_shapes
+from planners.memory.encoder.encoder import (
+    LARGEST_VALUE,
+    Architecture,
+    architecture_of,
+    embedding_bound,
+    weight_shapes,
+)
 from planners.memory.encoder.training import OBJECTIVES
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans, sweeps_with
 from planners.memory.ranking.inverted_lists import lists_with
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Floats32
 from planners.world.geometry.occupancy import GRID, Bits
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
@@ -34,14 +39,14 @@ from storage.places.run_folder import checked_name
 
 _KIND: Final = "memory"
 _WEIGHTS: Final = "encoder.safetensors"
-_ONNX: Final = "encoder.onnx"
 _READOUT: Final = "readout.safetensors"
 _FILES: Final = {
-    _WEIGHTS, _ONNX, _READOUT,
+    _WEIGHTS, _READOUT,
     "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy", "boxes.npy",
 }  # fmt: skip
 SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes take 10 MB
 _LISTS: Final = "lists.safetensors"  # only in a memory of very many plans
+_UNREAD: Final = "encoder.onnx"  # earlier versions wrote it for other programs
 
 
 def save_memory(folder: Path, memory: Memory) -> None:
@@ -55,7 +60,6 @@ def save_memory(folder: Path, memory: Memory) -> None:
     }
     files: Files = {
         _WEIGHTS: packed(memory.weights),
-        _ONNX: to_onnx(memory.weights),
         _READOUT: packed({"centroids": memory.centroids, "vectors": memory.vectors, "biases": memory.biases}),
         "states.npy": plans.states,
         "controls.npy": plans.controls,
@@ -84,8 +88,8 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
-        if files.keys() - {_LISTS} != _FILES:
-            different = ", ".join(sorted((files.keys() - {_LISTS}) ^ _FILES))
+        if files.keys() - {_LISTS, _UNREAD} != _FILES:
+            different = ", ".join(sorted((files.keys() - {_LISTS, _UNREAD}) ^ _FILES))
             raise ValueError(f"missing or too many: {different}")
         weights, readout = unpacked(files[_WEIGHTS]), unpacked(files[_READOUT])
         architecture = architecture_of(weights)
@@ -95,6 +99,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         rows = (len(plans) + 1, architecture.dimensions)
         check_floats(weights, weight_shapes(architecture))
         check_floats(readout, {"centroids": rows, "vectors": rows, "biases": rows[:1]})
+        _check_scores(readout["vectors"], embedding_bound(weights))
         masks = array_of(files["masks.npy"], "<u8", (GRID,))
         rows_of_lists = {"vectors": readout["vectors"], "biases": readout["biases"]}
         return Memory(
@@ -143,6 +148,13 @@ def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) ->
         if not (same and np.array_equal(masks[some], masks_of(again))):
             raise ValueError("its swept boxes or cells are not those of its plans")
     return sweeps
+
+
+def _check_scores(vectors: Floats32, largest: float) -> None:
+    """Raise ValueError if ``vectors [n, D]`` times embeddings of entries up to ``largest`` could overflow."""
+    greatest = max(float(vectors.max()), -float(vectors.min()))
+    if not greatest * largest * vectors.shape[1] <= LARGEST_VALUE:
+        raise ValueError("the vectors of its readout are so large that scores could overflow")
 
 
 def _objective(value: object) -> str:

@@ -199,10 +199,10 @@ def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
     done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
     assert (done.returncode, done.stderr) == (0, "")
     assert "612 attempts made again" in done.stdout
-    damaged = run.memory("trap") / "encoder.onnx"
+    damaged = run.memory("trap") / "encoder.safetensors"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
     done = subprocess.run(
         [*asked[:-3], "0", *asked[-2:]], capture_output=True, text=True, cwd=ROOT, timeout=200
     )
     assert done.returncode == 1
-    assert "encoder.onnx is damaged" in done.stderr
+    assert "encoder.safetensors is damaged" in done.stderr

@@ -23,6 +23,7 @@ Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ...,
 PATCH = 4  # cells a side, and stride, of the first convolution; the others are 3x3
 PRELU_SLOPE = 0.25  # initial (He et al. 2015)
 OPSET = 17
+LARGEST_VALUE = 1e20  # in the network; float32 ends at 3e38, bounds of trained ones are some 1e5
 IR_VERSION = 9  # the oldest that has the opset, so that old runtimes can read it
 
 
@@ -103,6 +104,29 @@ def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
         sum(name.startswith(kind) for name in names) for kind in ("convolution.", "linear.")
     )
     return convolutions, linears
+
+
+def embedding_bound(weights: Weights) -> float:
+    """Bound the entries of an embedding, whatever the grid, by the largest weights of each layer.
+
+    Raises ValueError if the weights are not finite, or so large that a value in the network could exceed
+    ``LARGEST_VALUE``.
+    """
+
+    def magnitude(name: str) -> float:
+        return max(float(weights[name].max()), -float(weights[name].min()))
+
+    convolutions, linears = layer_counts(weights)
+    layers = [f"convolution.{i}" for i in range(convolutions)] + [f"linear.{i}" for i in range(linears)]
+    bound = 1.0  # of a cell
+    for name in layers:
+        inputs = weights[f"{name}.weight"][0].size
+        bound = bound * inputs * magnitude(f"{name}.weight") + magnitude(f"{name}.bias")
+        if f"{name}.slope" in weights:
+            bound *= max(1.0, magnitude(f"{name}.slope"))
+        if not bound <= LARGEST_VALUE:
+            raise ValueError(f"the weights of {name} are so large that the encoder could overflow")
+    return bound
 
 
 def to_onnx(weights: Weights) -> bytes:

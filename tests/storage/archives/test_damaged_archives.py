@@ -29,7 +29,6 @@ from tests.storage.samples import a_memory
 FILES = (
     "memory.json",
     "encoder.safetensors",
-    "encoder.onnx",
     "readout.safetensors",
     "states.npy",
     "controls.npy",
@@ -110,6 +109,14 @@ def test_a_file_that_is_missing_renamed_longer_or_not_plain_is_refused(archive: 
     file.rmdir()
     file.write_bytes(elsewhere.read_bytes() + b"\n")
     assert name in refusal(archive)
+
+
+def test_the_onnx_file_that_earlier_versions_wrote_is_left_unread(archive: Path) -> None:
+    (archive / "encoder.onnx").write_bytes(b"x")
+    assert "encoder.onnx" in refusal(archive)
+    sign(archive)
+    save_memory(archive, load_memory(archive))
+    assert not (archive / "encoder.onnx").exists()
 
 
 def test_any_two_files_swapped_are_refused(archive: Path) -> None:
@@ -299,8 +306,7 @@ def test_loading_runs_no_code_and_imports_nothing_from_an_archive(whole: Path, t
             shutil.copytree(folder, tmp_path / f"{folder.name}-signed")
             (tmp_path / f"{folder.name}-signed" / "storage.py").unlink()
             sign(tmp_path / f"{folder.name}-signed")
-            if name != "encoder.onnx":  # which nobody here looks into
-                folders += [tmp_path / f"{folder.name}-signed"]
+            folders += [tmp_path / f"{folder.name}-signed"]
     done = subprocess.run(
         [sys.executable, "-c", PROBE, str(whole), *map(str, folders)],
         capture_output=True,

@@ -131,6 +131,25 @@ def test_the_sweeps_of_another_memory_are_refused(archives: Path, tmp_path: Path
         assert "are not those of its plans" in refusal(folder)
 
 
+@pytest.mark.parametrize("name", sorted(WEIGHTS))
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 3e38, -1e37])
+def test_weights_with_which_an_embedding_could_overflow_are_refused(
+    archives: Path, name: str, value: float
+) -> None:
+    weights = np.full_like(WEIGHTS[name], value)
+    change_tensors(archives / "memory", "encoder.safetensors", {name: weights})
+    assert "weights" in refusal(archives / "memory")
+    change_tensors(archives / "encoder", "tensors.safetensors", {f"weights.{name}": weights})
+    assert "weights" in refusal(archives / "encoder")
+
+
+@pytest.mark.parametrize("value", [np.inf, 3e38])
+def test_a_readout_whose_scores_could_overflow_is_refused(archives: Path, value: float) -> None:
+    vectors = np.full((4, 4), value, np.float32)
+    change_tensors(archives / "memory", "readout.safetensors", {"vectors": vectors})
+    assert "vectors" in refusal(archives / "memory")
+
+
 @pytest.mark.parametrize("vehicle", [DIFFERENTIAL_DRIVE, CAR_2_TRAILERS])
 def test_the_sweeps_of_every_vehicle_are_its_own(tmp_path: Path, vehicle: Any) -> None:
     memory = a_memory(3, vehicle=vehicle)

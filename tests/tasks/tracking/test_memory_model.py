@@ -126,7 +126,7 @@ def test_a_logged_memory_that_was_damaged_is_refused(at_home: dict[str, str]) ->
 
 def test_nothing_of_a_logged_memory_is_pickled(logged: dict[str, str]) -> None:
     endings = {file.suffix for file in Path(logged["data"], "mlartifacts").rglob("*") if file.is_file()}
-    assert endings <= {".npy", ".safetensors", ".onnx", ".json", ".py", ".txt", ".yaml", ""}
+    assert endings <= {".npy", ".safetensors", ".json", ".py", ".txt", ".yaml", ""}
     code = list(Path(logged["data"], "mlartifacts").rglob("*.py"))
     assert [file.name for file in code] == ["memory_model_code.py"]
 
