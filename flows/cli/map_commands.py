@@ -100,6 +100,6 @@ def route(
     from tasks.requests.drive_route import drive_route
     from tasks.requests.import_worlds import import_settings
 
-    assistant = Assistant(*options.settings(assist or ("fresh" if options.memory is None else "repair")))
+    assistant = Assistant(*options.settings(assist, without_memory="fresh"))
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))
     drive_route(path, format, begin, end, assistant, settings, out, picture)

@@ -19,7 +19,7 @@ _USUAL: Final = SolveOptions()
 def plan(
     problem: Path,
     *,
-    assist: str = "none",
+    assist: str | None = None,
     improve_seconds: float = 0.0,
     explain: Annotated[bool, Parameter(negative=())] = False,
     out: Path | None = None,
@@ -34,7 +34,8 @@ def plan(
     problem
         A .json, .jsonl or .parquet file with one problem.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
+        with a memory, none without.
     improve_seconds
         Seconds to improve the plan; 0 keeps the first plan.
     explain
@@ -99,7 +100,7 @@ def optimise(
 def solve(
     problems: Path,
     *,
-    assist: str = "none",
+    assist: str | None = None,
     improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
@@ -114,7 +115,8 @@ def solve(
     problems
         A .json, .jsonl or .parquet file.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory.
+        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
+        with a memory, none without.
     improve_seconds
         Seconds to improve the plan; 0 keeps the first plan.
     out

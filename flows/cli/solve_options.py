@@ -40,13 +40,19 @@ class SolveOptions:
     vehicle: str = "car"
     seed: int = 1
 
-    def settings(self, assist: str, improve_seconds: float = 0.0) -> AssistantSettings:
-        """These options as the settings of an assistant, with an assist."""
+    def settings(
+        self, assist: str | None, improve_seconds: float = 0.0, without_memory: str = "none"
+    ) -> AssistantSettings:
+        """These options as the settings of an assistant.
+
+        ``assist``: its name, or None for repair with a memory and ``without_memory`` without one.
+        ``improve_seconds``: how long to improve each plan.
+        """
         from tasks.requests.assistant import AssistantSettings
 
         return AssistantSettings(
             self.planner,
-            assist,
+            assist or (without_memory if self.memory is None else "repair"),
             self.top_k,
             self.memory,
             self.seed,

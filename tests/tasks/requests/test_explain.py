@@ -19,6 +19,7 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.archives.memories import save_memory
 from storage.exchange.problems import write_problems
+from storage.tables.attempts import read_attempts
 from tests.planners.memories import memory_of
 from tests.worlds import box, problem_of, strewn
 
@@ -72,3 +73,20 @@ def test_the_command_tells_and_draws_it(
     assert marked.read_bytes() != plain.read_bytes()
     assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
     assert "no memory" in capsys.readouterr().out
+
+
+def test_a_memory_that_is_given_is_used_whether_an_assist_is_named_or_not(
+    memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_memory(tmp_path / "memory", memory)
+    write_problems(tmp_path / "wall.json", [WALL])
+    plan = ["plan", str(tmp_path / "wall.json"), "--explain"]
+    solve_all = ["solve", str(tmp_path / "wall.json"), "--out", str(tmp_path / "rows.parquet")]
+    assert call([*plan, "--memory", str(tmp_path / "memory")]) == 0
+    assert "of 6 plans of test" in capsys.readouterr().out
+    assert call([*solve_all, "--memory", str(tmp_path / "memory")]) == 0
+    assert read_attempts(tmp_path / "rows.parquet")["assist"].tolist() == ["repair"]
+    capsys.readouterr()
+    for command in (plan, solve_all):
+        assert call([*command, "--memory", str(tmp_path / "nowhere")]) == 1
+        assert capsys.readouterr().err.count("\n") == 1
