@@ -47,8 +47,10 @@ for command in (
 
 def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; a failure prints one line to the error stream."""
+    arguments = sys.argv[1:] if arguments is None else arguments
     debug = os.environ.get("MOTION_MEMORY_DEBUG") == "1"
     try:
+        _refuse_null_characters(arguments)
         app(
             arguments,
             exit_on_error=False,
@@ -65,6 +67,15 @@ def call(arguments: Sequence[str] | None = None) -> int:
         print(f"motion-memory: {_one_line(error)}", file=sys.stderr)
         return WRONG_USE if _is_wrong_use(error) else FAILURE
     return 0
+
+
+def _refuse_null_characters(arguments: Sequence[str]) -> None:
+    """Raise UsageError if an argument holds a null character, at which the system's paths end."""
+    for argument in arguments:
+        if "\0" in argument:
+            from tasks.settings.errors import UsageError
+
+            raise UsageError(f"{argument!r} holds a null character, which no path or name can; leave it out.")
 
 
 def _is_wrong_use(error: Exception) -> bool:

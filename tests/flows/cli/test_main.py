@@ -52,6 +52,8 @@ COMMANDS = (
         (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
         (["plan", "p.json"], 1, "p.json does not exist"),
+        (["plan", "a\0.json"], 2, "'a\\x00.json' holds a null character"),
+        (["solve", "p.json", "--out", "a\0.parquet"], 2, "'a\\x00.parquet' holds a null character"),
         (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),
         (["optimise", "p.json", "--planner", "prm"], 2, "Unknown planner 'prm'. Known: rrt, gust, follow."),
         (["optimise", "p.json", "--clearance-weight", "-1"], 2, "Clearance weight -1.0"),
