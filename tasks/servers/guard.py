@@ -31,7 +31,13 @@ class Guard:
     was made to point at this machine.
     """
 
-    def __init__(self, app: ASGIApp, secret: str | None = None, names: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        secret: str | None = None,
+        names: Collection[str] = (),
+        closed: Collection[str] = (),
+    ) -> None:
         """Guard an ASGI application.
 
         Parameters
@@ -42,11 +48,14 @@ class Guard:
             The ``user:password`` to ask for (HTTP Basic); None asks for none.
         names
             Names by which clients may call the server, besides its address.
+        closed
+            Paths that nobody gets an answer from.
 
         """
         self._app = app
         self._credentials = None if secret is None else base64.b64encode(secret.encode())
         self._names = {_address(name) for name in names}
+        self._closed = frozenset(closed)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass on a request or a websocket, or refuse it with one line."""
@@ -74,6 +83,8 @@ class Guard:
             refusal = _refusing(401, "UNAUTHENTICATED", "Give user and password (HTTP Basic).")
             refusal.headers["WWW-Authenticate"] = 'Basic realm="motion-memory"'
             return refusal
+        if scope["path"].rstrip("/") in self._closed:
+            return _refusing(404, "NOT_FOUND", "This server has no such page.")
         return None
 
     def _is_own(self, host: str, scope: Scope) -> bool:

@@ -72,7 +72,9 @@ def end_with_parent() -> None:
     threading.Thread(target=wait_and_exit, daemon=True).start()
 
 
-def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
+def config_of(
+    app: Callable[[], Any], workers: int = 1, log_level: str = "warning", stop_seconds: int = STOP_SECONDS
+) -> Config:
     """The configuration of Uvicorn for an application, with our bounds on connections (``TimedProtocol``).
 
     This also lets the process open as many files as its connections need.
@@ -83,23 +85,29 @@ def config_of(app: Callable[[], Any], workers: int = 1) -> Config:
         Makes the ASGI application; with several workers it must be importable.
     workers
         The number of worker processes.
+    log_level
+        The least important messages of Uvicorn that are printed.
+    stop_seconds
+        How long requests that are being answered at the end may take.
 
     """
     from uvicorn import Config
 
-    from tasks.servers.connections import IDLE_SECONDS, TimedProtocol, allow_files
+    from tasks.servers.connections import IDLE_SECONDS, TimedProtocol, TimedSocket, allow_files, backlog
 
     allow_files()
     return Config(
         app,
         factory=True,
         workers=workers,
-        log_level="warning",
+        log_level=log_level,
         access_log=False,
         server_header=False,
         http=TimedProtocol,
+        ws=TimedSocket,
+        backlog=backlog(),
         timeout_keep_alive=int(IDLE_SECONDS),
-        timeout_graceful_shutdown=STOP_SECONDS,
+        timeout_graceful_shutdown=stop_seconds,
         timeout_worker_healthcheck=HEALTH_SECONDS,
     )
 

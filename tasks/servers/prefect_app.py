@@ -12,35 +12,55 @@ import socket
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Final
 
 from tasks.servers.access import hosts
 from tasks.servers.guard import Guard
+from tasks.servers.listening import config_of
 from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL
+from tasks.servers.sockets import Sockets
 from tasks.servers.users import is_used, locked
+
+# Pages of FastAPI that describe the server to whoever asks; Prefect's own page does not need them.
+DESCRIPTIONS: Final = ("/docs", "/docs/oauth2-redirect", "/openapi.json", "/redoc")
 
 
 def prefect_app() -> Guard:
-    """Prefect's server behind the guard; it checks the password in PREFECT_SERVER_API_AUTH_STRING itself."""
-    from prefect.server.api.server import create_app
+    """Prefect's server behind the guard; requests need the password in PREFECT_SERVER_API_AUTH_STRING.
 
-    return Guard(create_app(), names=hosts())
+    Prefect checks the password of requests itself, once it has begun to work for them; that of websockets is
+    checked before.
+    """
+    from prefect.server.api.server import create_app
+    from prefect.settings import get_current_settings
+
+    secret = get_current_settings().server.api.auth_string
+    app = create_app()
+    proven = app if secret is None else Sockets(app, secret.get_secret_value())
+    return Guard(proven, names=hosts(), closed=DESCRIPTIONS)
+
+
+def wait_until_unused(folder: Path) -> None:
+    """Return when no command uses the server of ``folder``; its address and its password are removed then."""
+    while True:
+        time.sleep(POLL_SECONDS)
+        with suppress(OSError), locked(folder):  # no more files can be opened now, but soon they can
+            if not is_used(folder):
+                for name in (URL, SECRET):  # the next command starts another server
+                    (folder / name).unlink(missing_ok=True)
+                return
 
 
 def _serve(folder: Path, listener: socket.socket) -> None:
     """Serve until no command uses the server."""
-    from uvicorn import Config, Server
+    from uvicorn import Server
 
-    server = Server(Config(prefect_app, factory=True, log_level="error", timeout_graceful_shutdown=1))
+    server = Server(config_of(prefect_app, log_level="error", stop_seconds=1))
 
     def stop_when_unused() -> None:
-        while True:
-            time.sleep(POLL_SECONDS)
-            with locked(folder):
-                if not is_used(folder):
-                    for name in (URL, SECRET):  # the next command starts another server
-                        (folder / name).unlink(missing_ok=True)
-                    break
+        wait_until_unused(folder)
         server.should_exit = True
         time.sleep(STOP_SECONDS)
         os._exit(0)

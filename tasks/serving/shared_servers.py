@@ -7,6 +7,7 @@ Prefect's records decides what its clients run, so these servers always need a p
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import multiprocessing
 import os
@@ -15,10 +16,13 @@ import signal
 import socket
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
+
+from starlette.exceptions import StarletteDeprecationWarning
 
 from storage.places.data_folder import DataFolder, open_data_folder
 from tasks.servers.access import AUTH, access, auth, check_address, hosts, new_secret
@@ -50,15 +54,16 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     UsageError
         The address is malformed or not protected.
     RunError
-        A port cannot be used, or a server ended.
+        Servers run already for the folder, a port cannot be used, or a server ended.
 
     """
     check_address(host)
     folder = open_data_folder(data)
     with (
-        password_set(folder) as access_line,
+        only_servers(folder),
         bound(host, prefect_port) as prefect_socket,
         bound(host, mlflow_port) as mlflow_socket,
+        password_set(folder) as access_line,  # last: a command that fails before leaves others' file as it is
     ):
         set_environment(folder.path)
         apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
@@ -72,6 +77,19 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
             print(f"MLflow   {address_of(mlflow_socket)}  MLFLOW_TRACKING_URI={healthy[1]}")
             print(f"access   {access_line}; Ctrl-C stops", flush=True)
             wait(lambda: False, float("inf"))
+
+
+@contextmanager
+def only_servers(folder: DataFolder) -> Iterator[None]:
+    """Keep other ``servers`` commands off a data folder. Raises RunError if one runs for it."""
+    with (folder.path / "servers.lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RunError(
+                f"Servers run already for {folder.path}; stop them first, or give another --data."
+            ) from None
+        yield
 
 
 @contextmanager
@@ -107,7 +125,11 @@ def mlflow_app(data: DataFolder) -> Guard:
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
         "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # would start ten processes that nobody needs
     }
-    from mlflow.server.fastapi_app import app
+    with (
+        warnings.catch_warnings()
+    ):  # about a part of Starlette that MLflow uses; users can do nothing about it
+        warnings.filterwarnings("ignore", category=StarletteDeprecationWarning)
+        from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores
 
     initialize_backend_stores(store, store, root)

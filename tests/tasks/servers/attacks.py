@@ -57,11 +57,17 @@ def evil_page() -> Iterator[str]:
 
 def websocket_status(url: str, headers: Mapping[str, str]) -> int:
     """The status with which a websocket's handshake is answered; 101: it is open."""
+    with open_websocket(url, headers) as connection:
+        return int(connection.recv(1000).split()[1])
+
+
+def open_websocket(url: str, headers: Mapping[str, str]) -> socket.socket:
+    """A connection over which the handshake of a websocket was sent, and nothing else."""
     address = urlsplit(url)
     sent = {"Host": address.netloc, "Upgrade": "websocket", "Connection": "Upgrade"} | dict(headers)
     sent |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
     sent |= {"Sec-WebSocket-Protocol": "prefect"}
     lines = [f"GET {address.path} HTTP/1.1", *(f"{name}: {value}" for name, value in sent.items())]
-    with socket.create_connection((address.hostname, address.port), timeout=10) as connection:
-        connection.sendall("\r\n".join([*lines, "", ""]).encode())
-        return int(connection.recv(1000).split()[1])
+    connection = socket.create_connection((address.hostname, address.port), timeout=10)
+    connection.sendall("\r\n".join([*lines, "", ""]).encode())
+    return connection

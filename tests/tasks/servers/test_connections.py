@@ -21,11 +21,22 @@ MOST = 60
 SILENT = 300
 SHORT = 0.5  # seconds
 Address = tuple[str, int]
+sent: list[bytes] = []  # answers to /parts that the application has finished
 
 
 async def app(scope: Any, receive: Any, send: Any) -> None:
-    """Answer with what was sent: /slow in a while, /rude without reading it, /large in megabytes."""
+    """Answer with what was sent: /slow in a while, /rude without reading it, /large in megabytes.
+
+    /parts sends megabytes bit by bit, and /sent says whether that has ended.
+    """
     if scope["type"] != "http":
+        return
+    if scope["path"] == "/parts":
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        for _ in range(50):
+            await send({"type": "http.response.body", "body": bytes(100_000), "more_body": True})
+        sent.append(b"all")
+        await send({"type": "http.response.body"})
         return
     body, more = b"", scope["path"] != "/rude"
     while more:
@@ -33,6 +44,7 @@ async def app(scope: Any, receive: Any, send: Any) -> None:
         body += message.get("body", b"")
         more = message.get("more_body", False)
     body *= 10_000_000 if scope["path"] == "/large" else 1
+    body = sent.pop() if scope["path"] == "/sent" and sent else body
     if scope["path"] == "/slow":
         await asyncio.sleep(3 * SHORT)
     headers = [(b"content-length", str(len(body)).encode())]
@@ -186,6 +198,35 @@ def test_an_answer_is_not_cut_off_while_it_is_read(hurried: Address) -> None:
             while more := len(connection.recv(400_000)):
                 read += more
         assert read < 10_000_000
+
+
+def test_answers_that_nobody_reads_do_not_pile_up(patient: Address, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "MOST_UNREAD", 50_000_000)
+    ask = b"POST /large HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\n\r\n1"
+    with ExitStack() as stack:
+        readers = [stack.enter_context(socket.create_connection(patient)) for _ in range(20)]
+        for reader in readers:
+            reader.sendall(2 * ask)  # the second answer waits for the first one to be read
+            assert reader.recv(12) == b"HTTP/1.1 200"
+            assert len(httpx.post("http://{}:{}/large".format(*patient), content=b"1").content) == 10_000_000
+        got = []
+        for reader in readers:
+            reader.settimeout(20 * SHORT)
+            size = 0
+            with suppress(ConnectionError):
+                while size < 20_000_000 and (more := len(reader.recv(1_000_000))):
+                    size += more
+            got.append(size)
+        assert sum(size > 10_000_000 for size in got) <= 5
+        assert got[-1] > 20_000_000 - 1_000
+
+
+def test_slow_readers_keep_no_application_waiting(patient: Address) -> None:
+    with socket.create_connection(patient) as reader:
+        reader.sendall(b"GET /parts HTTP/1.1\r\nHost: x\r\n\r\n")
+        assert reader.recv(12) == b"HTTP/1.1 200"
+        time.sleep(SHORT)
+        assert httpx.get("http://{}:{}/sent".format(*patient)).content == b"all"
 
 
 def test_a_request_that_takes_longer_to_answer_is_answered(hurried: Address) -> None:

@@ -27,6 +27,7 @@ def request(
     *,
     secret: str | None = None,
     names: Collection[str] = (),
+    closed: Collection[str] = (),
     at: str = "127.0.0.1:4200",
     **options: Any,
 ) -> httpx.Response:
@@ -39,7 +40,7 @@ def request(
     app = Starlette(routes=[Route("/{path:path}", inside, methods=METHODS)], middleware=[everybody])
 
     async def ask() -> httpx.Response:
-        transport = httpx.ASGITransport(Guard(app, secret, names))
+        transport = httpx.ASGITransport(Guard(app, secret, names, closed))
         async with httpx.AsyncClient(transport=transport, base_url=f"http://{at}") as client:
             return await client.request(method, path, **options)
 
@@ -145,3 +146,9 @@ def test_a_websocket_is_closed_before_it_opens(secret: str | None, headers: dict
     scope = {"type": "websocket", "path": "/ping", "headers": fields, "server": ("127.0.0.1", 80)}
     asyncio.run(Guard(Starlette(), secret)(scope, None, send))  # type: ignore[arg-type]
     assert sent == [{"type": "websocket.close", "code": 1008}]
+
+
+def test_closed_paths_are_not_there_for_anybody() -> None:
+    for path in ("/docs", "/docs/", "/%64ocs"):
+        assert request("GET", path, closed=("/docs",)).status_code == 404
+    assert request("GET", "/docs/x", closed=("/docs",)).text == "inside"

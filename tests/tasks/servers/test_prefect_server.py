@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import socket
 import stat
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import AbstractContextManager, ExitStack, suppress
 from pathlib import Path
 
 import httpx
@@ -18,10 +20,20 @@ from selenium.webdriver import Keys
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from tasks.servers.prefect_server import RESTARTS, local_server, running_server, set_environment
-from tasks.servers.users import is_held
+from tasks.servers import prefect_app
+from tasks.servers.connections import allow_files
+from tasks.servers.prefect_server import (
+    LOG,
+    RESTARTS,
+    SECRET,
+    is_healthy,
+    local_server,
+    running_server,
+    set_environment,
+)
+from tasks.servers.users import is_held, locked
 from tests.dashboards.web.browser import CHROMIUM, DRIVER, browser
-from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, websocket_status
+from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, open_websocket, websocket_status
 
 HOLD = """
 import os, sys, time
@@ -32,6 +44,8 @@ with local_server(Path(sys.argv[1])) as server:
     print(server.url, flush=True)
     time.sleep(240)
 """
+SILENT = 1_100  # connections, more than the server may have files
+SLOTS = 100  # of Prefect's server on SQLite
 ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")} | {
     "PYTHONPATH": str(ROOT)
@@ -204,6 +218,52 @@ def test_a_server_that_does_not_stay_ends_its_command_in_one_line(tmp_path: Path
     assert len(told) == 1 + RESTARTS
     assert str(tmp_path / "prefect" / "server.log") in told[-1]
     assert "Traceback" not in str(told)
+
+
+def test_neither_silent_connections_nor_few_files_keep_a_server_from_answering_and_ending(
+    tmp_path: Path,
+) -> None:
+    limited = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (1024, 1024))\n{HOLD}"
+    command = [sys.executable, "-c", limited, str(tmp_path)]
+    allow_files()
+    with ExitStack() as stack, subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE) as user:
+        try:
+            assert user.stdout
+            user.stdout.readline()
+            server = running_server(tmp_path)
+            assert server is not None
+            server.wait()
+            for _ in range(SILENT):
+                stack.enter_context(socket.create_connection(("127.0.0.1", server.port), timeout=20))
+            assert is_healthy(server.url)
+            for _ in range(SLOTS + 20):  # Prefect works for so many requests and websockets at once
+                stack.enter_context(open_websocket(f"{server.url}/events/in", {}))
+            user_name, _, password = server.secret.partition(":")
+            assert httpx.get(f"{server.url}/version", auth=(user_name, password)).status_code == 200
+        finally:
+            user.kill()
+        deadline = time.monotonic() + 10.0
+        while server.secret_file.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not server.secret_file.exists()
+    assert (tmp_path / "prefect" / LOG).stat().st_size < 10_000
+
+
+def test_a_server_ends_even_if_it_cannot_open_files_for_a_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tries = iter([OSError(errno.EMFILE, "Too many open files"), locked(tmp_path)])
+
+    def opened(_: Path) -> AbstractContextManager[None]:
+        found = next(tries)
+        if isinstance(found, OSError):
+            raise found
+        return found
+
+    monkeypatch.setattr(prefect_app, "locked", opened)
+    (tmp_path / SECRET).write_text("robot:old")
+    prefect_app.wait_until_unused(tmp_path)
+    assert not (tmp_path / SECRET).exists()
 
 
 def _command_lines() -> dict[psutil.Process, str]:
