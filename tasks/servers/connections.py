@@ -37,7 +37,7 @@ def files_allowed() -> int:
 
 def backlog() -> int:
     """How many connections to accept at once: so few that the bounds act before files run out."""
-    return min(MOST, files_allowed()) // 16
+    return min(2_048, files_allowed() // 16)
 
 
 def allow_files() -> None:
