@@ -29,6 +29,7 @@ _LEGEND_LINE: Final = 0.55  # inches of an entry beside its label
 _LEGEND_HEIGHT: Final = 0.2  # inches of a line of entries
 _LEGEND_LETTER: Final = 0.075  # inches
 _DPI: Final = 160
+_TITLE_LETTERS_AN_INCH: Final = 8.8  # bold, at the size of a title
 _NOTE_LETTERS_AN_INCH: Final = 16.5  # at _NOTE_SIZE, with room to spare
 
 # Identifiers in an SVG are drawn from this instead of the clock: the same rows give the same file.
@@ -36,12 +37,13 @@ matplotlib.rcParams["svg.hashsalt"] = "motion-memory"
 
 
 def new_figure(width: float, height: float, title: str, note: str = "") -> Figure:
-    """An empty figure of ``width`` by ``height`` inches with a ``title`` above and a wrapped ``note`` below.
+    """An empty figure of ``width`` by ``height`` inches with a ``title`` above and a ``note`` below, wrapped.
 
     It belongs to no window system and no global list of figures, so any thread may draw it.
     """
     figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
     figure.get_layout_engine().set(w_pad=0.08, h_pad=0.08, wspace=0.03, hspace=0.05)  # type: ignore[union-attr, call-arg]
+    title = textwrap.fill(title, int(_TITLE_LETTERS_AN_INCH * (width - 0.2)))
     figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold", color=INK)
     if note:
         letters = int(_NOTE_LETTERS_AN_INCH * (width - 0.2))

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import io
 import re
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from dashboards.figures.planning_curves import (
     solved_against_time,
 )
 from dashboards.figures.recall_curves import retrieval_curves, training_curves
-from dashboards.figures.style import save
+from dashboards.figures.style import new_figure, save
 from dashboards.statistics import distributions
 from dashboards.statistics.panels import COMBINED, summarise, summarise_continual
 from dashboards.statistics.retrieval_rates import retrieval_curve
@@ -34,6 +35,15 @@ BARS = STANDARD[:5]
 def texts(figure: Figure) -> list[str]:
     figure.draw_without_rendering()
     return [found.get_text() for found in figure.findobj(Text) if found.get_visible()]
+
+
+@pytest.mark.parametrize("inches", [3.0, 5.2, 8.0, 12.0])
+def test_a_title_is_never_cut_off(inches: float) -> None:
+    title = "Mean planning time with the best recall and repair, beside a control"
+    figure = new_figure(inches, 4.0, title)
+    figure.savefig(io.BytesIO(), format="png")
+    (drawn,) = (text for text in figure.findobj(Text) if text.get_text().split() == title.split())
+    assert drawn.get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_four_memories_and_three_planners_are_twelve_panels_of_five_bars() -> None:
