@@ -229,7 +229,7 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
                     done[i] = done_before
                     units_done += sizes[i]
             ended = [i for i, future in pending.items() if future.wrapped_future.done()]
-            lost = [i for i in ended if pending[i].wrapped_future.status in LOST]
+            lost = [i for i in ended if _is_lost(pending[i].wrapped_future)]
             if lost:
                 losses += 1
                 _wait_for_scheduler(pending[lost[0]].wrapped_future.client, losses)
@@ -247,6 +247,16 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
             time.sleep(POLL_SECONDS)
     record_load(job.title, [piece.work for piece in done.values() if piece.work is not None])
     return [done[i].result for i in range(len(pieces))]
+
+
+def _is_lost(future: Any) -> bool:
+    """Whether what a chunk told went away, with its scheduler or on the way from its worker."""
+    if future.status == "finished":
+        try:
+            future.result()  # a chunk that failed tells so: only the connection raises here
+        except OSError:
+            return True
+    return future.status in LOST
 
 
 def _wait_for_scheduler(client: Any, losses: int) -> None:

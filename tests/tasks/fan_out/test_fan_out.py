@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import dask
 import pytest
@@ -103,3 +104,21 @@ def test_a_worker_that_dies_while_it_starts_ends_the_command_in_one_line(
     monkeypatch.setattr(fan_out, "LocalCluster", dies)
     with pytest.raises(RunError, match="worker process ended"), fan_out.cluster(1):
         pass
+
+
+@pytest.mark.parametrize(
+    ("status", "fetched", "lost"),
+    [
+        ("finished", None, False),
+        ("finished", ConnectionResetError("closed"), True),
+        ("cancelled", None, True),
+        ("lost", None, True),
+        ("error", None, False),
+    ],
+)
+def test_a_result_that_is_lost_on_its_way_counts_as_not_done(
+    status: str, fetched: Exception | None, lost: bool
+) -> None:
+    future = Mock(status=status)
+    future.result.side_effect = fetched
+    assert fan_out._is_lost(future) == lost
