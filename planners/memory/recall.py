@@ -31,7 +31,7 @@ RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")
 CANDIDATES: Final = 256  # plans that the encoder picks for hybrid
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
 TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
-CHECKED_EARLY: Final = 64  # of these, the least blocked: if they are blocked, the others mostly are, too
+CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the others mostly are, too
 CHECKED_DRAWN: Final = 32  # plans checked from the drawing; if all are blocked, a planner will need the scene
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
 LIKELY_CELLS: Final = 16  # blocked cells: of plans with more, one in a hundred is free
@@ -84,20 +84,23 @@ def recall(
         if early.free >= 0:
             return early
         spent = early.checks
-    most = {"mask": k, "hybrid": candidates, "exhaustive": count}.get(strategy, k)
     worth = likely = count  # how many of the ranked plans may be returned, and how many are likely to be free
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "centroid":
         order = by_encoder(memory, view, k)
     elif not as_stored:
-        order = by_encoder(memory, view, most, never_none=True)
+        most = {"mask": k, "hybrid": candidates, "exhaustive": count}[strategy]
+        order, likely = by_encoder(memory, view, most, never_none=True), max(k, CHECKED_EARLY)
     else:
         narrowed = strategy == "hybrid" and candidates < count
         among = by_encoder(memory, view, candidates, never_none=True) if narrowed else None
         order, ends = by_cells(memory, view, among)
-        worth, likely = int(ends[WORTH_CELLS]), int(ends[LIKELY_CELLS])
-        order = order[: min(most, worth) if strategy == "mask" else most]
+        worth = int(ends[WORTH_CELLS])
+        if strategy == "mask":
+            order = order[: min(k, worth)]
+        else:
+            likely = int(ends[LIKELY_CELLS])
     tries = shortest_first(memory, order, likely)
     view.lap("recall")
     free, checks = first_check(memory, view, tries, as_stored)

@@ -13,7 +13,7 @@ from planners.memory.build_memory import build_memory
 from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.memory.plans.cell_masks import rank_by_cells
-from planners.memory.plans.free import free_plans
+from planners.memory.plans.free import ends_of, first_fitting, free_plans
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
 from planners.memory.ranking.scores import best_plans
 from planners.memory.recall import (
@@ -21,6 +21,7 @@ from planners.memory.recall import (
     MOST_EXHAUSTIVE,
     RECALLS,
     WORTH_CELLS,
+    by_encoder,
     default_recall,
     rank,
     recall,
@@ -137,6 +138,20 @@ def test_of_plans_with_few_blocked_cells_exhaustive_finds_the_one_that_drives_sh
     if likely.any():
         free = recalled_by(memory, problem, "exhaustive", k).free
         assert memory.durations[free] == memory.durations[likely].min()
+
+
+@given(seed=SEEDS, count=st.integers(0, 12))
+def test_for_another_heading_a_free_plan_that_the_encoder_ranks_high_is_the_answer(
+    memory, problem_in, seed, count
+):
+    problem = problem_in(seed, count)
+    problem = dataclasses.replace(problem, start=(*problem.start[:2], problem.start[2] + 0.01))
+    view = View(problem)
+    head = by_encoder(memory, view, 2, never_none=True)
+    with mock.patch("planners.memory.recall.CHECKED_EARLY", 2):
+        found = recalled_by(memory, problem, "exhaustive", 1)
+    if first_fitting(head, memory.sweeps, ends_of(problem), view.scene)[0] >= 0:
+        assert found.free in head
 
 
 @given(seed=SEEDS, k=st.integers(1, 12), count=st.integers(0, 12))
