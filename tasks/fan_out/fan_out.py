@@ -37,6 +37,7 @@ CLOSE_SECONDS: Final = 0.3
 POLL_SECONDS: Final = 0.05
 AHEAD: Final = 200  # chunks submitted at a time: enough for all workers, few enough for any memory
 LOST: Final = ("cancelled", "lost")  # states of a chunk whose scheduler is gone
+GONE: Final = object()  # stands for the state of such a chunk
 LOOK_SECONDS: Final = 1.0  # between two looks at partly done chunks, which read files
 
 Client: Any = distributed.Client  # Dask has no types
@@ -228,17 +229,20 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
                 else:
                     done[i] = done_before
                     units_done += sizes[i]
-            ended = [i for i, future in pending.items() if future.wrapped_future.done()]
-            lost = [i for i in ended if _is_lost(pending[i].wrapped_future)]
+            ended = {
+                i: future.wrapped_future for i, future in pending.items() if future.wrapped_future.done()
+            }
+            states = {i: _state(future) for i, future in ended.items()}
+            lost = [i for i, state in states.items() if state is GONE]
             if lost:
                 losses += 1
-                _wait_for_scheduler(pending[lost[0]].wrapped_future.client, losses)
-            for i in ended:
-                future = pending.pop(i)
-                if i in lost:
+                _wait_for_scheduler(ended[lost[0]].client, losses)
+            for i, state in states.items():
+                del pending[i]
+                if state is GONE:
                     waiting.append(i)
                 else:
-                    done[i] = _result(future, pieces[i], job.title)
+                    done[i] = _result(ended[i], state, pieces[i], job.title)
                     units_done += sizes[i]
             if time.monotonic() - last_look >= LOOK_SECONDS:
                 units_begun = units_done + sum(job.units_done(pieces[i]) for i in pending)
@@ -249,14 +253,20 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
     return [done[i].result for i in range(len(pieces))]
 
 
-def _is_lost(future: Any) -> bool:
-    """Whether what a chunk told went away, with its scheduler or on the way from its worker."""
+def _state(future: Any) -> Any:
+    """Prefect's state of a chunk that has ended.
+
+    ``GONE`` if its result went away, with the scheduler or on its way from the worker; None if Dask gave the
+    chunk up.
+    """
     if future.status == "finished":
         try:
-            future.result()  # a chunk that failed tells so: only the connection raises here
+            return (
+                future.result()
+            )  # it holds the error of a chunk that failed: only the connection raises here
         except OSError:
-            return True
-    return future.status in LOST
+            return GONE
+    return GONE if future.status in LOST else None
 
 
 def _wait_for_scheduler(client: Any, losses: int) -> None:
@@ -270,11 +280,10 @@ def _wait_for_scheduler(client: Any, losses: int) -> None:
         )
 
 
-def _result(future: Any, chunk: Piece, title: str) -> Any:
+def _result(future: Any, state: Any, chunk: Piece, title: str) -> Any:
     where = f"{title}: chunk {chunk.index} of {chunk.class_name}"
-    dask_future = future.wrapped_future
-    if dask_future.status != "finished":
-        cause = dask_future.exception()
+    if state is None:
+        cause = future.exception()
         if isinstance(cause, distributed.KilledWorker):
             killed = cause.allowed_failures + 1
             raise ChunkError(
@@ -282,7 +291,7 @@ def _result(future: Any, chunk: Piece, title: str) -> Any:
             ) from cause
         raise ChunkError(redacted(f"{where} was lost: {cause}")) from cause
     try:
-        return future.result()
+        return state.result(_sync=True)
     except Exception as error:
         reason = str(error).partition("\n")[0]
         raise ChunkError(redacted(f"{where} failed: {reason or type(error).__name__}")) from error

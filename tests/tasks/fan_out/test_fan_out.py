@@ -121,4 +121,4 @@ def test_a_result_that_is_lost_on_its_way_counts_as_not_done(
 ) -> None:
     future = Mock(status=status)
     future.result.side_effect = fetched
-    assert fan_out._is_lost(future) == lost
+    assert (fan_out._state(future) is fan_out.GONE) == lost
