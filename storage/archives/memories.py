@@ -18,6 +18,7 @@ from planners.memory.encoder.encoder import (
     Architecture,
     architecture_of,
     embedding_bound,
+    magnitude,
     weight_shapes,
 )
 from planners.memory.encoder.training import OBJECTIVES
@@ -152,8 +153,7 @@ def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) ->
 
 def _check_scores(vectors: Floats32, largest: float) -> None:
     """Raise ValueError if ``vectors [n, D]`` times embeddings of entries up to ``largest`` could overflow."""
-    greatest = max(float(vectors.max()), -float(vectors.min()))
-    if not greatest * largest * vectors.shape[1] <= LARGEST_VALUE:
+    if not magnitude(vectors) * largest * vectors.shape[1] <= LARGEST_VALUE:
         raise ValueError("the vectors of its readout are so large that scores could overflow")
 
 

@@ -7,7 +7,6 @@ Prefect's records decides what its clients run, so these servers always need a p
 
 from __future__ import annotations
 
-import fcntl
 import functools
 import multiprocessing
 import os
@@ -18,13 +17,15 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from starlette.exceptions import StarletteDeprecationWarning
 
+from storage.errors import InUseError
 from storage.places.data_folder import DataFolder, open_data_folder
+from storage.places.files import locked
 from tasks.servers.access import AUTH, access, auth, check_address, hosts, new_secret
 from tasks.servers.guard import Guard
 from tasks.servers.listening import STOP_SECONDS, address_of, bound, config_of, end_with_parent
@@ -82,10 +83,10 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
 @contextmanager
 def only_servers(folder: DataFolder) -> Iterator[None]:
     """Keep other ``servers`` commands off a data folder. Raises RunError if one runs for it."""
-    with (folder.path / "servers.lock").open("w") as lock:
+    with ExitStack() as stack:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            stack.enter_context(locked(folder.path / "servers.lock", str(folder.path)))
+        except InUseError:
             raise RunError(
                 f"Servers run already for {folder.path}; stop them first, or give another --data."
             ) from None
@@ -125,9 +126,7 @@ def mlflow_app(data: DataFolder) -> Guard:
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
         "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # would start ten processes that nobody needs
     }
-    with (
-        warnings.catch_warnings()
-    ):  # about a part of Starlette that MLflow uses; users can do nothing about it
+    with warnings.catch_warnings():  # of a part of Starlette that MLflow uses, not the user
         warnings.filterwarnings("ignore", category=StarletteDeprecationWarning)
         from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores

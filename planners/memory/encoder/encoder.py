@@ -106,24 +106,25 @@ def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
     return convolutions, linears
 
 
+def magnitude(numbers: Floats32) -> float:
+    """Return the largest absolute value, infinity and NaN included, of an array of any shape."""
+    return max(float(numbers.max()), -float(numbers.min()))
+
+
 def embedding_bound(weights: Weights) -> float:
     """Bound the entries of an embedding, whatever the grid, by the largest weights of each layer.
 
     Raises ValueError if the weights are not finite, or so large that a value in the network could exceed
     ``LARGEST_VALUE``.
     """
-
-    def magnitude(name: str) -> float:
-        return max(float(weights[name].max()), -float(weights[name].min()))
-
     convolutions, linears = layer_counts(weights)
     layers = [f"convolution.{i}" for i in range(convolutions)] + [f"linear.{i}" for i in range(linears)]
     bound = 1.0  # of a cell
     for name in layers:
         inputs = weights[f"{name}.weight"][0].size
-        bound = bound * inputs * magnitude(f"{name}.weight") + magnitude(f"{name}.bias")
+        bound = bound * inputs * magnitude(weights[f"{name}.weight"]) + magnitude(weights[f"{name}.bias"])
         if f"{name}.slope" in weights:
-            bound *= max(1.0, magnitude(f"{name}.slope"))
+            bound *= max(1.0, magnitude(weights[f"{name}.slope"]))
         if not bound <= LARGEST_VALUE:
             raise ValueError(f"the weights of {name} are so large that the encoder could overflow")
     return bound
