@@ -232,7 +232,7 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
 
 
 def _means(values: Floats) -> Floats:
-    """Means ``[C]`` of the numbers in each column of ``values [problems, C]``; NaN where there is none."""
+    """Average each column of ``values [problems, C]`` without its NaN; a column of nothing else gives NaN."""
     there = ~np.isnan(values)
     return ratio(np.where(there, values, 0.0).sum(axis=0), there.sum(axis=0).astype(np.float64))
 

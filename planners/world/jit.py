@@ -102,7 +102,7 @@ def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
     options: Any = {name: on for name, on in _INLINED.items() if name != "no_cfunc_wrapper"}
     overload(interpreted, jit_options=options, strict=False)(compiled)
     _implementations[interpreted] = by_kind
-    declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]
+    declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]  # the parameters are those of the function
     return declared
 
 

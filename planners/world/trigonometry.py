@@ -88,7 +88,7 @@ def angle_to(x: float, y: float) -> float:
 
 @inlined
 def wrapped(angle: float) -> float:
-    """The same angle (radians) between -pi and pi."""
+    """Wrap an angle (radians) to the range from -pi to pi."""
     return angle - 2.0 * math.pi * math.floor(angle * (0.5 / math.pi) + 0.5)
 
 

@@ -131,6 +131,6 @@ def _number(value: object, what: str) -> float:
     try:
         if isinstance(value, bool):
             raise ValueError
-        return float(value)  # type: ignore[arg-type]
+        return float(value)  # type: ignore[arg-type]  # what is no number raises TypeError
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"has {str(value)[:20]!r} as its {what}, expected a number") from None

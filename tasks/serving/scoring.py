@@ -76,7 +76,7 @@ class Scoring:
         try:
             plans = cast("pd.DataFrame", self._model.predict(table, {"top_k": top_k}))
         except MlflowException as error:
-            if error.get_http_status_code() >= 500:  # type: ignore[no-untyped-call]
+            if error.get_http_status_code() >= 500:  # type: ignore[no-untyped-call]  # MLflow's
                 raise
             raise RefusedError(400, str(error.message).rpartition("Error: ")[2]) from None
         return orjson.dumps({"predictions": plans.to_dict("records")})
@@ -119,7 +119,7 @@ class Scoring:
             raise RefusedError(400, f"Send an object with one of {', '.join(FORMATS)}; got {got}.")
         top_k = _top_k(content.get("params"))
         try:
-            schema = self._model.metadata.get_input_schema()  # type: ignore[no-untyped-call]
+            schema = self._model.metadata.get_input_schema()  # type: ignore[no-untyped-call]  # MLflow's
             table = scoring_server.infer_and_parse_data({formats[0]: content[formats[0]]}, schema)
             if not isinstance(table, pd.DataFrame):
                 table = pd.DataFrame(table)

@@ -51,7 +51,7 @@ def _make(path: Path, artifacts: str) -> None:
 
     _remove_leftovers(path)
     with whole_file(path, mode=OWNER_ONLY) as temporary:
-        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]
+        store = SqlAlchemyStore(f"sqlite:///{temporary}", artifacts)  # type: ignore[no-untyped-call]  # MLflow's
         store.engine.dispose()
 
 
@@ -74,7 +74,7 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         with closing(sqlite3.connect(path)) as source, closing(sqlite3.connect(temporary)) as copy:
             source.backup(copy)
         engine = create_engine(f"sqlite:///{temporary}")
-        _upgrade_db(engine)  # type: ignore[no-untyped-call]
+        _upgrade_db(engine)  # type: ignore[no-untyped-call]  # MLflow's
         engine.dispose()
         if not kept.exists():
             os.link(path, kept)

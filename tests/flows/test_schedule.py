@@ -80,14 +80,22 @@ def test_a_schedule_retrains_on_what_was_learned_in_between(
     served: tuple[Path, Path, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     data, log, process = served
-    registry_of = lambda: Registry(DataFolder(data))  # noqa: E731  the database may not be there yet
+
+    def registry_of() -> Registry:  # made anew each time: the database may not be there yet
+        return Registry(DataFolder(data))
+
+    def has_second_champion() -> bool:
+        champion = registry_of().aliased(name)
+        assert champion is not None
+        return champion.number == 2
+
     name = registered_name(CLASS, "car")
     (first,) = _wait(lambda: _judged(registry_of(), name, 1), process, log)
     assert first.tag("verdict") == FIRST
     learn(str(data), seed=901, count=150)
     two = _wait(lambda: _judged(registry_of(), name, 2), process, log)
     assert two[1].tag("verdict") == PROMOTED, log.read_text()[-3000:]
-    assert _wait(lambda: registry_of().aliased(name).number == 2, process, log)  # type: ignore[union-attr]
+    assert _wait(has_second_champion, process, log)
     assert "champion is version 1; " in log.read_text()
 
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(data))

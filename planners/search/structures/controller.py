@@ -33,7 +33,7 @@ def steer(
 ) -> tuple[float, float, Errors]:
     """The controls that drive towards (x, y) at ``speed`` (m/s), and the errors for the next step.
 
-    In the ``first`` step there are no errors of a step ago.
+    ``first`` says that the drive begins, so that the errors have not changed yet.
     """
     limit_1, limit_2 = control_limits(vehicle)
     last_turn, last_slow, turn_sum, slow_sum = last

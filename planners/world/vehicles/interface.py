@@ -1,5 +1,7 @@
 """The kernels that each kind of vehicle implements, in a file of its own.
 
+The bodies here never run: ``by_vehicle`` takes the implementation for the kind of vehicle instead.
+
 A state is a tuple of numbers that begins with x, y (metres), heading (radians) and speed (m/s). The two
 controls are constant during a step. A new kind of vehicle needs its settings in ``vehicle``, a file here, an
 entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is asked for (docs/architecture.md).
