@@ -26,7 +26,7 @@ PLANTED = {
     "OF_AN_ADDRESS": f"postgresql://robot:{SECRET}@10.0.0.5/db",
 }
 ELSEWHERE = f"http://robot:{SECRET}@127.0.0.1:9"  # where nobody answers
-IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0", "PREFECT_CLIENT_MAX_RETRIES": "0"}
+IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}
 TINY = [
     "--preset", "smoke", "--classes", "random", "--experiences", "3", "--candidates", "3", "--workers", "2",
     "--problems-per-experience", "6", "--test-problems", "4", "--epochs", "1",
