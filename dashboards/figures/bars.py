@@ -23,7 +23,7 @@ PAPER_BARS: Final = (("none", 0), ("closed", 1), ("closed", 5), ("open", 1), ("o
 _WHISKERS: Final = "Whiskers: 95 % bootstrap intervals of the mean over problems."
 _CONTROLS_NOTE: Final = (
     "closed, open, repair: with the best recalled plans. Labels say how many, and what recalled them: exh., "
-    "all plans are checked; mask, by the cells that they sweep; centroid, the encoder. fresh is a control: "
+    "all plans are checked; mask, by the cells that they sweep; encoder, by the encoder. fresh is a control: "
     "without memory, a way over the occupancy grid guides the planner."
 )
 
@@ -95,13 +95,13 @@ def time_split(split: pd.DataFrame) -> Figure:
 
 
 def paper_configurations(summary: pd.DataFrame) -> list[Configuration]:
-    """The five configurations of the paper's panels; recalled by centroid, if anything in ``summary`` is."""
+    """The five configurations of the paper's panels; recalled by the encoder, if any is."""
     measured = configurations_in(summary)
-    if any(each.recall == "centroid" for each in measured):
-        measured = [each for each in measured if each.recall in ("", "centroid")]
+    if any(each.recall == "encoder" for each in measured):
+        measured = [each for each in measured if each.recall in ("", "encoder")]
     by_bar = {(each.assist, each.top_k): each for each in reversed(measured)}
     return [
-        by_bar.get((assist, k), Configuration(assist, "centroid" if k else "", k)) for assist, k in PAPER_BARS
+        by_bar.get((assist, k), Configuration(assist, "encoder" if k else "", k)) for assist, k in PAPER_BARS
     ]
 
 
@@ -158,7 +158,7 @@ def _stack(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:
 
 def _tick(configuration: Configuration) -> str:
     """The label of a configuration, a word a line; that the encoder recalled goes without saying."""
-    label = configuration.label.removesuffix(" centroid").replace("exhaustive", "exh.")
+    label = configuration.label.removesuffix(" encoder").replace("exhaustive", "exh.")
     return re.sub("[ -]", "\n", label)
 
 

@@ -142,7 +142,7 @@ def _style(configuration: Configuration) -> dict[str, Any]:
     """Dashed if the encoder alone recalled, dotted for a fresh guide; dots tell blind picks apart."""
     if configuration.assist == "fresh":
         return {"color": INK, "linestyle": ":", "linewidth": 1.5}  # yellow lines are too pale
-    dashes: Any = (0, (5, 1.5)) if configuration.recall == "centroid" else "-"
+    dashes: Any = (0, (5, 1.5)) if configuration.recall == "encoder" else "-"
     if configuration.recall == "random":
         dashes = "-." if configuration.assist == "random-repair" else "-" if configuration.top_k > 1 else ":"
     width = 2.2 if configuration == BASELINE else 1.5

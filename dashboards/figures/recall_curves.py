@@ -31,7 +31,7 @@ def retrieval_curves(curve: pd.DataFrame) -> Figure:
     title = "How often a recalled plan is free"
     if curve.empty:
         return message_figure(title, "No recall to show: build a memory first.")
-    curve = curve[curve["recall"] == "centroid"]
+    curve = curve[curve["recall"] == "encoder"]
     pairs = list(curve[["panel", "memory"]].drop_duplicates().itertuples(index=False, name=None))
     panels = sorted(
         pairs, key=lambda pair: pair[0] != pair[1]

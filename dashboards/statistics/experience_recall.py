@@ -24,7 +24,7 @@ def experience_rows(recalls: pd.DataFrame) -> pd.DataFrame:
     % interval over problems, ``oracle`` is the share with any free plan.
     """
     rows = []
-    fresh = recalls[(recalls["recall"] == "centroid") & (recalls["protocol"] == "fresh")]
+    fresh = recalls[(recalls["recall"] == "encoder") & (recalls["protocol"] == "fresh")]
     for panel in ranked(fresh["class"], PANELS):
         of_class = fresh[fresh["class"] == panel]
         free = np.stack(list(of_class["free"]))

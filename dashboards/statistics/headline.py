@@ -40,7 +40,7 @@ def headline_retrieval(retrieval: pd.DataFrame) -> dict[str, float]:
 
     They are ``fresh_hit_1``, ``fresh_hit_5``, ``fresh_oracle``, ``held_out_origin_1``, ``held_out_origin_5``.
     """
-    own = retrieval[(retrieval["memory"] == retrieval["panel"]) & (retrieval["recall"] == "centroid")]
+    own = retrieval[(retrieval["memory"] == retrieval["panel"]) & (retrieval["recall"] == "encoder")]
     fresh, held_out = (own[own["protocol"] == protocol] for protocol in ("fresh", "held-out"))
     figures = {f"fresh_hit_{k}": fresh[f"hit@{k}"].mean() for k in (1, 5)}
     figures |= {"fresh_oracle": fresh["oracle"].mean()}

@@ -12,7 +12,7 @@ from planners.world.arrays import Floats
 
 MAX_K: Final = 20
 PROTOCOLS: Final = ("held-out", "fresh")
-RECALLS: Final = ("centroid", "mask", "popularity")
+RECALLS: Final = ("encoder", "mask", "popularity")
 _KEYS: Final = ["panel", "memory", "protocol", "recall"]
 _SHARES: Final = ["hit", "origin", "random", "oracle", "nothing_recalled"]
 _COLUMNS: Final = (*_KEYS, "k", "problems", "plans", "seeds", *_SHARES, "hit_sd", "origin_sd")

@@ -14,8 +14,8 @@ from dashboards.statistics.intervals import CONFIDENCE, RESAMPLES
 from dashboards.statistics.panels import compare
 from storage.tables.configurations import BASELINE, Configuration, configured
 
-CLOSED_1, CLOSED_5 = Configuration("closed", "centroid", 1), Configuration("closed", "centroid", 5)
-OPEN_1, OPEN_5 = Configuration("open", "centroid", 1), Configuration("open", "centroid", 5)
+CLOSED_1, CLOSED_5 = Configuration("closed", "encoder", 1), Configuration("closed", "encoder", 5)
+OPEN_1, OPEN_5 = Configuration("open", "encoder", 1), Configuration("open", "encoder", 5)
 RANDOM_1, RANDOM_5 = Configuration("random-open", "random", 1), Configuration("random-open", "random", 5)
 WITH_MEMORY: Final = (CLOSED_1, CLOSED_5, OPEN_1, OPEN_5)
 
@@ -126,7 +126,7 @@ class Evidence:
         """
         rows = self._recalls
         rows = rows[(rows["class"] == class_name) & (rows["memory"] == memory)]
-        rows = rows[(rows["protocol"] == "held-out") & (rows["recall"] == "centroid")]
+        rows = rows[(rows["protocol"] == "held-out") & (rows["recall"] == "encoder")]
         rows = rows[rows["made_for"] >= 0]
         if rows.empty:
             return None
@@ -140,7 +140,7 @@ class Evidence:
 def _reductions(attempts: pd.DataFrame, column: str, resamples: int) -> dict[_Key, Estimate]:
     """Every comparison of ``_PAIRS`` by panel and planner.
 
-    If no attempt recalled by centroid, another recall that ranks plans takes its place.
+    If no attempt recalled by the encoder, another recall that ranks plans takes its place.
     """
     attempted = [each for each in configured(attempts)[1].values() if each.recall != "exhaustive"]
 

@@ -23,7 +23,7 @@ class SolveOptions:
     top_k
         How many plans to recall.
     recall
-        How to recall them: exhaustive, mask, hybrid, centroid, random; default the best for the memory.
+        How to recall them: exhaustive, mask, hybrid, encoder, centroid, random; default: the best for it.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle

@@ -14,6 +14,7 @@ from planners.memory.encoder.forward_pass import Forward, forward_of
 from planners.memory.plans.free import START_TOLERANCE
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.memory.ranking.inverted_lists import InvertedLists
+from planners.memory.ranking.readout import nearest_readout
 from planners.world.arrays import Floats32
 from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan
@@ -61,6 +62,11 @@ class Memory:
     def forward(self) -> Forward:
         """The encoder for the bits ``[64]`` of one grid."""
         return forward_of(self.weights)
+
+    @functools.cached_property
+    def nearest(self) -> tuple[Floats32, Floats32]:
+        """Vectors ``[N + 1, D]`` and biases ``[N + 1]`` that score plans by how near their centroids are."""
+        return nearest_readout(self.centroids, 0.0)
 
     @functools.cached_property
     def durations(self) -> Floats32:

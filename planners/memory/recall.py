@@ -1,8 +1,9 @@
-"""Recall: which stored plans to try on a problem, by one of five strategies (paper, III-C is ``centroid``).
+"""Recall: which stored plans to try on a problem, by one of six strategies (paper, III-C is ``centroid``).
 
 | strategy | who ranks | which plans are checked exactly |
 |---|---|---|
-| centroid | the encoder | the first k |
+| encoder | the readout that the encoder was trained with | the first k |
+| centroid | the distance of the embedding to each plan's centroid | the first k |
 | mask | blocked cells | the first k |
 | hybrid | the encoder picks some hundred, blocked cells rank these | all of these |
 | exhaustive | blocked cells | all N |
@@ -27,7 +28,7 @@ from planners.world.arrays import Integers
 from planners.world.geometry.occupancy import Grid, bits_of
 from planners.world.view import View
 
-RECALLS: Final = ("centroid", "exhaustive", "mask", "hybrid", "random")
+RECALLS: Final = ("encoder", "centroid", "exhaustive", "mask", "hybrid", "random")
 CANDIDATES: Final = 256  # plans that the encoder picks for hybrid
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
 TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
@@ -60,9 +61,10 @@ def recall(
 ) -> Recalled:
     """Recall the best plans for a problem, and the first of them that fits it.
 
-    There are fewer than k, or none, if the strategy holds that no plan fits: ``centroid`` if "no plan" scores
-    best, the others leave out plans with more blocked cells than ``WORTH_CELLS``. Cells hold only for plans
-    as they are stored, so for a problem of another start heading the encoder ranks instead.
+    There are fewer than k, or none, if the strategy holds that no plan fits: ``encoder`` if "no plan" scores
+    best, ``centroid`` if the centroid of the problems without a plan is nearest. The others leave out plans
+    with more blocked cells than ``WORTH_CELLS``. Cells hold only for plans as they are stored, so for a
+    problem of another start heading the encoder ranks instead.
 
     Args:
         memory: to recall from.
@@ -87,8 +89,10 @@ def recall(
     worth = likely = count  # how many of the ranked plans may be returned, and how many are likely to be free
     if strategy == "random":
         order = pick_blindly(count, k, rng)
-    elif strategy == "centroid":
+    elif strategy == "encoder":
         order = by_encoder(memory, view, k)
+    elif strategy == "centroid":
+        order = by_centroids(memory, view, k)
     elif not as_stored:
         most = {"mask": k, "hybrid": candidates, "exhaustive": count}[strategy]
         order, likely = by_encoder(memory, view, most, never_none=True), max(k, CHECKED_EARLY)
@@ -151,6 +155,16 @@ def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> 
     rows = np.concatenate(([0], best[:1] + 1))
     scores = memory.vectors[rows] @ embedding + memory.biases[rows]
     return best if never_none or scores[0] <= scores[-1] else best[:0]
+
+
+def by_centroids(memory: Memory, view: View, k: int) -> Integers:
+    """Rank the (at most) ``k`` plans whose centroids are nearest to the problem's embedding, nearest first.
+
+    If the centroid of the problems that no plan solves is nearer than all of them there are none.
+    """
+    embedding = memory.forward(view.bits)
+    view.lap("encode")
+    return best_plans(*memory.nearest, embedding, k)
 
 
 def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, Integers]:

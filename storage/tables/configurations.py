@@ -9,7 +9,7 @@ import pandas as pd
 ASSISTS: Final = (
     "none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair",
 )  # fmt: skip
-RECALLS: Final = ("exhaustive", "hybrid", "mask", "centroid", "random")
+RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "random")
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
 _WITHOUT_MEMORY: Final = ("none", "fresh")
@@ -24,7 +24,7 @@ class Configuration(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The name in tables, figures and exports: ``none``, ``closed 5 centroid``, ``random-open 1``."""
+        """The name in tables, figures and exports: ``none``, ``closed 5 encoder``, ``random-open 1``."""
         count = [str(self.top_k)] if self.top_k else []
         return " ".join([self.assist, *count, *([] if self.recall in _UNNAMED else [self.recall])])
 
@@ -40,7 +40,7 @@ BASELINE: Final = Configuration("none", "", 0)
 def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configuration]]:
     """``attempts`` with a categorical column ``configuration`` of labels.
 
-    Rows that were written before there was a field ``recall`` count as ranked by centroid.
+    Rows that were written before there was a field ``recall`` count as ranked by the encoder.
 
     Returns the rows, and the configurations by label, in reading order.
     """
@@ -70,7 +70,7 @@ def _understood(assist: str, top_k: float, recall: object) -> Configuration:
     blindly = assist.startswith(_BLINDLY) or recall == "random"
     if blindly:
         return Configuration(f"{_BLINDLY}{assist.removeprefix(_BLINDLY)}", "random", int(top_k))
-    return Configuration(assist, recall if isinstance(recall, str) else "centroid", int(top_k))
+    return Configuration(assist, recall if isinstance(recall, str) else "encoder", int(top_k))
 
 
 def _position(name: str, order: tuple[str, ...]) -> tuple[int, str]:

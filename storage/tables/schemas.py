@@ -6,6 +6,10 @@ from typing import Final
 
 import pyarrow as pa
 
+# The version before, which is still read: ranking by the encoder was called ``centroid`` there.
+EARLIER: Final = {"attempts/2": "attempts/1", "recalls/2": "recalls/1"}
+RENAMED: Final = {"recall": {"centroid": "encoder"}}  # column: old value, new value
+
 GRID_BYTES: Final = 512  # 64 x 64 cells, one bit each
 
 _PROBLEM: Final = [
@@ -81,7 +85,7 @@ def hallucinated(plans: int) -> pa.Schema:
 
 
 ATTEMPTS: Final = _schema(
-    "attempts/1",
+    "attempts/2",
     [
         ("problem_id", pa.string()),
         ("problem_class", pa.string()),
@@ -141,7 +145,7 @@ WATCHED: Final = _schema(
 def recalls(plans: int) -> pa.Schema:
     """The table of what a memory of ``plans`` plans recalls, beside the truth."""
     return _schema(
-        "recalls/1",
+        "recalls/2",
         [
             ("problem_id", pa.string()),
             ("class", pa.string()),
@@ -150,7 +154,7 @@ def recalls(plans: int) -> pa.Schema:
             ("order", pa.list_(pa.int32())),  # the first plans, best first
             ("free", pa.binary((plans + 7) // 8)),  # which plans are free, most significant bit first
             ("nothing_recalled", pa.bool_()),
-            ("recall", pa.string()),  # what ranked the plans: centroid, mask, or the control popularity
+            ("recall", pa.string()),  # what ranked the plans: encoder, mask, or the control popularity
             ("training_seed", pa.int32()),  # number of the seed that the encoder was trained with, from 0
             ("made_for", pa.int32()),  # the plan that a held-out problem was made for; -1: none
         ],

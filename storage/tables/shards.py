@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from storage.errors import StorageError
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
+from storage.tables.schemas import EARLIER, RENAMED
 
 ROW_GROUP_ROWS: Final = 4096  # 2,000 to 8,000 measured best for 64 x 64 grids
 SCHEMA_KEY: Final = b"schema"
@@ -53,7 +55,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
     """
     wanted = schema.metadata[SCHEMA_KEY].decode()
     name = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
-    if name != wanted:
+    if name not in (wanted, EARLIER.get(wanted)):
         raise StorageError(
             f"{path} holds table {name}, expected {wanted}; is it the right file, written by this version?"
         )
@@ -69,7 +71,18 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
                 raise ValueError(
                     f"column {field.name} holds {field.type}, expected {schema.field(field.name).type}"
                 )
-        return table
+        return table if name == wanted else _renamed(table)
+
+
+def _renamed(table: pa.Table) -> pa.Table:
+    """A ``table`` of the earlier version, with what is called otherwise today renamed."""
+    for column, names in RENAMED.items():
+        if column in table.column_names:
+            values = table[column]
+            for old, new in names.items():
+                values = pc.if_else(pc.equal(values, old), new, values)
+            table = table.set_column(table.column_names.index(column), column, values)
+    return table
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+from storage.tables.schemas import RENAMED
 from tasks.settings.encoder_training import Learning
 from tasks.settings.retraining_settings import Retraining
 
@@ -27,10 +28,10 @@ ASSISTS: Final = (
     Assist("closed", 5),
     Assist("open", 5),
     Assist("repair", 5),
-    Assist("closed", 1, "centroid"),  # the paper's four: what the encoder recalls, and nothing else
-    Assist("closed", 5, "centroid"),
-    Assist("open", 1, "centroid"),
-    Assist("open", 5, "centroid"),
+    Assist("closed", 1, "encoder"),  # the paper's four: what the encoder recalls, and nothing else
+    Assist("closed", 5, "encoder"),
+    Assist("open", 1, "encoder"),
+    Assist("open", 5, "encoder"),
     Assist("fresh", 0),  # a control: no memory, a guide made on the spot
 )
 ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
@@ -60,6 +61,12 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "learned": "",
     "retraining": None,
 }
+
+VERSION: Final = 2  # of the JSON; in the first, which has no number, ``encoder`` was called ``centroid``
+_DIGESTED: Final = {
+    "encoder": "centroid",
+    "centroid": "nearest centroid",
+}  # so that older runs keep their names
 
 
 @dataclass(frozen=True)
@@ -128,6 +135,7 @@ class RunSettings:
         """Eight hexadecimal digits that tell settings with different results apart."""
         values = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
         del values["strict"], values["continual"]
+        values["assists"] = [_renamed(each, _DIGESTED) for each in self.assists]
         for name, default in _LATER.items():  # so that runs from before a field was added keep their names
             if values.get(name) == default:
                 del values[name]
@@ -144,12 +152,13 @@ class RunSettings:
 
     def to_json(self) -> str:
         """The settings as one JSON object; ``from_json`` gives them back."""
-        return json.dumps(asdict(self), indent=2, sort_keys=True)
+        return json.dumps({"version": VERSION} | asdict(self), indent=2, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> RunSettings:
         """The settings that ``to_json`` wrote; ValueError with one line if they are of another version."""
         values: dict[str, Any] = _LATER | json.loads(text)
+        version = values.pop("version", 1)
         names = {field.name for field in fields(cls)}
         if set(values) != names:
             odd = ", ".join(sorted(set(values) ^ names))
@@ -157,6 +166,8 @@ class RunSettings:
                 f"Settings of another version: {odd} missing or unknown. Start a new data folder."
             )
         values["assists"] = tuple(Assist(*assist) for assist in values["assists"])
+        if version == 1:
+            values["assists"] = tuple(_renamed(each, RENAMED["recall"]) for each in values["assists"])
         values["hallucination"] = tuple((name, float(share)) for name, share in values["hallucination"])
         for name in ("classes", "worlds", "planners"):
             values[name] = tuple(values[name])
@@ -164,6 +175,10 @@ class RunSettings:
         if values["retraining"] is not None:
             values["retraining"] = Retraining(**values["retraining"])
         return cls(**values)
+
+
+def _renamed(assist: Assist, names: dict[str, str]) -> Assist:
+    return assist._replace(recall=assist.recall and names.get(assist.recall, assist.recall))
 
 
 def world_class(path: str | Path) -> str:

@@ -58,7 +58,7 @@ def recall_chunk(chunk: Chunk) -> None:
         if by_popularity is not None:
             rows.append(_row(chunk, protocol, problem, "popularity", 0, by_popularity, False))
         for seed, memory in enumerate(memories):
-            rows.append(_row(chunk, protocol, problem, "centroid", seed, *rank(memory, problem.grid)))
+            rows.append(_row(chunk, protocol, problem, "encoder", seed, *rank(memory, problem.grid)))
     write_recalls(chunk.shard("recalls"), rows, plans=len(memories[0].plans), key=chunk.key)
 
 

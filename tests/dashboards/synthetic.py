@@ -13,7 +13,7 @@ from storage.tables.configurations import BASELINE, Configuration
 
 STANDARD = [
     BASELINE,
-    *(Configuration(assist, "centroid", k) for assist in ("closed", "open") for k in (1, 5)),
+    *(Configuration(assist, "encoder", k) for assist in ("closed", "open") for k in (1, 5)),
     *(Configuration(assist, "exhaustive", 5) for assist in ("closed", "open", "repair")),
     Configuration("fresh", "", 0),
 ]
@@ -79,7 +79,7 @@ def recalls(
     """Recall rows of rankings better than chance."""
     rng = np.random.default_rng(seed)
     rows: list[dict[str, Any]] = []
-    ways = [("popularity", 0), *(("centroid", training_seed) for training_seed in range(seeds))]
+    ways = [("popularity", 0), *(("encoder", training_seed) for training_seed in range(seeds))]
     for name, protocol, (recall, training_seed), i in product(classes, protocols, ways, range(problems)):
         free = rng.random(plans) < 0.1
         held_out = protocol == "held-out" and free.any()

@@ -99,7 +99,7 @@ def test_recall_is_measured_for_each_memory_seed_and_protocol(runs: tuple[RunFol
     assert set(asked.index.droplevel([2, 3, 4])) == {
         ("random", "random"), ("trap", "trap"), ("combined", "random"), ("combined", "trap")
     }  # fmt: skip
-    ways = [("centroid", 0), ("centroid", 1), ("mask", 0), ("popularity", 0)]
+    ways = [("encoder", 0), ("encoder", 1), ("mask", 0), ("popularity", 0)]
     assert (asked.groupby(level=[0, 1, 2]).size() == len(ways)).all()
     assert (asked.xs("fresh", level="protocol") == 6).all()
     held_out = rows[rows["protocol"] == "held-out"]

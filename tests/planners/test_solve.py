@@ -59,7 +59,7 @@ def test_without_assistance_the_answer_is_the_planners_own(planner):
 
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_the_recalled_plan_that_is_free_and_drives_shortest_is_the_answer(memory, assist):
-    attempt = solve(problem_of([]), "gust", assist, 5, memory, strategy="centroid")
+    attempt = solve(problem_of([]), "gust", assist, 5, memory, strategy="encoder")
     assert attempt.recalled == (4, 3, 2, 1, 0)
     assert attempt.plan is min((memory.plans[i] for i in attempt.recalled), key=lambda plan: plan.duration_s)
     assert (attempt.source, attempt.expansions, attempt.search_seconds) == ("recalled", 0, 0.0)
@@ -87,7 +87,7 @@ def test_an_open_box_is_guided_elsewhere(memory, planner):
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_where_no_plan_scores_best_nothing_is_recalled(assist):
     problem = strewn(3, 20)
-    attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]), strategy="centroid")
+    attempt = solve(problem, "rrt", assist, 5, memory_that_prefers([9, 1, 2, 3, 4, 5]), strategy="encoder")
     assert attempt.recalled == ()
     np.testing.assert_array_equal(attempt.plan.states, solve(problem, "rrt").plan.states)
 
@@ -207,7 +207,7 @@ def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory):
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
     problem = problem_of([box(*memory.plans[4].states[40, :2], 0.0, 0.2, 0.2)])
-    attempt = solve(problem, "rrt", "closed", 5, memory, strategy="centroid")
+    attempt = solve(problem, "rrt", "closed", 5, memory, strategy="encoder")
     assert attempt.recalled[0] == 4
     assert attempt.plan is not memory.plans[4]
     assert faults(problem, memory.plans[4]) != []

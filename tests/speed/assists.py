@@ -63,7 +63,7 @@ FRESH: Asked = ("fresh", None, 0)
 HARD: list[Asked] = [NONE, FRESH, *[(assist, None, 5) for assist in RECALLING]]
 EVERY: list[Asked] = [
     *HARD,
-    *[(assist, "centroid", k) for assist in RECALLING for k in (1, 5)],
+    *[(assist, "encoder", k) for assist in RECALLING for k in (1, 5)],
     *[(f"random-{assist}", "random", k) for assist in RECALLING for k in (1, 5)],
 ]
 

@@ -27,7 +27,7 @@ from tests.planners.memories import memory_of
 SEED: Final = 87
 COUNT: Final = 200  # problems a class
 EXPERIENCES: Final = 100
-CONFIGURATIONS: Final = (("none", None), ("fresh", None), ("open", "exhaustive"), ("open", "centroid"))
+CONFIGURATIONS: Final = (("none", None), ("fresh", None), ("open", "exhaustive"), ("open", "encoder"))
 LARGE_BYTES: Final = 64 << 20
 
 

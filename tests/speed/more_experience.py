@@ -35,7 +35,7 @@ from tasks.attempts.timing import no_garbage_collection
 from tasks.settings.run_settings import COMBINED, RunSettings
 
 SEED = 86
-ASSISTS = (("closed", "centroid"), ("repair", "exhaustive"))
+ASSISTS = (("closed", "encoder"), ("repair", "exhaustive"))
 TOP_K = 5
 COLLECTED_EVERY = 10
 

@@ -57,7 +57,7 @@ def report(console: Console) -> None:
         for assist, top_k in ASSISTS.items():
             ways = (benchmarked["assist"] == assist) & (benchmarked["top_k"] == top_k)
             of_planner = benchmarked[ways & (benchmarked["planner"] == PLANNER)]
-            theirs = of_planner[of_planner["recall"].ne("centroid")]["planning_seconds"].to_numpy()
+            theirs = of_planner[of_planner["recall"].ne("encoder")]["planning_seconds"].to_numpy()
             asked = [_planned(problem, assist, Path(folder)) for problem in track(problems, transient=True)]
             ours, whole = np.array(asked).T
             table.add_row(

@@ -109,7 +109,7 @@ def _fresh_recalls(data: DataReader, run: RunFolder, name: str) -> FreshRecalls 
     def made() -> FreshRecalls | None:
         rows = read_recalls(shards)
         rows = rows[(rows["memory"] == name) & (rows["protocol"] == "fresh")]
-        rows = rows[(rows["recall"] == "centroid") & (rows["training_seed"] == 0)]
+        rows = rows[(rows["recall"] == "encoder") & (rows["training_seed"] == 0)]
         if not len(rows) or rows["free"].map(len).nunique() > 1:
             return None
         free = np.stack(list(rows["free"])).astype(bool)

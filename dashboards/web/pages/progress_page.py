@@ -87,7 +87,7 @@ def progress(data: DataReader, params: Parameters) -> Page:
 
 def _default(labels: list[str]) -> str:
     """What a reader most wants to see: repair with the best recall, else the first there is."""
-    repairs = [label for label in labels if label.startswith("repair") and "centroid" not in label]
+    repairs = [label for label in labels if label.startswith("repair") and "encoder" not in label]
     return (repairs or labels or [""])[0]
 
 

@@ -20,7 +20,7 @@ def rows() -> pd.DataFrame:
 def test_a_hit_is_the_mean_over_seeds_with_an_interval_over_problems() -> None:
     given = recalls(("curves",), plans=30, protocols=("fresh",), seeds=2)
     (row,) = experience_rows(given).to_dict("records")
-    asked = given[given["recall"] == "centroid"]
+    asked = given[given["recall"] == "encoder"]
     hits = [free[order[:5]].any() for free, order in zip(asked["free"], asked["order"], strict=True)]
     assert row["hit"] == pytest.approx(np.mean(hits))
     by_problem = np.array(hits, float).reshape(2, -1).mean(0)

@@ -99,7 +99,7 @@ def test_only_the_most_plans_of_each_assist_get_a_curve_and_no_blind_picks() -> 
     table = solved_against_time(attempts(("trap",), ("gust",), [*STANDARD, *ABLATION]))
     shown = set(table[["assist", "recall", "top_k"]].itertuples(index=False, name=None))
     assert shown == {
-        ("none", "", 0), ("closed", "centroid", 5), ("closed", "exhaustive", 5), ("open", "centroid", 5),
+        ("none", "", 0), ("closed", "encoder", 5), ("closed", "exhaustive", 5), ("open", "encoder", 5),
         ("open", "exhaustive", 5), ("repair", "exhaustive", 5), ("fresh", "", 0),
     }  # fmt: skip
 

@@ -24,12 +24,12 @@ def test_headlines_are_means_of_the_tables(
     found: tuple[pd.DataFrame, pd.DataFrame, dict[str, float]],
 ) -> None:
     summary, retrieval, figures = found
-    closed = summary[summary["configuration"] == "closed 5 centroid"]
-    assert figures["reduction/closed-5-centroid"] == pytest.approx(closed["reduction"].mean())
+    closed = summary[summary["configuration"] == "closed 5 encoder"]
+    assert figures["reduction/closed-5-encoder"] == pytest.approx(closed["reduction"].mean())
     assert figures["solved/none"] == pytest.approx(
         summary.loc[summary["configuration"] == "none", "solved"].mean()
     )
-    fresh = retrieval[(retrieval["protocol"] == "fresh") & (retrieval["recall"] == "centroid")]
+    fresh = retrieval[(retrieval["protocol"] == "fresh") & (retrieval["recall"] == "encoder")]
     assert figures["fresh_hit_1"] == pytest.approx(fresh["hit@1"].mean())
     assert 0.6 < figures["reduction"] < 0.9  # memory was made four times as fast
 

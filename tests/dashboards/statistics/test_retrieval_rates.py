@@ -21,7 +21,7 @@ def test_random_choice_follows_the_hypergeometric_law(plans: int, data: st.DataO
 
 def test_random_choice_is_what_a_simulation_finds() -> None:
     rows = recalls(("curves",), problems=5, protocols=("fresh",), seeds=1)
-    rows = rows[rows["recall"] == "centroid"]
+    rows = rows[rows["recall"] == "encoder"]
     curve = retrieval_curve(rows)
     rng = np.random.default_rng(0)
     orders = np.argsort(rng.random((20_000, 30)), axis=1)
@@ -63,7 +63,7 @@ def test_the_summary_has_a_row_per_class_protocol_and_way_to_recall(recall_rows:
         (name, protocol, recall)
         for name in ("curves", "random", "trap")
         for protocol in ("held-out", "fresh")
-        for recall in ("centroid", "popularity")
+        for recall in ("encoder", "popularity")
     ]
     assert (summary["hit@1"] <= summary["hit@5"]).all()
     assert (summary["hit@5"] <= summary["oracle"]).all()

@@ -30,7 +30,7 @@ def with_factors(rows: pd.DataFrame, factors: dict[str, float]) -> pd.DataFrame:
 
 def measured(factors: dict[str, float], memory: str | None = None) -> pd.DataFrame:
     named = [
-        Configuration(name.rpartition(" ")[0], "centroid", int(name.rpartition(" ")[2])) for name in factors
+        Configuration(name.rpartition(" ")[0], "encoder", int(name.rpartition(" ")[2])) for name in factors
     ]
     return with_factors(attempts(configurations=[BARS[0], *named], memory=memory), factors)
 

@@ -19,7 +19,7 @@ from dashboards.verdicts.promotion import (
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import attempts
 
-WITH_MEMORY = [Configuration("closed", "centroid", 5), Configuration("open", "exhaustive", 5)]
+WITH_MEMORY = [Configuration("closed", "encoder", 5), Configuration("open", "exhaustive", 5)]
 COLUMNS = 2 * 2 * 2
 
 
@@ -68,7 +68,7 @@ def test_who_is_slower_somewhere_is_refused_however_much_faster_elsewhere(champi
     found = judge(champion, worse)
     assert found.low > 0.0
     assert not found.promoted
-    assert "slower with follow closed 5 centroid on trap" in found.why
+    assert "slower with follow closed 5 encoder on trap" in found.why
     assert (found.columns["verdict"] == SLOWER).sum() == 1
 
 

@@ -41,7 +41,7 @@ VERSIONS = (
     MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not faster", False),
 )
 SEEN = Usefulness(problems=200, hits=160, mean_ms=1.5, median_ms=0.5)
-WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "centroid"))
+WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "encoder"))
 
 
 def small_data(folder: Path, runs: Sequence[str] = ("first", "second")) -> DataFolder:
@@ -126,7 +126,7 @@ def _write_recalls(run: RunFolder, memory: Memory, problems: Sequence[Problem]) 
             "order": np.arange(len(memory.plans)),
             "free": _labels(memory, problem),
             "nothing_recalled": False,
-            "recall": "centroid",
+            "recall": "encoder",
             "training_seed": 0,
             "made_for": -1,
         }

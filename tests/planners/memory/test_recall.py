@@ -119,7 +119,7 @@ def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
         assert off or free_in(memory, problem)[found.free]
 
 
-@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(["centroid", "mask", "random"]))
+@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(["encoder", "centroid", "mask", "random"]))
 def test_no_free_plan_among_those_recalled_drives_shorter(memory, problem_in, seed, k, strategy):
     problem = problem_in(seed)
     found = recalled_by(memory, problem, strategy, k)
@@ -212,19 +212,30 @@ def test_plans_that_are_blocked_nearly_everywhere_are_not_recalled(memory, probl
 
 
 @given(seed=SEEDS, k=st.integers(1, 8))
-def test_centroid_is_the_head_of_the_rank(memory, problem_in, seed, k):
+def test_what_the_encoder_recalls_is_the_head_of_the_rank(memory, problem_in, seed, k):
     problem = problem_in(seed)
     order, no_plan = rank(memory, occupancy_of(problem))
     assert sorted(order) == list(range(PLANS))
-    found = recalled_by(memory, problem, "centroid", k)
+    found = recalled_by(memory, problem, "encoder", k)
     assert set(found.plans) == (set() if no_plan else set(order[:k].tolist()))
     assert found.free >= 0 or list(found.plans) == ([] if no_plan else order[:k].tolist())
+
+
+@given(seed=SEEDS, k=st.integers(1, 8))
+def test_centroids_recall_the_plans_whose_centroids_are_nearest(memory, problem_in, seed, k):
+    rng = generator(seed, "readout")  # which a trained readout may contradict
+    learned = dataclasses.replace(memory, vectors=rng.normal(size=memory.vectors.shape).astype(np.float32))
+    problem = problem_in(seed)
+    embedding = memory.encoder(occupancy_of(problem))
+    distances = cdist(embedding[np.newaxis], memory.centroids)[0]
+    nearest = [] if distances[0] < distances[1:].min() else np.argsort(distances[1:])[:k].tolist()
+    assert set(recalled_by(learned, problem, "centroid", k).plans) == set(nearest)
 
 
 def test_nothing_is_recalled_where_row_0_scores_best(memory, problem_in):
     hopeless = dataclasses.replace(memory, biases=np.array([1e6] + [0.0] * PLANS, np.float32))
     problem = problem_in(0)
-    assert recalled_by(hopeless, problem, "centroid", 5).plans == ()
+    assert recalled_by(hopeless, problem, "encoder", 5).plans == ()
     assert rank(hopeless, occupancy_of(problem))[1]
     assert recalled_by(hopeless, problem, "exhaustive", 5).plans != ()
 
@@ -274,7 +285,7 @@ def test_rows_that_do_not_fit_the_plans_are_refused(memory):
         dataclasses.replace(memory, biases=memory.biases[1:])
 
 
-@pytest.mark.parametrize(("strategy", "k"), [("mask", 0), ("centroid", -1), ("guess", 1)])
+@pytest.mark.parametrize(("strategy", "k"), [("mask", 0), ("encoder", -1), ("guess", 1)])
 def test_a_wrong_question_is_refused(memory, experiences, strategy, k):
     with pytest.raises(ValueError, match=f"recall {k} plans by '{strategy}': give 1 or more, and one of"):
         recall(memory, View(experiences[0].problem), strategy, k)

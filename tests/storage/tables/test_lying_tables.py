@@ -50,7 +50,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, pa.Table]:
         plans=PLANS,
     )
     row = {
-        "problem_id": "p", "class": "trap", "memory": "trap", "protocol": "fresh", "recall": "centroid",
+        "problem_id": "p", "class": "trap", "memory": "trap", "protocol": "fresh", "recall": "encoder",
         "order": [4, 0], "free": [True] * PLANS, "nothing_recalled": False, "training_seed": 0,
         "made_for": -1,
     }  # fmt: skip

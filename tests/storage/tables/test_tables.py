@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planners.memory.plans.experience import Experience
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, VEHICLES, Vehicle, name_of
 from storage.errors import StorageError
-from storage.tables.attempts import read_attempts, write_attempts
+from storage.tables.attempts import attempt_columns, read_attempts, write_attempts
 from storage.tables.experiences import merge_experiences, read_experiences, write_experiences
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, write_hallucinated
 from storage.tables.recalls import read_recalls, write_recalls
@@ -234,6 +234,17 @@ def test_an_attempt_of_another_shape_is_refused_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_the_first_version_called_centroid_is_the_encoder_today(tmp_path: Path) -> None:
+    path, names = tmp_path / "a.parquet", ("centroid", None, "mask")
+    rows = [{**ATTEMPT, "recall": name} for name in names]
+    write_attempts(path, rows)
+    assert attempt_columns(path, ["recall"]) == {"recall": list(names)}
+    table = pq.read_table(path)
+    pq.write_table(table.replace_schema_metadata({**table.schema.metadata, b"schema": b"attempts/1"}), path)
+    assert read_attempts(path)["recall"].dropna().tolist() == ["encoder", "mask"]
+    assert attempt_columns(path, ["recall"]) == {"recall": ["encoder", None, "mask"]}
+
+
 @quick
 @given(count=st.integers(1, 10), plans=st.integers(1, 20), seed=st.integers(0, 99))
 def test_recalls_come_back_exactly(
@@ -250,7 +261,7 @@ def test_recalls_come_back_exactly(
             "order": rng.permutation(plans),
             "free": rng.random(plans) < 0.5,
             "nothing_recalled": bool(i % 2),
-            "recall": "centroid",
+            "recall": "encoder",
             "training_seed": i % 3,
             "made_for": i - 1,
         }

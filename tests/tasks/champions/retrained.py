@@ -32,7 +32,7 @@ SETTINGS: Final = replace(
     problems_per_experience=40,
     test_problems=50,
     epochs=4,
-    assists=(Assist("closed", 5), Assist("closed", 1, "centroid")),
+    assists=(Assist("closed", 5), Assist("closed", 1, "encoder")),
     continual="none",
 )
 

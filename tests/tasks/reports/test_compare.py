@@ -31,7 +31,7 @@ def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p")
             "planning_seconds": seconds if assist == "closed" else 0.1,
             "assist": assist,
             "top_k": 5 if assist == "closed" else 0,
-            "recall": "centroid" if assist == "closed" else None,
+            "recall": "encoder" if assist == "closed" else None,
             "memory": "curves" if assist == "closed" else None,
         }
         for i in range(9)
@@ -67,7 +67,7 @@ def test_runs_are_compared_and_what_differs_is_said(
         "objective": {"one": '"labels"', "two": '"triplet"'},
         "learning.margin": {"one": "1.0", "two": "2.0"},
     }
-    (closed,) = [row for row in found["runs"]["two"] if row["configuration"] == "closed 5 centroid"]
+    (closed,) = [row for row in found["runs"]["two"] if row["configuration"] == "closed 5 encoder"]
     assert closed["reduction"] == pytest.approx(0.5)
     assert closed["verdict"] == "faster"
     assert "50 [  50,   50]" in (tmp_path / "c.md").read_text()

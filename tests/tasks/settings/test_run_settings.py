@@ -6,6 +6,7 @@ import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -93,15 +94,31 @@ def test_a_run_of_another_vehicle_says_its_name() -> None:
     assert for_preset("smoke", vehicle="car-1-trailer").run_name.startswith("smoke-labels-car-1-trailer-")
 
 
+def _first_version(settings: RunSettings) -> dict[str, Any]:
+    values: dict[str, Any] = json.loads(settings.to_json())
+    del values["version"]
+    for assist in values["assists"]:
+        assist[2] = "centroid" if assist[2] == "encoder" else assist[2]
+    return values
+
+
 def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
     settings = for_preset("smoke")
-    values = json.loads(settings.to_json())
+    values = _first_version(settings)
     del values["vehicle"], values["optimised"], values["learning"], values["hallucination"]
     del values["learned"], values["retraining"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"], values["continual"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
     assert settings.run_name == f"smoke-labels-{digest}"
+
+
+def test_nearest_centroids_are_not_what_was_once_called_centroid() -> None:
+    by_encoder = replace(for_preset("smoke"), assists=(Assist("closed", 5, "encoder"),))
+    nearest = replace(by_encoder, assists=(Assist("closed", 5, "centroid"),))
+    assert RunSettings.from_json(nearest.to_json()) == nearest
+    assert RunSettings.from_json(json.dumps(_first_version(by_encoder))) == by_encoder
+    assert nearest.digest != by_encoder.digest
 
 
 def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Path) -> None:
