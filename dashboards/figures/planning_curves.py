@@ -1,4 +1,4 @@
-"""Curves of planning: with growing experience, solved against time, profiles, plans that are improved."""
+"""Curves of planning: with growing experience, solved against time, profiles."""
 
 from __future__ import annotations
 
@@ -11,18 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from dashboards.cells import planner_title
 from dashboards.figures.style import (
     NO_ATTEMPTS,
     in_percent,
     logarithmic,
     message_figure,
-    panel_row,
     planner_grid,
-    tidy,
 )
-from dashboards.palette import INK, SERIES, colour_of
-from dashboards.statistics.panels import PLANNERS
+from dashboards.palette import INK, colour_of
 from storage.tables.configurations import BASELINE, Configuration, configurations_in
 
 
@@ -75,35 +71,6 @@ def performance_profile(curve: pd.DataFrame) -> Figure:
         "with the same planner (Dolan and Moré 2002). At 1: how often a configuration is the fastest."
     )
     return _shares(curve, title, note, "ratio", "times the fastest")
-
-
-def anytime_curves(history: pd.DataFrame) -> Figure:
-    """What it brings to go on improving a plan: the driving time of the best plan against the time spent.
-
-    ``history``: columns ``panel, planner, seconds, mean_s, low_s, high_s``. A row is a moment, from when all
-    problems have a plan, with the mean over all problems and its 95 % interval.
-    """
-    title = "Driving time of the best plan so far"
-    if history.empty:
-        return message_figure(title, "No history to show: improve some plans first.")
-    note = (
-        "Searches are repeated, each for a plan that takes less time than the best so far. Mean over all "
-        "problems, from when all have a plan; bands: 95 % bootstrap intervals."
-    )
-    panels = list(history["panel"].unique())
-    figure, row = panel_row(panels, title, note)
-    for axes, panel in zip(row, panels, strict=True):
-        for planner, colour in zip(PLANNERS, SERIES, strict=False):
-            rows = history[(history["panel"] == panel) & (history["planner"] == planner)]
-            axes.fill_between(
-                rows["seconds"], rows["low_s"], rows["high_s"], color=colour, alpha=0.15, linewidth=0
-            )
-            axes.plot(rows["seconds"], rows["mean_s"], color=colour, label=planner_title(planner))
-        logarithmic(axes, (1.0, 3.0))
-        axes.set_xlim(float(history["seconds"].min()), float(history["seconds"].max()))
-        tidy(axes, panel, "time spent, s", "mean driving time, s" if axes is row[0] else "")
-    row[0].legend(loc="upper right", frameon=False, fontsize=9)
-    return figure
 
 
 def _shares(curve: pd.DataFrame, title: str, note: str, x: str, label: str) -> Figure:

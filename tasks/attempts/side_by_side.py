@@ -7,8 +7,8 @@ in a row, and before each attempt other data fill the caches.
 from __future__ import annotations
 
 import gc
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from planners.memory.memory import Memory
 from planners.solve import Attempt, solve
@@ -23,6 +23,7 @@ from tasks.inputs.problem_sources import Source
 from tasks.settings.run_settings import Assist
 
 MemoryOfRun = tuple[str, str]  # name of a memory, and the run that made it
+Made = TypeVar("Made")
 
 
 class Contestant(NamedTuple):
@@ -34,16 +35,44 @@ class Contestant(NamedTuple):
     run: str  # that made the memory
 
 
+def in_turn(
+    problems: Sequence[Problem], ways: int, seed: int, attempt: Callable[[Problem, int], Made]
+) -> dict[tuple[int, int], Made]:
+    """Have each of some ways attempt each problem, by the cold clock.
+
+    All problems are attempted once before any is attempted again. In which order the ways attempt a problem
+    is drawn by its id, so that none of them always comes first.
+
+    Args:
+        problems: what to attempt; with one problem alone it is attempted several times in a row.
+        ways: how many ways there are.
+        seed: of the orders.
+        attempt: attempts a problem in one of the ways, which are counted from 0.
+
+    Returns:
+        what each attempt returned, by the number of the problem and of the way.
+
+    """
+    turns = [generator(seed, "order", problem.id).permutation(ways) for problem in problems]
+    made: dict[tuple[int, int], Made] = {}
+    other_work = OtherWork()
+    with no_garbage_collection():
+        for turn in range(ways):
+            for number, problem in enumerate(problems):
+                way = int(turns[number][turn])
+                other_work()
+                made[number, way] = attempt(problem, way)
+            gc.collect()
+    return made
+
+
 def side_by_side(
     chunk: Chunk,
     source: Source,
     contestants: Sequence[Contestant],
     memories: Mapping[MemoryOfRun, Memory],
 ) -> list[dict[str, Any]]:
-    """Have every contestant attempt each problem of a chunk.
-
-    All problems are attempted once before any is attempted again. In which order the contestants attempt a
-    problem is drawn by its id, so that none of them always comes first.
+    """Have every contestant attempt each problem of a chunk, in turn.
 
     Args:
         chunk: the range of test problems.
@@ -60,7 +89,8 @@ def side_by_side(
     """
     vehicle, seed, workspace = chunk.vehicle, chunk.settings.seed, Workspace()
 
-    def attempt(problem: Problem, by: Contestant) -> Attempt:
+    def attempt(problem: Problem, number: int) -> Attempt:
+        by = contestants[number]
         memory = memories[by.memory, by.run] if by.memory else None
         assist, top_k, recall = by.assist
         return solve(
@@ -71,19 +101,10 @@ def side_by_side(
         )
 
     problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
-    turns = [generator(seed, "order", problem.id).permutation(len(contestants)) for problem in problems]
-    attempts: dict[tuple[int, int], Attempt] = {}
-    other_work = OtherWork()
     compile_assists(vehicle)
-    for contestant in contestants:  # what is made when first needed is there before the first time counts
-        attempt(problems[-1], contestant)
-    with no_garbage_collection():
-        for turn in range(len(contestants)):
-            for number, problem in enumerate(problems):
-                who = int(turns[number][turn])
-                other_work()
-                attempts[number, who] = attempt(problem, contestants[who])
-            gc.collect()
+    for number in range(len(contestants)):  # what is made when first needed is there before time counts
+        attempt(problems[-1], number)
+    attempts = in_turn(problems, len(contestants), seed, attempt)
     rows: list[dict[str, Any]] = []
     for number, problem in enumerate(problems):
         checked: set[bytes] = set()

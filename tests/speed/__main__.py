@@ -21,7 +21,6 @@ SECTIONS: Final = {
     "latency": "tests.speed.latency",
     "cold_clock": "tests.speed.cold_clock",
     "one_problem": "tests.speed.one_problem",
-    "anytime": "tests.speed.anytime",
     "warm_start": "tests.speed.warm_start",
     "curation": "tests.speed.curation",
     "hallucination": "tests.speed.hallucination",

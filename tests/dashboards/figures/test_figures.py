@@ -6,7 +6,9 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import pandas as pd
 import pytest
@@ -16,11 +18,11 @@ from matplotlib.text import Text
 from dashboards.cells import PLANNING_TIME
 from dashboards.figures.bars import ablation, controls, paper_configurations, planning_times, time_split
 from dashboards.figures.planning_curves import (
-    anytime_curves,
     continual_improvement,
     performance_profile,
     solved_against_time,
 )
+from dashboards.figures.quality_curves import quality_curves
 from dashboards.figures.recall_curves import retrieval_curves, training_curves
 from dashboards.figures.style import new_figure, save
 from dashboards.statistics import distributions
@@ -131,23 +133,25 @@ def test_the_figure_says_what_counts_as_planning_time(attempt_rows: pd.DataFrame
     assert PLANNING_TIME in words
 
 
-def test_improving_has_a_panel_a_class_and_a_curve_a_planner() -> None:
-    moments = [0.01, 0.03, 0.1]
+def test_each_way_to_plan_is_named_beside_its_line_and_no_name_lies_over_another() -> None:
+    ways = [("GUST, alone", "alone", False), ("RRT, alone", "alone", False), ("GUST, memory", "memory", True)]
+    moments = [0.1, 1.0, 10.0]
     rows = [
-        {"panel": name, "planner": planner, "seconds": t, "mean_s": 20 - t, "low_s": 19 - t, "high_s": 21 - t}
-        for name in ("curves", "trap")
-        for planner in ("rrt", "gust", "follow")
-        for t in moments[planner == "rrt" :]  # RRT has a plan for all problems later
+        {"method": name, "kind": kind, "memory": memory, "ms": ms, "over": 0.2 / ms}
+        for name, kind, memory in ways
+        for ms in moments
     ]
-    figure = anytime_curves(pd.DataFrame(rows))
-    assert [axes.get_title() for axes in figure.axes] == ["curves", "trap"]
-    assert all(len(axes.lines) == 3 for axes in figure.axes)
-    assert {"RRT", "GUST", "Follow"} <= set(texts(figure))
+    figure = quality_curves(pd.DataFrame(rows), "A class", {"alone": "#888888", "memory": "#0072B2"})
+    (axes,) = figure.axes
+    assert len(axes.lines) == len(ways)
+    assert {name for name, _, _ in ways} <= set(texts(figure))
+    heights = sorted(cast(Any, label).xyann[1] for label in axes.texts)
+    assert min(after - before for before, after in pairwise(heights)) > 0.04
 
 
 @pytest.mark.parametrize("chart", [
     planning_times, controls, time_split, continual_improvement, solved_against_time, performance_profile,
-    retrieval_curves, training_curves, anytime_curves,
+    retrieval_curves, training_curves,
 ])  # fmt: skip
 def test_without_rows_a_figure_is_a_message(chart: Callable[[pd.DataFrame], Figure]) -> None:
     figure = chart(pd.DataFrame())
