@@ -140,11 +140,13 @@ class Evidence:
 def _reductions(attempts: pd.DataFrame, column: str, resamples: int) -> dict[_Key, Estimate]:
     """Every comparison of ``_PAIRS`` by panel and planner.
 
-    If no attempt recalled by the encoder, another recall that ranks plans takes its place.
+    Where nothing was recalled by the encoder, another recall that ranks plans takes its place.
     """
     attempted = [each for each in configured(attempts)[1].values() if each.recall != "exhaustive"]
 
     def nearest(wanted: Configuration) -> Configuration:
+        if wanted in attempted:
+            return wanted
         like = (each for each in attempted if (each.assist, each.top_k) == (wanted.assist, wanted.top_k))
         return next(like, wanted)
 

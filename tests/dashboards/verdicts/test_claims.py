@@ -67,6 +67,15 @@ def test_the_largest_reduction_is_held_against_89_per_cent(factor: float, verdic
     assert find(found, "up to 89 %").verdict == verdict
 
 
+def test_the_encoder_is_judged_by_its_own_rows_and_another_recall_only_where_it_has_none() -> None:
+    by_encoder = measured(BETTER)
+    hybrid = by_encoder.assign(recall=by_encoder["recall"].replace("encoder", "hybrid"))
+    slow = hybrid.assign(planning_seconds=9.0 * hybrid["planning_seconds"]).query("assist != 'none'")
+    words = "every planner faster on every class"
+    assert find(decided(pd.concat([by_encoder, slow])), words).verdict == HOLDS
+    assert find(decided(hybrid), words).verdict == HOLDS
+
+
 def test_what_was_not_measured_cannot_be_compared() -> None:
     found = claims(Evidence(attempts(("forest",), ("gust",), BARS), recalls(("forest",)), resamples=20))
     assert {claim.verdict for claim in found} == {OPEN}
