@@ -218,7 +218,8 @@ def retrieval_groups(retrieval: pd.DataFrame) -> list[Rows]:
         lines = []
         for _, rows in of_memory.groupby("protocol", sort=False):
             blind = rows.iloc[0].copy()
-            origin = [math.nan if math.isnan(blind["origin@1"]) else k / blind["plans"] for k in (1, 5)]
+            plans = blind["plans"]
+            origin = [math.nan if math.isnan(blind["origin@1"]) else min(k, plans) / plans for k in (1, 5)]
             blind[["origin@1", "origin@5"]] = origin
             blind[["hit@1", "hit@5"]] = blind[["random@1", "random@5"]].to_numpy()
             blind[[f"{name}_sd@{k}" for name in ("origin", "hit") for k in (1, 5)]] = math.nan

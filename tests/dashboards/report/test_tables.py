@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import pandas as pd
 import pytest
@@ -47,6 +48,14 @@ def test_the_table_holds_every_planner_configuration_and_class() -> None:
         for planner in ("rrt", "gust", "follow")
         for each in ALL
     }
+
+
+@pytest.mark.parametrize("plans", [1, 4, 30])
+def test_no_share_of_the_retrieval_table_exceeds_all_however_few_the_plans(plans: int) -> None:
+    text = retrieval_markdown(summarise_retrieval(retrieval_curve(recalls(("trap",), plans=plans))))
+    shares = [float(share) for share in re.findall(r"\d+\.\d", text)]
+    assert shares
+    assert max(shares) <= 100.0
 
 
 @pytest.mark.parametrize("slowness", [1e-4, 1.0, 1e4])
