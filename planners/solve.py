@@ -63,6 +63,7 @@ class Attempt:
     duration_s: float | None  # None if not solved
     seed: int
     plan: Plan | None
+    verified: bool | None  # what the authority said of the plan; None: it was not asked
 
 
 _PARTS = tuple(
@@ -207,6 +208,7 @@ def solve(
         duration_s=None if answer is None else answer.duration_s,
         seed=seed,
         plan=answer,
+        verified=None,
     )
 
 

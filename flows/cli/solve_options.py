@@ -23,7 +23,7 @@ class SolveOptions:
     top_k
         How many plans to recall.
     recall
-        How to recall them: exhaustive, mask, hybrid, encoder, centroid, random; default: the best for it.
+        How to recall them: exhaustive, mask, hybrid, encoder, centroid, random; default: by its size.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle

@@ -116,7 +116,7 @@ ATTEMPTS: Final = _schema(
         ("scene_seconds", pa.float64()),  # making the obstacles ready for collision checks
         ("guide_seconds", pa.float64()),  # finding a way over the grid, or along a recalled plan
         ("repair_seconds", pa.float64()),  # repairing a recalled plan, successful or not
-        ("verified", pa.bool_()),  # an independent check agreed; null if there was none
+        ("verified", pa.bool_()),  # what the authority said of the plan; null if there is none
         ("vehicle", pa.string()),  # its name
         ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
     ],

@@ -6,7 +6,7 @@ import functools
 import math
 import platform
 import subprocess
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,36 +25,46 @@ class PlanFaultError(RunError):
     """A plan of a solved problem is faulty: a bug, never data."""
 
 
-def check_attempt(problem: Problem, attempt: Attempt, checked: set[bytes], vehicle: Vehicle) -> None:
-    """Have the authority check the plan of an attempt, if it has one.
+def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
+    """Have the authority judge the plan of an attempt, which has to be right.
 
     Args:
         problem: what was attempted.
         attempt: the attempt.
-        checked: plans that need no check; this one is added.
+        accepted: plans for this problem that the authority has accepted; this one is added.
         vehicle: who drives.
+
+    Returns:
+        the attempt with the authority's answer in ``verified``.
 
     Raises:
         PlanFaultError: the plan does not solve the problem.
 
     """
-    if attempt.plan is None:
-        return
-    plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
-    if plan in checked:
-        return
-    wrong = faults(problem, attempt.plan, vehicle)
-    if wrong:
+    judged = judged_attempt(problem, attempt, accepted, vehicle)
+    if judged.verified is False and attempt.plan is not None:
         planner = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
-        raise PlanFaultError(f"{problem.id} solved by {planner}: {wrong[0]}")
-    checked.add(plan)
+        fault = faults(problem, attempt.plan, vehicle)[0]
+        raise PlanFaultError(f"{problem.id} solved by {planner}: {fault}")
+    return judged
+
+
+def judged_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
+    """Like ``check_attempt``, but a plan that the authority refuses raises nothing."""
+    if attempt.plan is None:
+        return attempt
+    plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
+    right = plan in accepted or not faults(problem, attempt.plan, vehicle)
+    if right:
+        accepted.add(plan)
+    return replace(attempt, verified=right)
 
 
 def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
-    """The row of a checked attempt (``storage.tables.schemas.ATTEMPTS``).
+    """The row of an attempt (``storage.tables.schemas.ATTEMPTS``), with what the authority said of its plan.
 
     Args:
-        attempt: the attempt.
+        attempt: the attempt, as ``check_attempt`` returned it.
         memory: name of the memory that it used, if any.
         run_id: the run that made the memory, if any.
         vehicle: who drives.
@@ -64,13 +74,13 @@ def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicl
     if not attempt.solved:
         row |= dict.fromkeys(_UNKNOWN_WHEN_UNSOLVED)
     where = {"run_id": run_id, "commit": commit(), "host": platform.node(), "vehicle": name_of(vehicle)}
-    return row | where | {"memory": memory, "verified": True if attempt.solved else None}
+    return row | where | {"memory": memory}
 
 
 def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> bool:
-    """Whether an attempt that was made again agrees with its row, but for times."""
+    """Whether an attempt that was made and judged again agrees with its row, but for times."""
     again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
-    counted = ("status", "solved", "collision_checks", "expansions", "nodes")
+    counted = ("status", "solved", "verified", "collision_checks", "expansions", "nodes")
     lengths = (again["length_m"] or math.nan, row["length_m"])
     return (
         all(again[name] == row[name] for name in counted)

@@ -107,8 +107,8 @@ def side_by_side(
     attempts = in_turn(problems, len(contestants), seed, attempt)
     rows: list[dict[str, Any]] = []
     for number, problem in enumerate(problems):
-        checked: set[bytes] = set()
+        accepted: set[bytes] = set()
         for i, contestant in enumerate(contestants):
-            check_attempt(problem, attempts[number, i], checked, vehicle)
-            rows.append(attempt_row(attempts[number, i], contestant.memory, contestant.run, vehicle))
+            checked = check_attempt(problem, attempts[number, i], accepted, vehicle)
+            rows.append(attempt_row(checked, contestant.memory, contestant.run, vehicle))
     return rows

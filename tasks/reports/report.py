@@ -49,7 +49,7 @@ from tasks.stages.sweep import sweep_rows
 
 COLUMNS: Final = 110  # width of tables that are not printed to a terminal
 NOT_NEEDED: Final = (
-    "recalled", "run_id", "vehicle", "verified", "seed", "nodes", "expansions", "length_m",
+    "recalled", "run_id", "vehicle", "seed", "nodes", "expansions", "length_m",
     "host", "commit",
 )  # fmt: skip
 MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared by their experiences
@@ -71,6 +71,7 @@ def report_run(data: str, settings: RunSettings) -> Report:
     """Write tables, charts and the page into a run's folder; StorageError if the run has no rows."""
     run = run_folder(data, settings)
     attempts = read_attempts(run.results, NOT_NEEDED)
+    check_verified(attempts)
     continual = continual_rows(data, settings, attempts)
     summary, recalls = summarise(attempts), _recall_rows(data, settings)
     report = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, continual)))
@@ -93,6 +94,25 @@ def report_run(data: str, settings: RunSettings) -> Report:
     made_by = {name: distinct_values(run.results, name) for name in ("host", "commit")}
     _write(run.report, page_of(run, settings, attempts, *report, made_by))
     return report
+
+
+def check_verified(attempts: pd.DataFrame) -> None:
+    """Refuse ``attempts`` of which one counts as solved by a plan that the authority did not accept.
+
+    Raises:
+        StorageError: there is such an attempt.
+
+    """
+    if "verified" not in attempts:  # rows from before the answer was kept
+        return
+    wrong = attempts[attempts["solved"] & ~attempts["verified"].eq(True)]
+    if len(wrong):
+        first = wrong.iloc[0]
+        raise StorageError(
+            f"{len(wrong):,} of {len(attempts):,} attempts count as solved by plans that the authority did "
+            f"not accept; the first: {first['problem_id']} by {first['planner']}, {first['assist']} "
+            f"{first['top_k']}. No report is made of them."
+        )
 
 
 def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> pd.DataFrame:

@@ -152,7 +152,7 @@ class Assistant:
         attempt = self.attempt(canonical)
         if self.improve_seconds > 0.0:
             attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle, self._workspace)
-        check_attempt(canonical, attempt, set(), self.vehicle)
+        attempt = check_attempt(canonical, attempt, set(), self.vehicle)
         if attempt.length_m is not None:
             attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)

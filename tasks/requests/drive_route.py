@@ -57,7 +57,7 @@ class _Solver:
 
     def _solved(self, problem: Problem, assist: str) -> Attempt:
         attempt = self.assistant.attempt(replace(problem, scale=self.scale), assist)
-        check_attempt(problem, attempt, set(), self.assistant.vehicle)
+        attempt = check_attempt(problem, attempt, set(), self.assistant.vehicle)
         self.seconds.append(attempt.planning_seconds)
         return attempt
 

@@ -207,7 +207,9 @@ def _attempts(
     source, vehicle = problem_source(data, settings, name), vehicle_named(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
     wrong = [
-        f"{path}: a plan for {row['problem_id']} was never checked" for row in solved if not row["verified"]
+        f"{path}: the authority did not accept a plan for {row['problem_id']}"
+        for row in solved
+        if not row["verified"]
     ]
     memories = {
         (name, run_id): load_memory(
@@ -237,7 +239,7 @@ def _attempts(
                 strategy=row["recall"],
                 workspace=workspace,
             )
-            check_attempt(problem, attempt, set(), vehicle)
+            attempt = check_attempt(problem, attempt, set(), vehicle)
             attempts_repeated += 1
             plans_checked += attempt.solved
             if not same_outcome(attempt, row, vehicle):
@@ -245,7 +247,9 @@ def _attempts(
     return Counter(
         {
             "attempts read": len(rows),
-            "plans of attempts checked by FCL when they were made": len(solved),
+            "plans of attempts checked by FCL when they were made": sum(
+                bool(row["verified"]) for row in solved
+            ),
             "attempts made again": attempts_repeated,
             "plans of these re-simulated and checked by FCL": plans_checked,
         }

@@ -8,11 +8,12 @@ from typing import Final
 import pandas as pd
 import pytest
 
+from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
 from storage.places.files import write_json
 from storage.tables.attempts import read_attempts, write_attempts
 from tasks.fan_out.chunk import keep_settings
-from tasks.reports.report import continual_rows
+from tasks.reports.report import check_verified, continual_rows
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import COMBINED, RunSettings
@@ -37,6 +38,16 @@ def measure(data: Path, settings: RunSettings, memories: Sequence[str] = ()) -> 
 def grown(data: Path, settings: RunSettings) -> pd.DataFrame:
     own = open_data_folder(data).run(settings.run_name)
     return continual_rows(str(data), settings, read_attempts(own.results))
+
+
+@pytest.mark.parametrize("said", [False, None])
+def test_no_report_is_made_of_plans_that_the_authority_did_not_accept(tmp_path: Path, said: object) -> None:
+    rows = [{**ATTEMPT, "verified": True}, {**ATTEMPT, "solved": False, "verified": None}]
+    write_attempts(tmp_path / "right.parquet", rows)
+    check_verified(read_attempts(tmp_path / "right.parquet"))
+    write_attempts(tmp_path / "wrong.parquet", [*rows, {**ATTEMPT, "verified": said}])
+    with pytest.raises(StorageError, match=f"1 of 3 attempts count as solved .* {ATTEMPT['problem_id']} by"):
+        check_verified(read_attempts(tmp_path / "wrong.parquet"))
 
 
 def test_growing_experience_is_that_of_the_planners_and_classes_that_several_runs_measured(
