@@ -20,6 +20,7 @@ SECTIONS: Final = {
     "assists": "tests.speed.assists",
     "latency": "tests.speed.latency",
     "cold_clock": "tests.speed.cold_clock",
+    "cold_recall": "tests.speed.cold_recall",
     "one_problem": "tests.speed.one_problem",
     "warm_start": "tests.speed.warm_start",
     "curation": "tests.speed.curation",
