@@ -9,6 +9,8 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any, Final
 
+import orjson
+
 from storage.errors import StorageError
 
 SMALLEST_SCALE: Final = 0.01  # a robot of 2 cm
@@ -29,6 +31,9 @@ def parse_json(text: str | bytes, where: str) -> Any:
             raise StorageError(f"{where} {_repeated(name for name, _ in pairs)}.")
         return fields
 
+    plain = _plain_object(text)
+    if plain is not None:
+        return plain
     try:
         decoded = text if isinstance(text, str) else text.decode()
         if decoded.startswith("\ufeff"):
@@ -38,6 +43,23 @@ def parse_json(text: str | bytes, where: str) -> Any:
         raise StorageError(f"{where} is not text in UTF-8; is it the right file?") from None
     except (ValueError, RecursionError) as error:
         raise StorageError(f"{where} is not valid JSON ({error}); was it cut off?") from None
+
+
+def _plain_object(text: str | bytes) -> dict[str, Any] | None:
+    """The object that a ``text`` holds, read in a fifth of the time, or None if it has to be read with care.
+
+    It is plain if its only texts are its fields and their values, none with a backslash. Then each has two
+    quotes, and a field that occurs twice leaves quotes over.
+    """
+    quote, escape = ('"', "\\") if isinstance(text, str) else (b'"', b"\\")
+    try:
+        value = orjson.loads(text)
+    except orjson.JSONDecodeError:
+        return None
+    if type(value) is not dict or escape in text:  # type: ignore[operator]  # both are of the same kind
+        return None
+    texts = len(value) + sum(type(each) is str for each in value.values())
+    return value if text.count(quote) == 2 * texts else None  # type: ignore[arg-type]
 
 
 def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:

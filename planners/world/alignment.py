@@ -10,7 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats, Point
-from planners.world.problem import CANONICAL_DISTANCE, CANONICAL_START, Plan, Problem, obstacles_of
+from planners.world.problem import (
+    CANONICAL_DISTANCE,
+    CANONICAL_START,
+    Obstacles,
+    Plan,
+    Problem,
+    obstacles_of,
+)
 
 SAME_ANGLE = 1e-9  # radians: a smaller turn moves nothing by as much as the last digit of a float32
 SLIVER = 1e-4  # metres: thinner triangles are left out, since float32 would turn them inside out
@@ -51,19 +58,17 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
     alignment = Alignment((x, y), 0.0 if abs(turn) < SAME_ANGLE else -turn)
     if alignment == Alignment((0.0, 0.0), 0.0):
         return problem, alignment
-    groups = [[_turned(piece, alignment) for piece in group] for group in _groups(problem)]
     x_min, y_min, x_max, y_max = problem.bounds
     corners = _turned(np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]]), alignment)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    if alignment.turn != 0.0:
-        groups += [[triangle] for triangle in _cut_off(corners, low, high)]
+    cut_off = _cut_off(corners, low, high) if alignment.turn != 0.0 else []
     goal_x, goal_y = _turned(np.array([goal]), alignment)[0]
     return replace(
         problem,
         start=(0.0, 0.0, heading + alignment.turn),
         goal=(float(goal_x), float(goal_y)),
         bounds=(float(low[0]), float(low[1]), float(high[0]), float(high[1])),
-        obstacles=obstacles_of(groups),
+        obstacles=_joined(_turned(problem.obstacles.vertices, alignment), problem.obstacles, cut_off),
     ), alignment
 
 
@@ -105,6 +110,17 @@ def _turned(points: Floats, alignment: Alignment) -> Floats:
     cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
     turned: Floats = (points - alignment.origin) @ np.array([[cos, sin], [-sin, cos]])
     return turned
+
+
+def _joined(vertices: Floats, obstacles: Obstacles, triangles: list[Floats]) -> Obstacles:
+    """The same obstacles with other vertices ``[V, 2]``, and triangles ``[3, 2]`` behind them, in float32."""
+    more = obstacles_of([[triangle] for triangle in triangles])
+    _, piece_starts, obstacle_starts = obstacles
+    return Obstacles(
+        np.concatenate((vertices.astype(np.float32).astype(np.float64), more.vertices)),
+        np.concatenate((piece_starts, piece_starts[-1] + more.piece_starts[1:])),
+        np.concatenate((obstacle_starts, obstacle_starts[-1] + more.obstacle_starts[1:])),
+    )
 
 
 def _groups(problem: Problem) -> list[list[Floats]]:

@@ -7,9 +7,19 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.geometry.collision import CELL_M, REACH_M, count_free_prefix, point_is_free, scene_of
+from planners.world.arrays import Bounds, Floats, Integers, Point
+from planners.world.geometry.collision import (
+    CELL_M,
+    REACH_M,
+    box_is_inside,
+    box_meets_piece,
+    make_edges,
+    piece_extent,
+)
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
+from planners.world.jit import jit
 from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
+from planners.world.vehicles.dynamics import load, swept_bodies
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
@@ -43,25 +53,62 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
             f"start and goal are {distance:.2f} m apart, expected {CANONICAL_DISTANCE:.2f} m within the "
             f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
         )
-    if _entries(problem) > MOST_LISTED:
+    entries, start_is_free, goal_is_free = _room(
+        problem.obstacles.vertices,
+        problem.obstacles.piece_starts,
+        problem.bounds,
+        start_state(problem, vehicle)[np.newaxis],
+        problem.goal,
+        vehicle,
+    )
+    if entries > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"
-    scene = scene_of(problem)
-    if count_free_prefix(start_state(problem, vehicle)[np.newaxis], vehicle, scene) == 0:
+    if not start_is_free:
         return f"start footprint at {_point(problem.start)} is not free or leaves the bounds; move the start"
-    x, y = problem.goal
-    if not point_is_free(x, y, scene):
+    if not goal_is_free:
         return f"goal centre {_point(problem.goal)} lies in an obstacle or out of bounds; move the goal"
     return None
 
 
-def _entries(problem: Problem) -> float:
-    """Estimate how many entries the cell lists of the problem's scene will have."""
-    vertices, starts = problem.obstacles.vertices, problem.obstacles.piece_starts[:-1]
-    if len(vertices) == 0:
-        return 0.0
-    low = np.maximum(np.minimum.reduceat(vertices, starts) - REACH_M, problem.bounds[:2])
-    high = np.minimum(np.maximum.reduceat(vertices, starts) + REACH_M, problem.bounds[2:])
-    return float((np.maximum(high - low, 0.0) / CELL_M + 1.0).prod(axis=1).sum())
+@jit
+def _room(
+    vertices: Floats, piece_starts: Integers, bounds: Bounds, start: Floats, goal: Point, vehicle: Vehicle
+) -> tuple[float, bool, bool]:
+    """How many entries the cell lists of a problem's scene will have, and whether both its ends are free.
+
+    The answers are those of its scene, which would take far longer to build. ``start [1, S]`` is the first
+    state, with nothing folded.
+    """
+    entries = 0.0
+    goal_box = (goal[0], goal[1], 1.0, 0.0, 0.0, 0.0)
+    goal_is_free = box_is_inside(goal_box, bounds)
+    start_is_free = True
+    for box in swept_bodies(load(start, 0, vehicle), vehicle):
+        start_is_free &= box_is_inside(box, bounds)
+    edges = np.empty((vertices.shape[0], 5))
+    for p in range(piece_starts.shape[0] - 1):
+        first = piece_starts[p]
+        last = piece_starts[p + 1]
+        x_min, y_min, x_max, y_max = piece_extent(vertices, first, last)
+        x_min -= REACH_M
+        y_min -= REACH_M
+        x_max += REACH_M
+        y_max += REACH_M
+        across = max(min(x_max, bounds[2]) - max(x_min, bounds[0]), 0.0)
+        along = max(min(y_max, bounds[3]) - max(y_min, bounds[1]), 0.0)
+        entries += (across / CELL_M + 1.0) * (along / CELL_M + 1.0)
+        made = False
+        for box in swept_bodies(load(start, 0, vehicle), vehicle):
+            if x_min <= box[0] <= x_max and y_min <= box[1] <= y_max:
+                if not made:
+                    make_edges(vertices, first, last, edges, 0)
+                    made = True
+                start_is_free &= not box_meets_piece(box, 0, last - first, edges)
+        if x_min <= goal[0] <= x_max and y_min <= goal[1] <= y_max:
+            if not made:
+                make_edges(vertices, first, last, edges, 0)
+            goal_is_free &= not box_meets_piece(goal_box, 0, last - first, edges)
+    return entries, start_is_free, goal_is_free
 
 
 def _point(coordinates: tuple[float, ...]) -> str:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.geometry.polygons import PolygonError, convex_pieces
-from planners.world.problem import Obstacles, Problem, obstacles_of
+from planners.world.geometry.polygons import cut_polygons
+from planners.world.problem import Obstacles, Problem
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
@@ -130,34 +131,41 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
 def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:
     if not isinstance(polygons, list):
         raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
-    pieces = []
-    for number, points in enumerate(polygons, start=1):
-        try:
-            pieces.append(convex_pieces(_points(points) / scale))
-        except PolygonError as error:
-            raise ValueError(f"obstacle {number} {error}") from None
+    points = _points(polygons)
+    starts = np.cumsum([0] + [len(polygon) for polygon in polygons], dtype=np.int64)
+    obstacles = cut_polygons(points / scale, starts)
     if groups is None:
-        return obstacles_of(pieces)
+        return obstacles
     if not isinstance(groups, list) or not all(type(size) is int and size > 0 for size in groups):
         raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
-    if sum(groups) != len(pieces):
+    if sum(groups) != len(polygons):
         raise ValueError(
-            f"groups are of {sum(groups)} polygons, obstacles are {len(pieces)}; make them agree"
+            f"groups are of {sum(groups)} polygons, obstacles are {len(polygons)}; make them agree"
         )
-    ends = np.cumsum(groups).tolist()
-    return obstacles_of(
-        [
-            [piece for polygon in pieces[end - size : end] for piece in polygon]
-            for size, end in zip(groups, ends, strict=True)
-        ]
-    )
+    ends = np.cumsum([0, *groups])
+    return obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
 
 
-def _points(points: object) -> Floats:
+def _points(polygons: list[Any]) -> Floats:
+    """The points ``[m, 2]`` of all polygons, one after another."""
+    if set(map(type, polygons)) <= {list}:
+        corners = list(chain.from_iterable(polygons))
+        if set(map(type, corners)) <= {list} and set(map(len, corners)) <= {2}:
+            numbers = list(chain.from_iterable(corners))
+            if set(map(type, numbers)) <= {float, int}:
+                try:
+                    return np.array(numbers, np.float64).reshape(-1, 2)
+                except OverflowError:  # an integer beyond all floats
+                    pass
+    return np.concatenate([_points_of(polygon, i) for i, polygon in enumerate(polygons, start=1)])
+
+
+def _points_of(points: object, number: int) -> Floats:
+    """The points ``[m, 2]`` of one polygon. Raises ValueError, which says what is wrong with them."""
     if not isinstance(points, list) or not all(
         isinstance(point, list) and len(point) == 2 for point in points
     ):
-        raise PolygonError("must be a list of points [x, y] in metres; correct it")
+        raise ValueError(f"obstacle {number} must be a list of points [x, y] in metres; correct it")
     return np.array([[number_of(x, "a point"), number_of(y, "a point")] for x, y in points]).reshape(-1, 2)
 
 

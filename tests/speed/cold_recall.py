@@ -1,14 +1,14 @@
 """Cold recall: what a memory costs an attempt, by part, and what the robot's whole call takes.
 
-``python -m tests.speed cold_recall`` makes every call once a problem, with other calls, other problems and 4 MB
-of other data between two calls for the same problem, as the benchmark does. Printed are microseconds: the
-median and the 99 % of whole calls, and medians of their parts.
+``python -m tests.speed cold_recall`` makes every call once a problem, with other calls, other problems and
+4 MB of other data between two calls for the same problem, as the benchmark does. Printed are microseconds:
+the median and the 99 % of whole calls, and medians of their parts.
 
 First ``solve`` by ``closed 5`` with 100 plans: planning time less what a planner searched ("whole"); of this
-drawing, encoding, ranking, making the scene and checking; "rest" is what belongs to none of these, and "after"
+drawing, encoding, ranking, making the scene and checking; "rest" is what belongs to none of these, "after" is
 what ``solve`` does when the clock has stopped. Then the robot's call, its plan not judged, from JSON, from
-arrays, and from arrays in a frame of their own; "recalled" says how many problems a stored plan answered, and
-only these count here. Problems have a seed of their own: they are neither collected from, nor tuned or tested on.
+arrays, and both in a frame of their own; "recalled" says how many problems a stored plan answered, and only
+these count here. Problems have a seed of their own: they are neither collected from, nor tuned or tested on.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from tests.speed.assists import memory_of
 
 MEASURING: Final = 88
 COUNT: Final = 500  # problems a class
-STRATEGIES: Final = ("exhaustive", "mask", "centroid")
+STRATEGIES: Final = ("exhaustive", "mask", "encoder")
 PARTS: Final = ("occupancy", "encode", "recall", "scene", "check")
 TURN: Final = 0.7  # radians: the frame of their own of problems from arrays
 FAR: Final = (120.0, -80.0)  # metres: its origin

@@ -17,6 +17,7 @@ from planners.world.geometry.collision import (
     REACH_M,
     Scene,
     box_is_free,
+    box_is_inside,
     box_meets_piece,
     make_edges,
     piece_extent,
@@ -169,16 +170,8 @@ def least_blocked(order: Integers, sweeps: PlanSweeps, ends: Ends, scene: Scene)
 @inlined
 def _inside(boxes: Floats, first: int, last: int, bounds: Bounds) -> bool:
     for j in range(first, last):
-        cos = abs(boxes[j, 2])
-        sin = abs(boxes[j, 3])
-        extent_x = boxes[j, 4] * cos + boxes[j, 5] * sin
-        extent_y = boxes[j, 4] * sin + boxes[j, 5] * cos
-        if (
-            boxes[j, 0] - extent_x < bounds[0]
-            or boxes[j, 0] + extent_x > bounds[2]
-            or boxes[j, 1] - extent_y < bounds[1]
-            or boxes[j, 1] + extent_y > bounds[3]
-        ):
+        box = (boxes[j, 0], boxes[j, 1], boxes[j, 2], boxes[j, 3], boxes[j, 4], boxes[j, 5])
+        if not box_is_inside(box, bounds):
             return False
     return True
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Box, Floats, Integers
+from planners.world.arrays import Bounds, Box, Floats, Integers
 from planners.world.jit import inlined, jit
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
@@ -173,21 +173,27 @@ def scene_of(problem: Problem) -> Scene:
 
 
 @inlined
-def box_is_free(box: Box, scene: Scene) -> bool:
-    """Whether a box, whose half-diagonal is at most REACH_M, is inside the bounds and meets no obstacle."""
+def box_is_inside(box: Box, bounds: Bounds | Floats) -> bool:
+    """Whether a box lies inside the bounds, which are a tuple or an array ``[4]``."""
     x, y, cos, sin, half_length, half_width = box
     extent_x = half_length * abs(cos) + half_width * abs(sin)
     extent_y = half_length * abs(sin) + half_width * abs(cos)
+    return bool(
+        x - extent_x >= bounds[0]
+        and x + extent_x <= bounds[2]
+        and y - extent_y >= bounds[1]
+        and y + extent_y <= bounds[3]
+    )
+
+
+@inlined
+def box_is_free(box: Box, scene: Scene) -> bool:
+    """Whether a box, whose half-diagonal is at most REACH_M, is inside the bounds and meets no obstacle."""
     bounds = scene.bounds
-    if (
-        x - extent_x < bounds[0]
-        or x + extent_x > bounds[2]
-        or y - extent_y < bounds[1]
-        or y + extent_y > bounds[3]
-    ):
+    if not box_is_inside(box, bounds):
         return False
-    column = int((x - bounds[0]) * (1.0 / CELL_M))
-    row = int((y - bounds[1]) * (1.0 / CELL_M))
+    column = int((box[0] - bounds[0]) * (1.0 / CELL_M))
+    row = int((box[1] - bounds[1]) * (1.0 / CELL_M))
     cell = row * scene.columns + column
     pieces = scene.cell_pieces
     edges = scene.edges

@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 import shapely
 
-from planners.world.arrays import Floats
-from planners.world.problem import counter_clockwise
+from planners.world.arrays import Flags, Floats, Indices, Integers
+from planners.world.jit import inlined, jit, lean
+from planners.world.problem import Obstacles, counter_clockwise
 
 Corner = tuple[float, ...]
 
@@ -19,6 +20,109 @@ SURE_TURN_M2: Final = 1e-6  # far more than rounding can make of a straight angl
 
 class PolygonError(ValueError):
     """Says what is wrong with a polygon and what to do, as the end of a sentence that names the polygon."""
+
+
+def cut_polygons(points: Floats, starts: Indices) -> Obstacles:
+    """Cut simple polygons into convex pieces, as ``convex_pieces`` does, those that are convex in one go.
+
+    Args:
+        points: ``[m, 2]`` metres, of all polygons one after another.
+        starts: ``[n + 1]`` polygon i owns ``points[starts[i] : starts[i + 1]]``.
+
+    Returns:
+        Each polygon as an obstacle.
+
+    Raises:
+        PolygonError: As for ``convex_pieces``. The message names the polygon, "obstacle 1" being the first.
+    """
+    vertices, piece_starts, convex = _convex_polygons(np.ascontiguousarray(points, np.float64), starts)
+    if convex.all():
+        return Obstacles(vertices, piece_starts, np.arange(len(starts), dtype=np.int32))
+    pieces: list[Floats] = []
+    piece_counts = []
+    for i, whole in enumerate(convex.tolist()):
+        if whole:
+            cut = [vertices[piece_starts[i] : piece_starts[i + 1]]]
+        else:
+            try:
+                cut = convex_pieces(points[starts[i] : starts[i + 1]])
+            except PolygonError as error:
+                raise PolygonError(f"obstacle {i + 1} {error}") from None
+        pieces += cut
+        piece_counts.append(len(cut))
+    return Obstacles(
+        np.concatenate(pieces),
+        np.cumsum([0] + [len(piece) for piece in pieces], dtype=np.int32),
+        np.cumsum([0, *piece_counts], dtype=np.int32),
+    )
+
+
+@jit
+def _convex_polygons(points: Floats, starts: Indices) -> tuple[Floats, Integers, Flags]:
+    """The vertices ``[V, 2]`` and starts ``[n + 1]`` of convex polygons, and which ``[n]`` surely are convex.
+
+    The vertices are rounded to float32, counter-clockwise, and none is repeated. Polygons that may be
+    anything else are left out. One whose every corner turns left is convex if its edges go round only once.
+    """
+    count = starts.shape[0] - 1
+    vertices = np.empty((points.shape[0], 2))
+    piece_starts = np.zeros(count + 1, np.int32)
+    convex = np.zeros(count, np.bool_)
+    end = 0
+    for p in range(count):
+        first = starts[p]
+        last = starts[p + 1]
+        corners = 0
+        usable = last - first >= 3
+        for i in range(first, last):
+            j = i + 1 if i + 1 < last else first
+            usable &= abs(points[i, 0]) <= LARGEST_COORDINATE_M and abs(points[i, 1]) <= LARGEST_COORDINATE_M
+            x = np.float64(np.float32(points[i, 0]))
+            y = np.float64(np.float32(points[i, 1]))
+            if x != np.float64(np.float32(points[j, 0])) or y != np.float64(np.float32(points[j, 1])):
+                vertices[end + corners, 0] = x
+                vertices[end + corners, 1] = y
+                corners += 1
+        if usable and corners >= 3:
+            convex[p] = _goes_round(vertices, end, corners)
+        if convex[p]:
+            end += corners
+        piece_starts[p + 1] = end
+    return vertices[:end], piece_starts, convex
+
+
+@lean
+def _goes_round(vertices: Floats, first: int, corners: int) -> bool:
+    """Whether a polygon surely is convex. Its vertices are turned round if they are clockwise."""
+    least = math.inf
+    most = -math.inf
+    rounds = 0
+    dx = vertices[first, 0] - vertices[first + corners - 1, 0]
+    dy = vertices[first, 1] - vertices[first + corners - 1, 1]
+    for i in range(first, first + corners):
+        j = i + 1 if i + 1 < first + corners else first
+        next_dx = vertices[j, 0] - vertices[i, 0]
+        next_dy = vertices[j, 1] - vertices[i, 1]
+        turn = dx * next_dy - dy * next_dx
+        least = min(least, turn)
+        most = max(most, turn)
+        rounds += _leads_up(dx, dy) and not _leads_up(next_dx, next_dy)
+        dx = next_dx
+        dy = next_dy
+    if rounds != 1 or (least <= SURE_TURN_M2 and most >= -SURE_TURN_M2):
+        return False
+    if most < 0.0:
+        for k in range(corners // 2):
+            i = first + k
+            j = first + corners - 1 - k
+            for axis in range(2):
+                vertices[i, axis], vertices[j, axis] = vertices[j, axis], vertices[i, axis]
+    return True
+
+
+@inlined
+def _leads_up(dx: float, dy: float) -> bool:
+    return dy > 0.0 or (dy == 0.0 and dx > 0.0)
 
 
 def convex_pieces(polygon: Floats) -> list[Floats]:

@@ -16,7 +16,7 @@ from storage.errors import StorageError
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problem_files import FIELDS, FORMATS
 from storage.exchange.problems import fields_of, read_problems
-from storage.fields import check_fields
+from storage.fields import check_fields, parse_json
 from tests.storage.samples import box, plan, problem_with, quick
 
 GOOD: dict[str, Any] = fields_of(problem_with([box(20, 20)]))
@@ -77,6 +77,27 @@ def test_a_field_that_is_there_twice_is_refused(tmp_path: Path, ending: str, nam
     path = tmp_path / f"p{ending}"
     path.write_text(f'{json.dumps(GOOD)[:-1]}, "{name}": [], "{name}": []}}')
     assert f"{name!r} more than once" in refusal(path)
+
+
+@given(
+    pairs=st.lists(
+        st.tuples(
+            st.sampled_from(["a", "b", 'a"', "a\\"]),
+            st.sampled_from(['"x"', '"\\""', "1", "[2, [3.5]]", '{"b": "a"}']),
+        ),
+        max_size=4,
+    )
+)
+def test_an_object_is_read_as_json_says_but_for_fields_that_are_there_twice(
+    pairs: list[tuple[str, str]],
+) -> None:
+    text = "{" + ", ".join(f"{json.dumps(name)}: {value}" for name, value in pairs) + "}"
+    for given_text in (text, text.encode()):
+        if len({name for name, _ in pairs}) < len(pairs):
+            with pytest.raises(StorageError, match="more than once"):
+                parse_json(given_text, "it")
+        else:
+            assert parse_json(given_text, "it") == json.loads(text)
 
 
 def test_a_column_that_is_there_twice_is_refused(tmp_path: Path) -> None:

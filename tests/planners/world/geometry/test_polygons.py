@@ -7,8 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.world.arrays import Floats
-from planners.world.geometry.polygons import PolygonError, convex_pieces
+from planners.world.geometry.polygons import PolygonError, convex_pieces, cut_polygons
+from planners.world.problem import obstacles_of
 from tests.storage.samples import box, quick, stars
+
+
+def regular(corners: int) -> Floats:
+    angles = np.arange(corners) * (2.0 * np.pi / corners)
+    return np.column_stack((10.0 + 3.0 * np.cos(angles), 20.0 + 3.0 * np.sin(angles)))
 
 
 @quick
@@ -39,6 +45,32 @@ def test_a_convex_polygon_is_its_own_only_piece() -> None:
     assert {tuple(corner) for corner in piece} == {tuple(corner) for corner in box(20, 20)}
     with_middle = np.insert(box(20, 20), 1, [20.0, 19.0], axis=0)
     assert len(convex_pieces(with_middle)) == 1
+
+
+@quick
+@given(
+    polygons=st.lists(st.one_of(stars, st.integers(3, 9).map(regular)), max_size=6),
+    backwards=st.booleans(),
+    repeated=st.booleans(),
+)
+def test_many_polygons_are_cut_as_each_alone(polygons: list[Floats], backwards: bool, repeated: bool) -> None:
+    given_polygons = [polygon[::-1] if backwards else polygon for polygon in polygons]
+    given_polygons = [np.repeat(polygon, 1 + repeated, axis=0) for polygon in given_polygons]
+    starts = np.cumsum([0] + [len(polygon) for polygon in given_polygons])
+    cut = cut_polygons(np.concatenate([np.empty((0, 2)), *given_polygons]), starts)
+    alone = obstacles_of([convex_pieces(polygon) for polygon in given_polygons])
+    for name in cut._fields:
+        one, other = getattr(cut, name), getattr(alone, name)
+        assert np.array_equal(one, other)
+        assert one.dtype == other.dtype
+
+
+@pytest.mark.parametrize("corners", [5, 7])
+def test_edges_that_go_round_twice_are_refused_beside_convex_polygons(corners: int) -> None:
+    star = regular(corners)[np.arange(corners) * 2 % corners]  # each corner turns left
+    points = np.concatenate((box(20, 20), star))
+    with pytest.raises(PolygonError, match="obstacle 2 crosses"):
+        cut_polygons(points, np.array([0, 4, 4 + corners]))
 
 
 def test_triangles_are_joined_where_they_stay_convex() -> None:
