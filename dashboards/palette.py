@@ -31,6 +31,7 @@ _ASSISTS: Final = {  # with one recalled plan, and with more
     "none": (GREY, GREY),
     "closed": (SKY, BLUE),
     "open": (ORANGE, VERMILLION),
+    "published-open": (ORANGE, VERMILLION),
     "repair": (GREEN, GREEN),
     "fresh": (YELLOW, YELLOW),
 }

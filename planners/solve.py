@@ -16,7 +16,7 @@ from planners.memory.plans.free import ends_of, least_blocked, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
 from planners.search.guides.grid_path import grid_path
-from planners.search.guides.guidance import guidance
+from planners.search.guides.guidance import guidance, published_guidance
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Guide, Limits, Query
 from planners.search.registry import PLANNERS
@@ -28,7 +28,8 @@ from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
-ASSISTS = ("none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair")
+_WITH_MEMORY = ("closed", "open", "repair", "published-open")
+ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
 WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
 
 
@@ -119,7 +120,8 @@ def solve(
     drives shortest, else search.
     ``open``: the same, but the search goes on from the free beginning of the least blocked of the recalled
     plans, guided by that plan and by a path over the grid. ``repair``: the same, but the blocked segments of
-    that plan are planned anew; if this fails as ``open``. ``fresh``: search guided by a path over the grid.
+    that plan are planned anew; if this fails as ``open``. ``published-open``: the paper's open box, where the
+    search samples near the states of all recalled plans. ``fresh``: search guided by a path over the grid.
     ``random-`` before an assist picks the plans blindly.
 
     Args:
@@ -171,7 +173,11 @@ def solve(
         rng = generator(seed, "search", problem.id, planner)
         query = Query(problem, rng, view.scene, view.workspace, limits=limits or Limits(), vehicle=vehicle)
         nearly = None
-        if memory is not None and use != "closed":
+        if memory is not None and use == "published-open" and recalled.plans:
+            plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
+            query = replace(query, guide=published_guidance(plans))
+            view.lap("guide")
+        if memory is not None and use in ("open", "repair"):
             nearly, more = nearly_free(memory, recalled.plans, view, vehicle)
             checks += more
         if use == "repair" and nearly is not None:

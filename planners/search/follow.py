@@ -12,10 +12,16 @@ from planners.search import gust
 from planners.search.guides.sampling import in_disc, uniform
 from planners.search.gust import GustSettings
 from planners.search.outcome import Outcome
-from planners.search.query import Query
+from planners.search.query import Guide, Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
-from planners.search.structures.roadmap import Roadmap, RoadmapSettings, allocate_roadmap, resample_path
+from planners.search.structures.roadmap import (
+    Roadmap,
+    RoadmapSettings,
+    allocate_roadmap,
+    resample_path,
+    roadmap_guide,
+)
 from planners.search.structures.tree import EXPANSIONS, GOAL_VERTEX, SIZE, Tree, extend
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
@@ -170,6 +176,7 @@ def _grow(
 def _begin(
     tree: Tree,
     goal: Floats,
+    guide: Guide,
     roadmap: Roadmap,
     groups: gust.Groups,
     lead: Lead,
@@ -179,23 +186,24 @@ def _begin(
     rng: BitGenerator,
 ) -> None:
     """Begin as GUST does, and choose a first lead."""
-    gust.begin_gust(tree, goal, roadmap, groups, settings.gust, vehicle, scene, rng)
+    gust.begin_gust(tree, goal, guide, roadmap, groups, settings.gust, vehicle, scene, rng)
     lead.marks.fill(0)
     _new_lead(tree, gust.heaviest(groups), roadmap, groups, lead, settings, rng)
 
 
 def follow(query: Query, settings: FollowSettings) -> Outcome:
-    """Plan from the problem's start to its goal disc; with a guide, along it first."""
+    """Plan from the problem's start to its goal disc; a guide leads the tree or places nodes."""
     on_roadmap = settings.gust.roadmap
     roadmap = query.workspace.buffers(allocate_roadmap, on_roadmap.most_nodes, on_roadmap.neighbours)
     groups = query.workspace.buffers(gust.allocate_groups, on_roadmap.most_nodes)
     lead = query.workspace.buffers(allocate_lead)
     vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
     exploring = settings.gust._replace(guide_probability=0.0)
+    near = roadmap_guide(query)
 
     def prepare(tree: Tree, goal: Floats, trial: int) -> None:
         begun = settings._replace(gust=gust.larger(settings.gust, trial))
-        _begin(tree, goal, roadmap, groups, lead, begun, vehicle, scene, rng)
+        _begin(tree, goal, near, roadmap, groups, lead, begun, vehicle, scene, rng)
 
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, scene, rng)

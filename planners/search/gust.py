@@ -10,7 +10,7 @@ from numpy.random import BitGenerator
 
 from planners.search.guides.sampling import in_bounds, in_disc, uniform
 from planners.search.outcome import Outcome
-from planners.search.query import Query
+from planners.search.query import Guide, Query
 from planners.search.rrt import along_guide, towards_anywhere
 from planners.search.search_loop import attempt
 from planners.search.structures import tree as trees
@@ -22,6 +22,7 @@ from planners.search.structures.roadmap import (
     allocate_roadmap,
     build_roadmap,
     resample_path,
+    roadmap_guide,
 )
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
@@ -189,6 +190,7 @@ def grow_gust(
 def begin_gust(
     tree: trees.Tree,
     goal: Floats,
+    guide: Guide,
     roadmap: Roadmap,
     groups: Groups,
     settings: GustSettings,
@@ -196,8 +198,8 @@ def begin_gust(
     scene: Scene,
     rng: BitGenerator,
 ) -> None:
-    """Build the roadmap and group the vertices that the tree has already."""
-    build_roadmap(roadmap, tree.states[0], goal, settings.roadmap, vehicle, scene, rng)
+    """Build the roadmap, near the plans of a guide, and group the vertices that the tree has already."""
+    build_roadmap(roadmap, tree.states[0], goal, guide, settings.roadmap, vehicle, scene, rng)
     tree.counts[trees.CHECKS] += roadmap.counts[ROADMAP_CHECKS]
     clear_groups(groups)
     join_groups(tree, 0, tree.counts[trees.SIZE], roadmap, groups, settings.distance_exponent, rng)
@@ -211,14 +213,15 @@ def larger(settings: GustSettings, trial: int) -> GustSettings:
 
 
 def gust(query: Query, settings: GustSettings) -> Outcome:
-    """Plan from the problem's start to its goal disc; with a guide, along it first."""
+    """Plan from the problem's start to its goal disc; a guide leads the tree or places nodes."""
     sizes = settings.roadmap.most_nodes, settings.roadmap.neighbours
     roadmap = query.workspace.buffers(allocate_roadmap, *sizes)
     groups = query.workspace.buffers(allocate_groups, settings.roadmap.most_nodes)
     vehicle, scene, rng = query.vehicle, query.scene, query.rng.bit_generator
+    near = roadmap_guide(query)
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        begin_gust(tree, goal, roadmap, groups, larger(settings, trial), vehicle, scene, rng)
+        begin_gust(tree, goal, near, roadmap, groups, larger(settings, trial), vehicle, scene, rng)
 
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, scene, rng)

@@ -16,16 +16,20 @@ from planners.world.workspace import Workspace
 
 
 class Guide(NamedTuple):
-    """Paths to sample around: path i with probability b_i, else the goal, else anywhere."""
+    """Paths to sample around: path i with probability b_i, else the goal, else anywhere.
 
-    points: Floats  # [M, 2] metres, about a metre apart: the points of all paths, one path after another
+    A tree grows *along* a path, from near a point of it towards one of the ``lead`` points that follow. If
+    ``lead`` is 0 it grows towards what is near a point, and roadmaps have their nodes there (paper, III-D).
+    """
+
+    points: Floats  # [M, 2] metres: the points of all paths, one path after another
     starts: Integers  # [k + 1] path i owns points[starts[i] : starts[i + 1]]
     probabilities: Floats  # [k] b_1 > ... > b_k
-    goal_probability: float
-    # what remains to 1 is b_other
+    goal_probability: float  # what remains to 1 is b_other
+    lead: int  # how many points ahead a target lies at most; 0: near the point itself
 
 
-NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1)
+NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1, 0)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ class RrtSettings(NamedTuple):
 
     guide_near_m: float = 2.0
     guide_far_m: float = 4.0
-    guide_lead: int = 16  # points, a metre apart, that a target lies ahead on the guide at most
     restart_after: int = 1000  # expansions
     extension: trees.Extension = trees.EXTENSION
 
@@ -47,7 +46,7 @@ def grow_rrt(
     counts = tree.counts
     while counts[trees.EXPANSIONS] < until and counts[trees.SIZE] < tree.states.shape[0]:
         from_x, from_y, x, y = guided(
-            guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, settings.guide_lead, rng
+            guide, goal, scene.bounds, settings.guide_near_m, settings.guide_far_m, rng
         )
         vertex = max(nearest(tree.buckets, from_x, from_y), 0)  # the root if all others are dead ends
         trees.extend(tree, vertex, x, y, goal, no_lead, 0.0, 0.0, settings.extension, vehicle, scene, rng)
@@ -64,8 +63,9 @@ def towards_anywhere(query: Query, guide: Guide = NO_GUIDE, settings: RrtSetting
 
 
 def along_guide(query: Query) -> Grow | None:
-    """How a planner with a roadmap grows its tree along a guide first; None without a guide."""
-    return None if query.guide is None else towards_anywhere(query, query.guide)
+    """How a planner with a roadmap grows its tree along a guide first; None without a guide to go along."""
+    guide = query.guide
+    return None if guide is None or guide.lead == 0 else towards_anywhere(query, guide)
 
 
 def rrt(query: Query, settings: RrtSettings) -> Outcome:

@@ -7,7 +7,8 @@ from typing import Final, NamedTuple
 import pandas as pd
 
 ASSISTS: Final = (
-    "none", "closed", "open", "repair", "fresh", "random-closed", "random-open", "random-repair",
+    "none", "closed", "open", "published-open", "repair", "fresh",
+    "random-closed", "random-open", "random-published-open", "random-repair",
 )  # fmt: skip
 RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "random")
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random

@@ -76,10 +76,11 @@ def test_a_closed_box_without_a_free_plan_searches_as_if_alone(memory, planner):
     assert assisted.collision_checks > alone.collision_checks
 
 
+@pytest.mark.parametrize("assist", ["open", "published-open"])
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_an_open_box_is_guided_elsewhere(memory, planner):
+def test_an_open_box_is_guided_elsewhere(memory, planner, assist):
     problem = blocked_everywhere()
-    alone, guided = solve(problem, planner), solve(problem, planner, "open", 5, memory)
+    alone, guided = solve(problem, planner), solve(problem, planner, assist, 5, memory)
     assert guided.solved
     assert not np.array_equal(alone.plan.states, guided.plan.states)
 

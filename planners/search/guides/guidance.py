@@ -14,6 +14,8 @@ from planners.world.arrays import Floats
 from planners.world.jit import jit
 
 RATIO = 0.3  # each path is sampled 0.3 times as often as the one before; 0.6, 0.8: worse (docs/planners.md)
+PUBLISHED_RATIO = 0.8  # of the paper's open box, which gives no number: b_goal is 0.08 with five plans
+LEAD = 16  # points ahead, each SPACING_M after the one before
 SPACING_M = 1.0  # between the points of a path, so that slow stretches are not sampled more often
 
 
@@ -44,19 +46,37 @@ def guidance(paths: Sequence[Floats]) -> Guide:
     Raises:
         ValueError: There are no paths.
     """
-    if not paths:
+    return _guide([spaced(path, SPACING_M) for path in paths], RATIO, LEAD)
+
+
+def published_guidance(plans: Sequence[Floats]) -> Guide:
+    """Make the guide of the paper's open box (III-D): draws lie near the states of recalled plans.
+
+    The probabilities are a geometric series of ratio ``PUBLISHED_RATIO``.
+
+    Args:
+        plans: best first, the states ``[T, >= 2]`` of each with x, y in metres.
+
+    Raises:
+        ValueError: There are no plans.
+    """
+    return _guide([plan[:, :2] for plan in plans], PUBLISHED_RATIO, 0)
+
+
+def _guide(points: Sequence[Floats], ratio: float, lead: int) -> Guide:
+    if not points:
         raise ValueError("there is no path to guide along: search without a guide")
-    points = [spaced(path, SPACING_M) for path in paths]
     starts = list(itertools.accumulate((len(each) for each in points), initial=0))
     return Guide(
-        points[0] if len(points) == 1 else np.concatenate(points),
+        np.ascontiguousarray(points[0]) if len(points) == 1 else np.concatenate(points),
         np.array(starts, np.int32),
-        *_probabilities(len(paths)),
+        *_probabilities(len(points), ratio),
+        lead,
     )
 
 
-@functools.lru_cache(maxsize=16)
-def _probabilities(paths: int) -> tuple[Floats, float]:
-    weights: Floats = np.power(RATIO, np.arange(paths + 2))
+@functools.lru_cache(maxsize=32)
+def _probabilities(paths: int, ratio: float) -> tuple[Floats, float]:
+    weights: Floats = np.power(ratio, np.arange(paths + 2))
     weights /= weights.sum()
     return weights[:-2].copy(), float(weights[-2])

@@ -42,15 +42,15 @@ def in_bounds(bounds: Floats, rng: BitGenerator) -> tuple[float, float]:
 
 @lean
 def guided(
-    guide: Guide, goal: Floats, bounds: Floats, near_m: float, far_m: float, lead: int, rng: BitGenerator
+    guide: Guide, goal: Floats, bounds: Floats, near_m: float, far_m: float, rng: BitGenerator
 ) -> tuple[float, float, float, float]:
     """Draw where to extend from and where to, x and y each: along path i of the guide with probability b_i.
 
     The first point lies around a uniformly drawn point of the path, within a radius U(near_m, far_m), the
-    second around one of the ``lead`` points after it. With probability b_goal the target lies in the goal
-    disc, else anywhere in the bounds, and what is nearest to the target is extended. (The paper, III-D, only
-    draws targets near a plan. That says where to be, but not in which direction to go on, and is slower than
-    no guide: docs/planners.md.)
+    second around one of the ``guide.lead`` points after it. With probability b_goal the target lies in the
+    goal disc, else anywhere in the bounds, and what is nearest to the target is extended. It is, too, if
+    there is no lead: the first point is the target then. (So does the paper, III-D. That says where to be,
+    but not in which direction to go on, and is slower than no guide: docs/planners.md.)
     """
     draw = uniform(rng)
     for i in range(guide.probabilities.shape[0]):
@@ -59,9 +59,13 @@ def guided(
             first = guide.starts[i]
             count = guide.starts[i + 1] - first
             chosen = int(uniform(rng) * count)
-            ahead = min(chosen + 1 + int(uniform(rng) * lead), count - 1)
+            ahead = chosen
+            if guide.lead > 0:
+                ahead = min(chosen + 1 + int(uniform(rng) * guide.lead), count - 1)
             radius = near_m + (far_m - near_m) * uniform(rng)
             x, y = in_disc(guide.points[first + chosen, 0], guide.points[first + chosen, 1], radius, rng)
+            if guide.lead == 0:
+                return x, y, x, y
             to_x, to_y = in_disc(guide.points[first + ahead, 0], guide.points[first + ahead, 1], near_m, rng)
             return x, y, to_x, to_y
     if draw < guide.goal_probability:

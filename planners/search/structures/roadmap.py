@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import BitGenerator
 
-from planners.search.guides.sampling import in_bounds, uniform
+from planners.search.guides.sampling import guided, in_bounds, uniform
+from planners.search.query import NO_GUIDE, Guide, Query
 from planners.search.structures.clearance import clearance, strip_is_free
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, nearest_k, put
 from planners.world.arrays import Floats, Indices
@@ -25,6 +26,7 @@ GOAL, START = 0, 1  # the first two nodes
 # indices into Roadmap.counts
 NODES, CHECKS, EDGES, QUEUED = range(4)
 UNKNOWN, FREE, BLOCKED = range(3)
+ANYWHERE = NO_GUIDE._replace(goal_probability=0.0)
 
 
 class RoadmapSettings(NamedTuple):
@@ -37,6 +39,7 @@ class RoadmapSettings(NamedTuple):
     body_width_scale: float = 1.25
     clearance_exponent: float = 0.0  # edge cost: length / clearance^f; GUST 0, Follow 1
     clearance_limit_m: float = 5.0  # a larger clearance counts as this one
+    guide_radius_m: float = 4.0  # guided nodes lie within this distance of a state of a recalled plan
 
 
 class Roadmap(NamedTuple):
@@ -202,15 +205,30 @@ def search_from_goal(roadmap: Roadmap, settings: RoadmapSettings, vehicle: Vehic
 
 @lean
 def grow_roadmap(
-    roadmap: Roadmap, batch: int, settings: RoadmapSettings, vehicle: Vehicle, scene: Scene, rng: BitGenerator
+    roadmap: Roadmap,
+    batch: int,
+    goal: Floats,
+    guide: Guide,
+    settings: RoadmapSettings,
+    vehicle: Vehicle,
+    scene: Scene,
+    rng: BitGenerator,
 ) -> None:
-    """Draw ``batch`` nodes, keep the free ones, and search from the goal again."""
+    """Draw ``batch`` nodes, keep the free ones, and search from the goal again.
+
+    They lie near the guide's plans, in the goal disc, or anywhere; without plans they lie anywhere.
+    """
     half_length = 0.5 * settings.body_length_scale * (vehicle.front + vehicle.rear)
     half_width = 0.5 * settings.body_width_scale * vehicle.width
     for _ in range(batch):
         if roadmap.counts[NODES] == roadmap.nodes.shape[0]:
             break
-        x, y = in_bounds(scene.bounds, rng)
+        if guide.probabilities.shape[0] > 0:
+            x, y, _, _ = guided(
+                guide, goal, scene.bounds, settings.guide_radius_m, settings.guide_radius_m, rng
+            )
+        else:
+            x, y = in_bounds(scene.bounds, rng)
         heading = 2.0 * math.pi * uniform(rng)
         roadmap.counts[CHECKS] += 1
         cos = math.cos(heading)
@@ -225,22 +243,32 @@ def build_roadmap(
     roadmap: Roadmap,
     start: Floats,
     goal: Floats,
+    guide: Guide,
     settings: RoadmapSettings,
     vehicle: Vehicle,
     scene: Scene,
     rng: BitGenerator,
 ) -> bool:
-    """Draw batches until the start reaches the goal. Returns False if ``most_nodes`` do not suffice."""
+    """Draw batches until the start reaches the goal. Returns False if ``most_nodes`` do not suffice.
+
+    The nodes of the first batch lie where the guide says, those of later ones anywhere.
+    """
+    anywhere = Guide(guide.points[:0], guide.starts[:1], guide.probabilities[:0], 0.0, 0)
     roadmap.counts.fill(0)
     clear_buckets(roadmap.sampled, scene.bounds, BUCKET_M)
     add_node(roadmap, goal[0], goal[1], settings, scene)
     add_node(roadmap, start[0], start[1], settings, scene)
-    grow_roadmap(roadmap, settings.batch, settings, vehicle, scene, rng)
+    grow_roadmap(roadmap, settings.batch, goal, guide, settings, vehicle, scene, rng)
     draws = settings.batch
     while roadmap.distances[START] == math.inf and draws < settings.most_nodes:
-        grow_roadmap(roadmap, settings.batch, settings, vehicle, scene, rng)
+        grow_roadmap(roadmap, settings.batch, goal, anywhere, settings, vehicle, scene, rng)
         draws += settings.batch
     return bool(roadmap.distances[START] < math.inf)
+
+
+def roadmap_guide(query: Query) -> Guide:
+    """Return the guide near whose plans a query's roadmaps have their nodes, or ``ANYWHERE``."""
+    return query.guide if query.guide is not None and query.guide.lead == 0 else ANYWHERE
 
 
 @lean

@@ -21,7 +21,7 @@ EVERY = pytest.mark.parametrize("name", PLANNERS)
 
 def straight_guide():
     line = np.linspace([0, 0], [50, 50], 100)
-    return Guide(line, np.array([0, 100], np.int32), np.array([0.6]), 0.3)
+    return Guide(line, np.array([0, 100], np.int32), np.array([0.6]), 0.3, 16)
 
 
 @EVERY

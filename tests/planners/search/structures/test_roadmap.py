@@ -6,8 +6,10 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from planners.search.guides.guidance import published_guidance
 from planners.search.structures.clearance import clearance, strip_is_free
 from planners.search.structures.roadmap import (
+    ANYWHERE,
     BLOCKED,
     CHECKS,
     EDGES,
@@ -29,12 +31,12 @@ def shape(problem):
     return shapely.union_all([shapely.Polygon(piece) for piece in problem.obstacles.pieces()])
 
 
-def build(problem, settings, seed=0):
+def build(problem, settings, seed=0, guide=ANYWHERE):
     scene = scene_of(problem)
     roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
     goal = np.array([*problem.goal, problem.goal_radius])
     start = np.array([*problem.start, 0.0, 0.0])
-    joined = build_roadmap(roadmap, start, goal, settings, CAR, scene, generator(seed).bit_generator)
+    joined = build_roadmap(roadmap, start, goal, guide, settings, CAR, scene, generator(seed).bit_generator)
     return roadmap, joined, scene
 
 
@@ -58,6 +60,26 @@ def test_ways_to_the_goal_are_as_short_as_scipys(seed, exponent):
     expected = dijkstra(graph, directed=False, indices=GOAL)
     np.testing.assert_allclose(roadmap.distances[:count], expected)
     assert joined == np.isfinite(expected[START])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_nodes_lie_near_the_recalled_plan_until_start_and_goal_need_more(seed):
+    line = np.linspace(0.0, 50.0, 60)[:, None] * np.ones(2)
+    guide = published_guidance([line])
+    roadmap, joined, _ = build(strewn(seed, 15), RoadmapSettings(), seed, guide)
+    assert joined
+    nodes = roadmap.nodes[2 : roadmap.counts[NODES]]
+    near = np.hypot(*(nodes[:, None] - line).T).min(0) <= 4.0
+    elsewhere = 1.0 - guide.probabilities.sum() - guide.goal_probability
+    assert near.mean() > 1.0 - 2.0 * elsewhere
+    assert (
+        near.mean()
+        > 1.5
+        * (
+            np.hypot(*(build(strewn(seed, 15), RoadmapSettings(), seed)[0].nodes[2:80, None] - line).T).min(0)
+            <= 4.0
+        ).mean()
+    )
 
 
 @given(st.integers(0, 10**6))
