@@ -92,7 +92,7 @@ def recall(
     elif strategy == "encoder":
         order = by_encoder(memory, view, k)
     elif strategy == "centroid":
-        order = by_centroids(memory, view, k)
+        order, likely = by_centroids(memory, view, k), 0  # the nearest free one is the answer, as published
     elif not as_stored:
         most = {"mask": k, "hybrid": candidates, "exhaustive": count}[strategy]
         order, likely = by_encoder(memory, view, most, never_none=True), max(k, CHECKED_EARLY)

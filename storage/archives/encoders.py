@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.memory.encoder.encoder import Architecture, embedding_bound, weight_shapes
+from planners.memory.encoder.encoder import described_architecture, embedding_bound, weight_shapes
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import read_archive, write_archive
@@ -64,11 +64,9 @@ def _settings(described: object) -> TrainingSettings:
     """The settings that a header describes. Raises ValueError or TypeError if no training had such."""
     if not isinstance(described, dict):
         raise ValueError(f"its settings are {short(described)}, expected an object")
-    sizes = described["architecture"]
     others = {name: value for name, value in described.items() if name != "architecture"}
     for name, usual in asdict(TrainingSettings()).items():
         value = others.get(name, usual)
         if not (type(value) is type(usual) or (type(value) is int and type(usual) is float)):
             raise ValueError(f"its setting {name} is {short(value)}")
-    architecture = Architecture(tuple(sizes["channels"]), tuple(sizes["hidden"]), sizes["dimensions"])
-    return TrainingSettings(**others, architecture=architecture)
+    return TrainingSettings(**others, architecture=described_architecture(described["architecture"]))

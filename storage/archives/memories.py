@@ -17,6 +17,7 @@ from planners.memory.encoder.encoder import (
     LARGEST_VALUE,
     Architecture,
     architecture_of,
+    described_architecture,
     embedding_bound,
     magnitude,
     weight_shapes,
@@ -94,7 +95,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
             raise ValueError(f"missing or too many: {different}")
         weights, readout = unpacked(files[_WEIGHTS]), unpacked(files[_READOUT])
         architecture = architecture_of(weights)
-        if header["architecture"] != _sizes(architecture):
+        if described_architecture(header["architecture"]) != architecture:
             raise ValueError("its encoder is of another architecture than it says")
         plans = _plans(files, vehicle)
         rows = (len(plans) + 1, architecture.dimensions)

@@ -1,9 +1,11 @@
 """The encoder, from occupancy grid to embedding, and its runtime, which needs no torch.
 
-It has convolutions with PReLU, then fully connected layers, and no normalisation, as published. Instead of
-max-pooling, the first convolution takes patches of 4x4 cells with stride 4: whether a plan is free depends on
-where exactly an obstacle lies, and pooling loses that. On fresh problems of class random the first plan was
-free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of training).
+It has convolutions with PReLU, then fully connected layers, and no normalisation. There are two networks.
+``pooled`` is the paper's (IV-A): it sees 50x50 cells, and a max-pool of 2x2 follows each convolution of 3x3.
+``patches`` has no pooling. Its first convolution takes patches of 4x4 cells with stride 4: whether a plan is
+free depends on where exactly an obstacle lies, and pooling loses that. On fresh problems of class random
+the first plan was free in 67 % of what 100 plans can solve, with pooling in 51 % (one seed; 25 and 21 s of
+training).
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,7 +22,12 @@ from planners.world.geometry.occupancy import GRID, Grid
 
 Weights = dict[str, Floats32]  # "convolution.0.weight", ".bias", ".slope", ..., "linear.0.weight", ...
 
-PATCH = 4  # cells a side, and stride, of the first convolution; the others are 3x3
+NETWORKS: Final = ("patches", "pooled")
+PATCH = 4  # cells a side, and stride, of the first convolution of ``patches``; all others are 3x3
+POOLED_GRID: Final = 50  # cells a side that ``pooled`` sees
+_COARSE = (np.arange(GRID) + 0.5) * POOLED_GRID // GRID  # the one of these in which each cell's centre lies
+FIRST_CELLS: Final = np.searchsorted(_COARSE, np.arange(POOLED_GRID))  # [POOLED_GRID] a cell within each
+LAST_CELLS: Final = np.searchsorted(_COARSE, np.arange(POOLED_GRID), "right") - 1  # the same one, or the next
 PRELU_SLOPE = 0.25  # initial (He et al. 2015)
 OPSET = 17
 LARGEST_VALUE = 1e20  # in the network; float32 ends at 3e38, bounds of trained ones are some 1e5
@@ -34,8 +41,13 @@ class Architecture:
     channels: tuple[int, ...] = (16,)  # of the convolutions
     hidden: tuple[int, ...] = (128,)  # widths of the fully connected layers before the embedding
     dimensions: int = 30  # of the embedding
+    network: str = NETWORKS[0]
 
     def __post_init__(self) -> None:
+        if self.network not in NETWORKS:
+            raise ValueError(f"Unknown network {self.network!r}; choose one of {', '.join(NETWORKS)}.")
+        if self.network == "pooled" and not POOLED_GRID >> len(self.channels):
+            raise ValueError(f"{len(self.channels)} convolutions pool {POOLED_GRID} cells away: give fewer.")
         if not self.channels:
             raise ValueError("The encoder has no convolution: give the channels of one or more.")
         if min((*self.channels, *self.hidden, self.dimensions)) < 1:
@@ -43,17 +55,30 @@ class Architecture:
             raise ValueError(f"Sizes of the encoder are {sizes}: give 1 or more.")
 
 
+def described_architecture(described: Any) -> Architecture:
+    """Return the architecture that JSON values describe; without a ``network`` it is of ``patches``.
+
+    Raises ValueError if there is no such architecture.
+    """
+    try:
+        sizes = {name: tuple(described[name]) for name in ("channels", "hidden")}
+        return Architecture(**{**described, **sizes})
+    except (KeyError, TypeError):
+        raise ValueError("its architecture is not one of an encoder") from None
+
+
 def weight_shapes(architecture: Architecture) -> dict[str, tuple[int, ...]]:
     """Return the names and shapes of the weights, layer by layer."""
     shapes: dict[str, tuple[int, ...]] = {}
     inputs = 1
+    pooled = architecture.network == "pooled"
     for i, outputs in enumerate(architecture.channels):
-        kernel = PATCH if i == 0 else 3
+        kernel = 3 if pooled or i else PATCH
         shapes[f"convolution.{i}.weight"] = (outputs, inputs, kernel, kernel)
         shapes[f"convolution.{i}.bias"] = (outputs,)
         shapes[f"convolution.{i}.slope"] = (outputs, 1, 1)
         inputs = outputs
-    width = inputs * (GRID // PATCH) ** 2
+    width = inputs * (POOLED_GRID >> len(architecture.channels) if pooled else GRID // PATCH) ** 2
     for i, outputs in enumerate((*architecture.hidden, architecture.dimensions)):
         shapes[f"linear.{i}.weight"] = (outputs, width)
         shapes[f"linear.{i}.bias"] = (outputs,)
@@ -89,12 +114,18 @@ def architecture_of(weights: Mapping[str, Floats32]) -> Architecture:
             tuple(len(weights[f"convolution.{i}.bias"]) for i in range(convolutions)),
             tuple(widths[:-1]),
             widths[-1],
+            NETWORKS[is_pooled(weights)],
         )
     except (KeyError, IndexError, TypeError, ValueError):
         raise ValueError("these are not the weights of an encoder: a layer is missing") from None
     if {name: tensor.shape for name, tensor in weights.items()} != weight_shapes(architecture):
         raise ValueError("these are not the weights of an encoder: the layers do not fit together")
     return architecture
+
+
+def is_pooled(weights: Mapping[str, Any]) -> bool:
+    """Return whether these are the weights of the network ``pooled``, by its first convolution."""
+    return bool(weights["convolution.0.weight"].shape[-1] != PATCH)
 
 
 def layer_counts(weights: Mapping[str, object]) -> tuple[int, int]:
@@ -147,11 +178,21 @@ def to_onnx(weights: Weights) -> bytes:
         nodes.append(helper.make_node(operation, [value, *inputs], [output], **attributes))
         value = output
 
+    pooled = is_pooled(weights)
+    joined = {"first_cells": FIRST_CELLS, "last_cells": LAST_CELLS} if pooled else {}
+    for axis in (2, 3) if pooled else ():
+        outputs = [f"{cells}_{axis}" for cells in joined]
+        for cells, output in zip(joined, outputs, strict=True):
+            nodes.append(helper.make_node("Gather", [value, cells], [output], axis=axis))
+        value = f"coarse_{axis}"
+        nodes.append(helper.make_node("Max", outputs, [value]))
     for i in range(convolutions):
         name = f"convolution.{i}"
-        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        stride, padding = (1, 1) if pooled or i else (PATCH, 0)
         chain("Conv", f"{name}.weight", f"{name}.bias", strides=[stride] * 2, pads=[padding] * 4)
         chain("PRelu", f"{name}.slope")
+        if pooled:
+            chain("MaxPool", kernel_shape=[2, 2], strides=[2, 2])
     chain("Flatten")
     for i in range(linears):
         chain("Gemm", f"linear.{i}.weight", f"linear.{i}.bias", transB=1)
@@ -166,6 +207,7 @@ def to_onnx(weights: Weights) -> bytes:
         [helper.make_tensor_value_info("embedding", TensorProto.FLOAT, ["n", dimensions])],
         [
             numpy_helper.from_array(np.array([-1, 1, GRID, GRID], np.int64), "image_shape"),
+            *(numpy_helper.from_array(cells, name) for name, cells in joined.items()),
             *(numpy_helper.from_array(np.asarray(weights[name]), name) for name in sorted(weights)),
         ],
     )

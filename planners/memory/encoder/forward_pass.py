@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.memory.encoder.encoder import PATCH, Encoder, Weights, layer_counts, to_onnx
+from planners.memory.encoder.encoder import PATCH, Encoder, Weights, is_pooled, layer_counts, to_onnx
 from planners.world.arrays import Floats32, Integers
 from planners.world.geometry.occupancy import GRID, Bits, grid_of
 from planners.world.jit import lean
@@ -168,7 +168,7 @@ def tables_of(weights: Weights) -> Tables:
 
 def forward_of(weights: Weights) -> Forward:
     """Return a function that embeds the bits ``[64]`` of one grid in a new array ``[D]``."""
-    if layer_counts(weights)[0] > 1:
+    if is_pooled(weights) or layer_counts(weights)[0] > 1:
         encoder = Encoder(to_onnx(weights))
         return lambda bits: encoder(grid_of(bits))
     tables = tables_of(weights)

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from planners.memory.encoder.encoder import PATCH, layer_counts
+from planners.memory.encoder.encoder import FIRST_CELLS, LAST_CELLS, PATCH, is_pooled, layer_counts
 from planners.world.geometry.occupancy import GRID
 
 Parameters = dict[str, Tensor]
@@ -16,6 +16,13 @@ def unpacked(bits: Tensor) -> Tensor:
     """Unpack grids uint8 ``[n, 512]`` into images float32 ``[n, 1, 64, 64]``."""
     shifts = torch.arange(7, -1, -1, dtype=torch.uint8, device=bits.device)
     return ((bits[:, :, None] >> shifts) & 1).to(torch.float32).view(-1, 1, GRID, GRID)
+
+
+def coarse(images: Tensor) -> Tensor:
+    """Join the cells of images ``[n, 1, 64, 64]`` to ``[n, 1, 50, 50]``; those with an obstacle are 1."""
+    first, last = (torch.from_numpy(each).to(images.device) for each in (FIRST_CELLS, LAST_CELLS))
+    rows = torch.maximum(images[:, :, first], images[:, :, last])
+    return torch.maximum(rows[..., first], rows[..., last])
 
 
 def prelu(value: Tensor, slope: Tensor) -> Tensor:
@@ -28,12 +35,17 @@ def embed(parameters: Parameters, bits: Tensor) -> Tensor:
     """Embed packed grids uint8 ``[n, 512]`` as ``[n, D]``."""
     convolutions, linears = layer_counts(parameters)
     value = unpacked(bits)
+    pooled = is_pooled(parameters)
+    if pooled:
+        value = coarse(value)
     for i in range(convolutions):
         name = f"convolution.{i}"
         weight, bias = parameters[f"{name}.weight"], parameters[f"{name}.bias"]
-        stride, padding = (PATCH, 0) if i == 0 else (1, 1)
+        stride, padding = (1, 1) if pooled or i else (PATCH, 0)
         value = functional.conv2d(value, weight, bias, stride=stride, padding=padding)
         value = prelu(value, parameters[f"{name}.slope"])
+        if pooled:
+            value = functional.max_pool2d(value, 2)
     value = value.flatten(1)
     for i in range(linears):
         value = functional.linear(value, parameters[f"linear.{i}.weight"], parameters[f"linear.{i}.bias"])

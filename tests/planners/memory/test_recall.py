@@ -119,7 +119,7 @@ def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
         assert off or free_in(memory, problem)[found.free]
 
 
-@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(["encoder", "centroid", "mask", "random"]))
+@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(["encoder", "mask", "random"]))
 def test_no_free_plan_among_those_recalled_drives_shorter(memory, problem_in, seed, k, strategy):
     problem = problem_in(seed)
     found = recalled_by(memory, problem, strategy, k)
@@ -222,14 +222,16 @@ def test_what_the_encoder_recalls_is_the_head_of_the_rank(memory, problem_in, se
 
 
 @given(seed=SEEDS, k=st.integers(1, 8))
-def test_centroids_recall_the_plans_whose_centroids_are_nearest(memory, problem_in, seed, k):
+def test_centroids_recall_the_nearest_plans_and_the_first_free_one_is_the_answer(memory, problem_in, seed, k):
     rng = generator(seed, "readout")  # which a trained readout may contradict
     learned = dataclasses.replace(memory, vectors=rng.normal(size=memory.vectors.shape).astype(np.float32))
     problem = problem_in(seed)
     embedding = memory.encoder(occupancy_of(problem))
     distances = cdist(embedding[np.newaxis], memory.centroids)[0]
     nearest = [] if distances[0] < distances[1:].min() else np.argsort(distances[1:])[:k].tolist()
-    assert set(recalled_by(learned, problem, "centroid", k).plans) == set(nearest)
+    recalled = recalled_by(learned, problem, "centroid", k)
+    assert list(recalled.plans) == nearest
+    assert recalled.free == next((i for i in nearest if free_in(memory, problem)[i]), -1)
 
 
 def test_nothing_is_recalled_where_row_0_scores_best(memory, problem_in):

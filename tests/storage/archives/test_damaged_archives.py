@@ -173,6 +173,10 @@ def test_a_name_that_reaches_out_of_the_folder_is_never_opened(archive: Path, na
         ({"files": {"dt.npy": {"bytes": -1, "sha256": ""}}}, "damaged"),
         ({"files": {"dt.npy": {"bytes": 2**80, "sha256": ""}}}, "damaged"),
         ({"architecture": {"channels": [2], "hidden": [8], "dimensions": 4}}, "another architecture"),
+        (
+            {"architecture": {"channels": [2], "hidden": [8], "dimensions": 4, "network": "dense"}},
+            "Unknown network 'dense'; choose one of patches, pooled",
+        ),
         ({"class": 7}, "class must be a printable text"),
         ({"objective": ["labels"]}, "objective is ['labels']"),
         ({"metadata": 3}, "no whole memory"),

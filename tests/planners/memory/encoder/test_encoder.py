@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import pickle
 
 import numpy as np
@@ -8,7 +9,14 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, layer_counts, to_onnx
+from planners.memory.encoder.encoder import (
+    Architecture,
+    Encoder,
+    architecture_of,
+    initial_weights,
+    layer_counts,
+    to_onnx,
+)
 from planners.memory.encoder.forward_pass import forward_of
 from planners.memory.encoder.torch_network import embed, unpacked
 from planners.world.geometry.occupancy import bits_of
@@ -18,6 +26,8 @@ ARCHITECTURES = [
     Architecture(),
     Architecture(channels=(4,), hidden=(), dimensions=3),
     Architecture(channels=(4, 6, 5), hidden=(17,), dimensions=30),
+    Architecture((8, 16, 32), (128, 64), 30, "pooled"),  # the paper's
+    Architecture((3,), (), 2, "pooled"),
 ]
 
 
@@ -50,6 +60,50 @@ def patchy_grids(count, seed):
     fine = rng.random((count, 16, 16, 4, 4)) < rng.uniform(0.05, 0.9, (count, 16, 16, 1, 1))
     cells = np.where(coarse < 0.4, 0, np.where(coarse < 0.5, 1, fine))
     return cells.transpose(0, 1, 3, 2, 4).reshape(count, 64, 64).astype(np.uint8)
+
+
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+def test_weights_say_which_network_they_are_of(architecture):
+    assert architecture_of(random_weights(architecture)) == architecture
+
+
+def published_embedding(weights, grid):
+    """The paper's network by torch's own modules, written without a look at ``embed``: 50x50 cells."""
+    cells = np.zeros((50, 50), np.float32)
+    for row, column in zip(*np.nonzero(grid), strict=True):  # to where the cell's centre lies
+        cells[int((row + 0.5) * 50 / 64), int((column + 0.5) * 50 / 64)] = 1.0
+    layers = []
+    for inputs, outputs in itertools.pairwise((1, 8, 16, 32)):
+        layers += [
+            torch.nn.Conv2d(inputs, outputs, 3, padding=1),
+            torch.nn.PReLU(outputs),
+            torch.nn.MaxPool2d(2),
+        ]
+    layers.append(torch.nn.Flatten())
+    for inputs, outputs in itertools.pairwise((32 * 6 * 6, 128, 64, 30)):
+        layers += [torch.nn.Linear(inputs, outputs), torch.nn.PReLU(outputs)]
+    network = torch.nn.Sequential(*layers[:-1])
+    names = [
+        f"{kind}.{i}.{part}"
+        for kind in ("convolution", "linear")
+        for i in range(3)
+        for part in ("weight", "bias", "slope")
+    ]
+    values = [torch.from_numpy(weights[name]) for name in names if name in weights]
+    with torch.no_grad():
+        for parameter, value in zip(network.parameters(), values, strict=True):
+            parameter.copy_(value.reshape(parameter.shape))
+        return network(torch.from_numpy(cells)[None, None])[0].numpy()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_published_network_is_three_stages_of_convolution_prelu_and_pooling(seed):
+    weights = random_weights(ARCHITECTURES[3])
+    grids = patchy_grids(3, seed)
+    expected = np.array([published_embedding(weights, grid) for grid in grids])
+    np.testing.assert_allclose(Encoder(to_onnx(weights))(grids), expected, atol=1e-5)
+    forward = forward_of(weights)
+    np.testing.assert_allclose([forward(bits) for bits in bits_of(grids)], expected, atol=1e-4)
 
 
 @given(
@@ -105,8 +159,18 @@ def test_a_wrong_grid_is_refused(grid):
 
 
 @pytest.mark.parametrize(
-    "sizes", [{"channels": ()}, {"channels": (8, -1)}, {"hidden": (0,)}, {"dimensions": 0}]
+    "sizes",
+    [
+        {"channels": ()},
+        {"channels": (8, -1)},
+        {"hidden": (0,)},
+        {"dimensions": 0},
+        {"channels": (2,) * 6, "network": "pooled"},
+        {"network": "dense"},
+    ],
 )
 def test_sizes_that_make_no_network_are_refused(sizes):
-    with pytest.raises(ValueError, match=r"give (1 or more|the channels)"):
+    with pytest.raises(
+        ValueError, match=r"give (1 or more|the channels|fewer)|choose one of patches, pooled"
+    ):
         Architecture(**sizes)
