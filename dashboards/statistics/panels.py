@@ -60,6 +60,15 @@ class Panel(NamedTuple):
         solved = self.matrix("solved")
         return np.where(solved < 1.0, np.inf, self.milliseconds())
 
+    def driving_seconds(self) -> Floats:
+        """Mean driving times ``[columns]`` of the plans that were found; NaN if there is none."""
+        return _means(self.matrix("duration_s"))
+
+    def total_seconds(self, longest: float) -> Floats:
+        """Planning and driving ``[problems, columns]``; an attempt without a plan drives the ``longest``."""
+        driving = np.where(self.matrix("solved") < 1.0, longest, self.matrix("duration_s"))
+        return self.matrix("planning_seconds") + driving
+
     def column(self, planner: str, configuration: Configuration) -> int | None:
         """The index of a planner's configuration; None if it was not attempted."""
         wanted = (planner, configuration)

@@ -1,16 +1,19 @@
 """The rule by which a challenger takes a champion's place, and how the judgement is written.
 
 Both attempt the same held-back problems, next to each other, with every planner and every configuration that
-uses a memory. A column is a planner and configuration on a class. The challenger is promoted if
+uses a memory. A column is a planner and configuration on a class. What counts is when the robot is there:
+planning and driving. The challenger is promoted if
 
-1. it is faster: the mean over all columns of the reduction of mean planning time has a 95 % interval (paired
+1. it is sooner: the mean over all columns of the mean time that it saves has a 95 % interval (paired
    bootstrap over problems) above 0;
-2. it is slower nowhere: no column has an interval below 0, widened for their number (Bonferroni);
+2. it is later nowhere: no column has an interval, widened for their number (Bonferroni), that lies beyond
+   ``NOTICED_S`` on the wrong side;
 3. it solves no fewer problems: not in all columns together, and in no column significantly fewer (exact sign
    test, corrected by Holm, 5 %).
 
-Failures count with the time they took. The challenger has to show that it is better: if an interval reaches
-0, the champion stays.
+An attempt without a plan counts with the planning time it took and the longest drive of its class, that of
+either side. The challenger has to show that it is better: if an interval reaches 0, the champion stays.
+Planning faster is shown, but decides nothing by itself.
 """
 
 from __future__ import annotations
@@ -22,19 +25,22 @@ import numpy as np
 import pandas as pd
 from rich.console import Group
 
-from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables, with_interval
+from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables
 from dashboards.statistics.intervals import CONFIDENCE, bootstrap
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
-from dashboards.verdicts.comparison import FASTER, OPEN, SLOWER
 from planners.world.arrays import Floats
 
 RESAMPLES: Final = 10_000  # the end of an interval widened for 20 columns stands on 12 of them
+NOTICED_S: Final = 1e-3  # being later by less is no harm, however certain it is
 HEADINGS: Final = (
-    "planner", "configuration", "champion ms", "challenger ms", "less time % [95 %]", "champion solved %",
-    "solved %", "champion hits %", "hits %", "verdict",
+    "planner", "configuration", "champion ms", "challenger ms", "champion drives s", "drives s",
+    "sooner s [95 %]", "champion solved %", "solved %", "champion hits %", "hits %", "verdict",
 )  # fmt: skip
+SOONER: Final = "sooner"
+LATER: Final = "later"
 FEWER: Final = "fewer solved"
+OPEN: Final = "open"  # the interval reaches over 0
 
 
 class Judgement(NamedTuple):
@@ -43,9 +49,9 @@ class Judgement(NamedTuple):
     promoted: bool
     why: str  # in one line
     problems: int
-    reduction: float  # mean over columns, a fraction
-    low: float  # ends of its 95 % interval
-    high: float
+    sooner_s: float  # planning and driving time that it saves, mean over columns, seconds
+    low_s: float  # ends of its 95 % interval
+    high_s: float
     columns: pd.DataFrame  # a row a class, planner and configuration: ``HEADINGS`` and ``problems``
 
 
@@ -60,39 +66,45 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
     sides = [list(panels(rows.assign(memory="own"))) for rows in (champion, challenger)]
     if not sides[0] or _attempted(champion) != _attempted(challenger):
         raise ValueError("champion and challenger have not attempted the same problems in the same ways")
-    reductions, tables = [], []
+    savings, tables = [], []
     for number, (before, after) in enumerate(zip(*sides, strict=True)):
-        resampled = bootstrap(after.milliseconds(), before.milliseconds(), seed + number, RESAMPLES)
-        reductions.append(resampled.reductions)
-        tables.append(_compared(before, after))
+        driven = np.concatenate([each.matrix("duration_s").ravel() for each in (before, after)])
+        longest = float(np.nanmax(driven, initial=0.0))
+        saved = before.total_seconds(longest) - after.total_seconds(longest)
+        savings.append(bootstrap(saved, saved, seed + number, RESAMPLES).means)
+        tables.append(_compared(before, after).assign(sooner_s=saved.mean(0)))
     columns = pd.concat(tables, ignore_index=True)
-    drawn = np.concatenate(reductions, axis=1)
+    drawn = np.concatenate(savings, axis=1)
     low, high = _ends(drawn, CONFIDENCE)
     _, widened = _ends(drawn, 1.0 - (1.0 - CONFIDENCE) / drawn.shape[1])
-    columns = columns.assign(low=low, high=high, p_value=holm(columns["p_value"].to_numpy(float)))
+    columns = columns.assign(low_s=low, high_s=high, p_value=holm(columns["p_value"].to_numpy(float)))
     fewer = (columns["p_value"] < 1.0 - CONFIDENCE) & (columns["solved"] < columns["champion_solved"])
-    verdicts = np.select([fewer, widened < 0.0, low > 0.0], [FEWER, SLOWER, FASTER], OPEN)
+    verdicts = np.select([fewer, widened < -NOTICED_S, low > 0.0], [FEWER, LATER, SOONER], OPEN)
     columns = columns.assign(verdict=verdicts)
     whole = _ends(drawn.mean(1, keepdims=True), CONFIDENCE)
     ends = float(whole[0][0]), float(whole[1][0])
     against = _against(columns, ends)
     return Judgement(
         promoted=not against,
-        why="; ".join(against) or _interval_line("faster", columns, ends),
+        why="; ".join(against) or _interval_line("sooner there", columns, ends),
         problems=int(challenger["problem_id"].nunique()),
-        reduction=float(columns["reduction"].mean()),
-        low=ends[0],
-        high=ends[1],
+        sooner_s=float(columns["sooner_s"].mean()),
+        low_s=ends[0],
+        high_s=ends[1],
         columns=columns,
     )
 
 
 def judgement_line(judged: Judgement) -> str:
     """The figures by which it was ``judged``, in one line."""
-    interval = f"{100 * judged.low:.1f} to {100 * judged.high:.1f}"
+    interval = f"{_seconds(judged.low_s)} to {_seconds(judged.high_s)}"
+    less = 100 * judged.columns["reduction"].mean()
     counts = Counter(judged.columns["verdict"])
-    named = ", ".join(f"{counts[each]} {each}" for each in (FASTER, SLOWER, FEWER, OPEN) if counts[each])
-    return f"{100 * judged.reduction:.1f} % less time ({interval}) on {judged.problems:,} problems: {named}"
+    named = ", ".join(f"{counts[each]} {each}" for each in (SOONER, LATER, FEWER, OPEN) if counts[each])
+    return (
+        f"there {_seconds(judged.sooner_s)} s sooner ({interval}) on {judged.problems:,} problems, "
+        f"planning in {less:.1f} % less time: {named}"
+    )
 
 
 def judgement_table(judged: Judgement) -> Group:
@@ -115,6 +127,7 @@ def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:
 def _compared(before: Panel, after: Panel) -> pd.DataFrame:
     """The figures of a class without intervals; p-values are of the problems solved, not corrected yet."""
     times = [panel.milliseconds().mean(0) for panel in (before, after)]
+    driving = [panel.driving_seconds() for panel in (before, after)]
     solved = [panel.matrix("solved") for panel in (before, after)]
     hits = [
         panel._replace(rows=panel.rows.assign(hit=panel.rows["source"] == "recalled")).matrix("hit").mean(0)
@@ -126,6 +139,8 @@ def _compared(before: Panel, after: Panel) -> pd.DataFrame:
         champion_ms=times[0],
         ms=times[1],
         reduction=1.0 - times[1] / times[0],
+        champion_driving_s=driving[0],
+        driving_s=driving[1],
         champion_solved=solved[0].mean(0),
         solved=solved[1].mean(0),
         champion_hits=hits[0],
@@ -144,11 +159,11 @@ def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
     """What speaks against a promotion, by the rule."""
     reasons = []
     if ends[0] <= 0.0:
-        reasons.append(_interval_line("not shown to be faster", columns, ends))
-    for verdict, words in ((SLOWER, "slower"), (FEWER, "solves fewer")):
+        reasons.append(_interval_line("not shown to be sooner there", columns, ends))
+    for verdict, words in ((LATER, "later there"), (FEWER, "solves fewer")):
         worse = columns[columns["verdict"] == verdict]
         if len(worse):
-            worst = worse.iloc[int(worse["reduction"].argmin())]
+            worst = worse.iloc[int(worse["sooner_s"].argmin())]
             more = f" and {len(worse) - 1} more" if len(worse) > 1 else ""
             reasons.append(
                 f"{words} with {worst['planner']} {worst['configuration']} on {worst['panel']}{more}"
@@ -162,8 +177,13 @@ def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
 
 
 def _interval_line(what: str, columns: pd.DataFrame, ends: tuple[float, float]) -> str:
-    mean = 100 * columns["reduction"].mean()
-    return f"{what}: {mean:.1f} % less time, 95 % interval {100 * ends[0]:.1f} to {100 * ends[1]:.1f}"
+    mean = _seconds(columns["sooner_s"].mean())
+    return f"{what}: {mean} s saved, 95 % interval {_seconds(ends[0])} to {_seconds(ends[1])}"
+
+
+def _seconds(value: float) -> str:
+    """Two decimals, or more if that would be nothing."""
+    return f"{value:.2f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
 def _titled(judged: Judgement) -> list[tuple[str, list[Rows]]]:
@@ -183,7 +203,8 @@ def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
         row["planner"],
         row["configuration"],
         *[f"{row[name]:,.{decimals}f}" for name in ("champion_ms", "ms")],
-        with_interval(row["reduction"], row["low"], row["high"]),
+        *[f"{row[name]:.1f}" for name in ("champion_driving_s", "driving_s")],
+        f"{_seconds(row['sooner_s'])} [{_seconds(row['low_s'])}, {_seconds(row['high_s'])}]",
         *[percent(row[name]) for name in ("champion_solved", "solved", "champion_hits", "hits")],
         row["verdict"],
     ]

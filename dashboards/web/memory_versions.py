@@ -15,9 +15,9 @@ class MemoryVersion(NamedTuple):
     run: str
     verdict: str  # empty: not judged yet
     against: str  # number of the champion that it was judged against; empty if there was none
-    reduction: float  # of mean planning time, a fraction; NaN if it was not judged
-    low: float  # ends of its 95 % interval
-    high: float
+    sooner_s: float  # planning and driving time saved, mean seconds; NaN if it was not judged by it
+    low_s: float  # ends of its 95 % interval
+    high_s: float
     why: str
     is_champion: bool
 

@@ -115,7 +115,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
         "against": "" if champion is None else champion.number,
     }
     if judgement is not None:
-        figures = {name: f"{getattr(judgement, name):.6f}" for name in ("reduction", "low", "high")}
+        figures = {name: f"{getattr(judgement, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
         tags |= figures | {"why": judgement.why}
     name = registered_name(memory, settings.vehicle)
     version = registry.register(name, run_id, model_id, key_of(settings.run_name, key), tags, markdown)

@@ -108,9 +108,9 @@ def _memory_version(version: Version, champion: Version | None) -> MemoryVersion
         run=version.tag("run"),
         verdict=version.tag("verdict"),
         against=version.tag("against"),
-        reduction=figure("reduction"),
-        low=figure("low"),
-        high=figure("high"),
+        sooner_s=figure("sooner_s"),
+        low_s=figure("low_s"),
+        high_s=figure("high_s"),
         why=version.tag("why"),
         is_champion=champion is not None and champion.number == version.number,
     )

@@ -207,10 +207,13 @@ def log_judgement(
 
 
 def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
-    metrics = {name: float(getattr(judgement, name)) for name in ("reduction", "low", "high")}
+    metrics = {name: float(getattr(judgement, name)) for name in ("sooner_s", "low_s", "high_s")}
     for row in judgement.columns.to_dict("records"):
         prefix = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
-        names = ("champion_ms", "ms", "reduction", "champion_solved", "solved", "champion_hits", "hits")
+        names = (
+            "champion_ms", "ms", "reduction", "champion_driving_s", "driving_s", "sooner_s",
+            "champion_solved", "solved", "champion_hits", "hits",
+        )  # fmt: skip
         metrics |= {f"{prefix}/{name}": float(row[name]) for name in names}
     return metrics
 

@@ -22,21 +22,23 @@ _COLOURS: Final = {
 
 def retraining_charts(versions: Sequence[MemoryVersion], runs: set[str]) -> Iterator[Chart]:
     """Every challenger in ``versions`` beside the champion of its time; ``runs``: names of those there."""
-    judged = [version for version in versions if np.isfinite(version.reduction)]
+    judged = [version for version in versions if np.isfinite(version.sooner_s)]
     if not judged:
         return
-    ends = [100.0 * end for version in judged for end in (version.low, version.high)]
-    across = (max(-100.0, min(0.0, *ends) - 2.0), min(100.0, max(0.0, *ends) + 2.0))
+    ends = [end for version in judged for end in (version.low_s, version.high_s)]
+    room = 0.05 * max(max(0.0, *ends) - min(0.0, *ends), 0.01)
+    across = (min(0.0, *ends) - room, max(0.0, *ends) + room)
     drawings = []
     for memory in dict.fromkeys(version.memory for version in judged):
         rows = [_dot(version, runs) for version in judged if version.memory == memory]
-        drawings.append(dots(memory, rows, "less planning time than the champion, %", across))
+        drawings.append(dots(memory, rows, "sooner there than the champion, s", across))
     verdicts = dict.fromkeys(version.verdict for version in judged)
     yield Chart(
         "retrainings",
         "Retrainings: each challenger beside the champion of its time",
-        "Reduction of the mean planning time on held-back problems that both attempted, averaged over "
-        f"planners and configurations, with the 95 % interval that decided. {PLANNING_TIME}",
+        "How much sooner the robot is there, planning and driving counted, on held-back problems that both "
+        "attempted, averaged over planners and configurations, with the 95 % interval that decided: right of "
+        f"the line at 0 is sooner. {PLANNING_TIME}",
         drawings,
         pd.DataFrame(versions),
         [(_colour(verdict), verdict or "not judged yet") for verdict in verdicts],
@@ -97,7 +99,7 @@ def watched_rows(seen: pd.DataFrame) -> list[dict[str, Any]]:
 
 def _dot(version: MemoryVersion, runs: set[str]) -> Dot:
     words = f"version {version.number} is {version.verdict}, against version {version.against}: {version.why}"
-    estimate = (100.0 * version.reduction, 100.0 * version.low, 100.0 * version.high)
+    estimate = version.sooner_s, version.low_s, version.high_s
     label, colour = f"version {version.number}", _colour(version.verdict)
     return Dot(label, estimate, colour, words, _address(version, runs) or None)
 

@@ -8,10 +8,10 @@ import pytest
 
 from dashboards.verdicts import promotion
 from dashboards.verdicts.promotion import (
-    FASTER,
     FEWER,
+    LATER,
     OPEN,
-    SLOWER,
+    SOONER,
     judge,
     judgement_markdown,
     judgement_table,
@@ -41,35 +41,83 @@ def _times(rows: pd.DataFrame, factor: float | np.ndarray, which: pd.Series | bo
 def test_nobody_is_promoted_over_an_equal(champion: pd.DataFrame) -> None:
     found = judge(champion, champion.sample(frac=1.0, random_state=1))
     assert not found.promoted
-    assert found.why.startswith("not shown to be faster")
-    assert (found.reduction, found.low, found.high) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert found.why.startswith("not shown to be sooner")
+    assert (found.sooner_s, found.low_s, found.high_s) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     assert set(found.columns["verdict"]) == {OPEN}
     assert len(found.columns) == COLUMNS
     assert found.problems == 120
 
 
-def test_whoever_is_faster_everywhere_is_promoted(champion: pd.DataFrame) -> None:
+def _drives(rows: pd.DataFrame, longer: float | np.ndarray, which: pd.Series | bool = True) -> pd.DataFrame:
+    return rows.assign(duration_s=rows["duration_s"] + np.where(which, longer, 0.0))
+
+
+def test_whoever_plans_faster_everywhere_and_drives_the_same_is_promoted(champion: pd.DataFrame) -> None:
     found = judge(champion, _times(champion, 0.5))
     assert found.promoted
-    assert (found.reduction, found.low, found.high) == pytest.approx((0.5, 0.5, 0.5))
-    assert set(found.columns["verdict"]) == {FASTER}
+    assert found.sooner_s == pytest.approx(0.5 * champion["planning_seconds"].mean())
+    assert set(found.columns["verdict"]) == {SOONER}
+
+
+def test_whoever_plans_the_same_and_drives_shorter_is_promoted(champion: pd.DataFrame) -> None:
+    found = judge(champion, _drives(champion, -0.5))
+    assert found.promoted
+    assert found.sooner_s == pytest.approx(0.5 * champion["solved"].mean(), abs=0.02)
+
+
+def test_whoever_plans_faster_and_drives_longer_is_refused(champion: pd.DataFrame) -> None:
+    found = judge(champion, _drives(_times(champion, 0.1), 0.5))
+    assert not found.promoted
+    assert found.high_s < 0.0
+    assert set(found.columns["verdict"]) == {LATER}
+
+
+def test_whoever_plans_slower_and_drives_shorter_by_more_is_promoted(champion: pd.DataFrame) -> None:
+    assert judge(champion, _drives(_times(champion, 2.0), -0.5)).promoted
+
+
+def test_who_drives_longer_somewhere_is_refused_however_much_shorter_elsewhere(
+    champion: pd.DataFrame,
+) -> None:
+    somewhere = (champion["planner"] == "gust") & (champion["assist"] == "open")
+    worse = _drives(_drives(champion, -2.0), 3.0, somewhere & (champion["problem_class"] == "curves"))
+    found = judge(champion, worse)
+    assert found.low_s > 0.0
+    assert not found.promoted
+    assert "later there with gust open 5 exhaustive on curves" in found.why
+
+
+def test_microseconds_that_nobody_notices_refuse_nobody(champion: pd.DataFrame) -> None:
+    somewhere = (champion["planner"] == "gust") & (champion["problem_class"] == "curves")
+    seconds = champion["planning_seconds"] + np.where(somewhere, 5e-4, 0.0)
+    assert judge(champion, _drives(champion.assign(planning_seconds=seconds), -0.5, ~somewhere)).promoted
+
+
+def test_not_solving_a_problem_is_never_sooner(champion: pd.DataFrame) -> None:
+    rows = champion.assign(planning_seconds=1e-3)
+    longest = rows["duration_s"] > rows.groupby("problem_class")["duration_s"].transform("quantile", 0.7)
+    given_up = rows.assign(solved=rows["solved"] & ~longest)
+    assert judge(rows, given_up).sooner_s < 0.0
+    assert not judge(rows, given_up).promoted
 
 
 def test_of_two_never_both_are_promoted(champion: pd.DataFrame) -> None:
     rng = np.random.default_rng(3)
     for spread in (0.02, 0.2, 1.0):
         other = _times(champion, rng.lognormal(-0.1, spread, len(champion)))
+        other = _drives(other, rng.normal(-0.01, spread, len(champion)))
         assert not (judge(champion, other).promoted and judge(other, champion).promoted)
 
 
 def test_who_is_slower_somewhere_is_refused_however_much_faster_elsewhere(champion: pd.DataFrame) -> None:
     somewhere = (champion["planner"] == "follow") & (champion["assist"] == "closed")
-    worse = _times(_times(champion, 0.3), 4.0, somewhere & (champion["problem_class"] == "trap"))
-    found = judge(champion, worse)
-    assert found.low > 0.0
+    slow = _times(champion, 20.0)  # milliseconds, which a robot notices
+    worse = _times(_times(slow, 0.3), 10.0, somewhere & (champion["problem_class"] == "trap"))
+    found = judge(slow, worse)
+    assert found.low_s > 0.0
     assert not found.promoted
-    assert "slower with follow closed 5 encoder on trap" in found.why
-    assert (found.columns["verdict"] == SLOWER).sum() == 1
+    assert "later there with follow closed 5 encoder on trap" in found.why
+    assert (found.columns["verdict"] == LATER).sum() == 1
 
 
 def test_who_solves_fewer_is_refused_however_fast(champion: pd.DataFrame) -> None:
@@ -88,7 +136,8 @@ def test_chance_seldom_promotes(champion: pd.DataFrame) -> None:
     promoted = 0
     for _ in range(40):
         noise = [rng.lognormal(0.0, 0.3, len(champion)) for _ in range(2)]
-        promoted += judge(_times(champion, noise[0]), _times(champion, noise[1])).promoted
+        first, other = (_drives(_times(champion, each), np.log(each)) for each in noise)
+        promoted += judge(first, other).promoted
     assert promoted <= 4  # one in 40 is expected; five or more come of that rate in one case of 300
 
 
@@ -103,6 +152,7 @@ def test_what_is_not_paired_is_not_judged(champion: pd.DataFrame) -> None:
 def test_both_forms_show_every_column_and_the_verdict(champion: pd.DataFrame) -> None:
     found = judge(champion, _times(champion, 0.5))
     text = judgement_markdown(found)
-    assert text.startswith("**promoted**: faster: 50.0 % less time")
+    assert text.startswith("**promoted**: sooner there: ")
+    assert "50.0 % less time" in text
     assert text.count("\n|") == COLUMNS + 2 * 2
     assert len(judgement_table(found).renderables) == 2

@@ -37,8 +37,8 @@ CLASS = "trap"
 PROBLEMS = 6
 VERSIONS = (
     MemoryVersion("motion-memory-trap", 1, 0, "first", "rolled back", "", nan, nan, nan, "", False),
-    MemoryVersion("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "faster: 20 %", True),
-    MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not faster", False),
+    MemoryVersion("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "sooner", True),
+    MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not sooner", False),
 )
 SEEN = Usefulness(problems=200, hits=160, mean_ms=1.5, median_ms=0.5)
 WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "encoder"))

@@ -74,7 +74,7 @@ def test_the_first_run_makes_the_first_champion_and_a_better_challenger_the_next
     assert (one["verdict"], one["learned"], one["retraining"]) == (FIRST, "", "0")
     assert (two["verdict"], two["against"], two["previous"]) == (PROMOTED, "1", "1")
     assert state["champion"] == 2
-    assert float(two["low"]) > 0.0
+    assert float(two["low_s"]) > 0.0
     assert two["learned"].startswith("retrain-0001-")
     assert json.loads(two["benchmark"])["gust closed 5 exhaustive"]["problems"] == SETTINGS.test_problems
     assert RunSettings.from_json(story.seen["second"]).epochs == SETTINGS.epochs // 2
