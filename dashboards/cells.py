@@ -24,7 +24,7 @@ PLANNING_TIME: Final = (
     "encoding, recall, checking recalled plans, guides and repair, the planner's own structures, search. One "
     "problem at a time, one thread, compiled code warm. Failures count with the time they took."
 )
-_PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow"}
+_PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow", "lattice": "Lattice"}
 
 Rows = list[list[str]]
 

@@ -27,7 +27,7 @@ from storage.tables.configurations import BASELINE, Configuration, configured
 
 COMBINED: Final = "combined"  # the memory of all classes, whose attempts form a panel of their own
 PANELS: Final = ("curves", "random", "trap")
-PLANNERS: Final = ("rrt", "gust", "follow")
+PLANNERS: Final = ("rrt", "gust", "follow", "lattice")
 
 
 class Panel(NamedTuple):

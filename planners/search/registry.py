@@ -9,6 +9,7 @@ import numpy as np
 
 from planners.search.follow import FollowSettings, follow
 from planners.search.gust import GustSettings, gust
+from planners.search.lattice import LatticeSettings, lattice
 from planners.search.outcome import Outcome
 from planners.search.query import Guide, Limits, Query
 from planners.search.rrt import RrtSettings, rrt
@@ -21,6 +22,7 @@ PLANNERS: dict[str, Callable[[Query], Outcome]] = {
     "rrt": partial(rrt, settings=RrtSettings()),
     "gust": partial(gust, settings=GustSettings()),
     "follow": partial(follow, settings=FollowSettings()),
+    "lattice": partial(lattice, settings=LatticeSettings()),
 }
 
 

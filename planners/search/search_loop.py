@@ -94,7 +94,10 @@ def attempt(
                 extend_tree = explore if explore is not None and trial % 2 else grow
                 if extend_tree is grow:
                     prepare(tree, goal, trial)
-            extend_tree(tree, goal, min(int(counts[trees.EXPANSIONS]) + SLICE, restart_at, limits.expansions))
+            until = min(int(counts[trees.EXPANSIONS]) + SLICE, restart_at, limits.expansions)
+            extend_tree(tree, goal, until)
+            if counts[trees.EXPANSIONS] < until:
+                restart_at = int(counts[trees.EXPANSIONS])  # nothing is left to extend
             running_since = min(running_since, perf_counter())
             if counts[trees.GOAL_VERTEX] >= 0:
                 status = Status.SOLVED

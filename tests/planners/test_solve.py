@@ -166,7 +166,7 @@ def test_every_assist_works_with_every_strategy(assist, strategy, seed):
     assert len(set(attempt.recalled)) == len(attempt.recalled) <= 3
 
 
-@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("planner", ["rrt", "gust", "follow"])  # the lattice needs no guide
 def test_a_fresh_guide_needs_no_memory_and_leads_elsewhere(planner, memory):
     problem = strewn(3, 30)
     attempt, again = solve(problem, planner, "fresh"), solve(problem, planner, "fresh", 5, memory)

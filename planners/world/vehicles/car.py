@@ -78,6 +78,11 @@ def _control_limits(vehicle: CarLike) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_steering_rate
 
 
+@implements(interface.turn_limit, Car, CarWithTrailers)
+def _turn_limit(vehicle: CarLike) -> float:
+    return vehicle.max_steering
+
+
 @implements(interface.admissible, Car, CarWithTrailers)
 def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
     return (

@@ -41,6 +41,11 @@ def _control_limits(vehicle: DifferentialDrive) -> tuple[float, float]:
     return vehicle.max_acceleration, vehicle.max_turn_acceleration
 
 
+@implements(interface.turn_limit, DifferentialDrive)
+def _turn_limit(vehicle: DifferentialDrive) -> float:
+    return vehicle.max_turn_rate
+
+
 @implements(interface.admissible, DifferentialDrive)
 def _admissible(state: State, first: float, second: float, vehicle: DifferentialDrive) -> tuple[float, float]:
     return (

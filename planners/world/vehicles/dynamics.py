@@ -16,6 +16,7 @@ from planners.world.vehicles.interface import step as step
 from planners.world.vehicles.interface import store as store
 from planners.world.vehicles.interface import swept_bodies as swept_bodies
 from planners.world.vehicles.interface import turn_error as turn_error
+from planners.world.vehicles.interface import turn_limit as turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 KINDS = (car, differential_drive, car_with_trailers)  # imported so that their kernels are registered

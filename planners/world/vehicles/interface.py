@@ -43,6 +43,12 @@ def control_limits(vehicle: Vehicle) -> tuple[float, float]:
 
 
 @by_vehicle
+def turn_limit(vehicle: Vehicle) -> float:
+    """The largest absolute value of the fifth variable of a state: a steering angle or a turn rate."""
+    raise NotImplementedError
+
+
+@by_vehicle
 def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
     """The controls, reduced if a step with them would lead past a limit of the state.
 

@@ -1,0 +1,231 @@
+"""Best-first search over motion primitives (Pivtoraiko and Kelly 2005; Dolgov 2008: hybrid A*).
+
+A motion primitive drives for a fixed time towards one of a few speeds and one of a few steering angles (or
+turn rates). Of all primitives from all states reached, the one with the least driving time is driven next:
+the time so far, and the time to go, which is estimated from the distance over the grid. States in the same
+cell of place, heading and speed count as one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from planners.search.guides.sampling import uniform
+from planners.search.outcome import Outcome
+from planners.search.query import Query
+from planners.search.rrt import towards_anywhere
+from planners.search.search_loop import attempt
+from planners.search.structures import tree as trees
+from planners.search.structures.cost_to_go import (
+    CostToGo,
+    allocate_cost_to_go,
+    fill_cost_to_go,
+    metres_to_go,
+)
+from planners.search.structures.frontier import (
+    Frontier,
+    allocate_frontier,
+    clear_frontier,
+    is_empty,
+    pop,
+    push,
+    reach,
+    was_reached,
+)
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.jit import inlined, lean
+from planners.world.problem import BOUNDS
+from planners.world.trigonometry import length, sincos, wrapped
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, store, turn_limit
+from planners.world.vehicles.vehicle import Vehicle
+
+SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
+SPEEDS: Final = (1.0, 0.5, -1.0)  # shares of the largest speed; below 0 of the largest backwards
+LOOK_AHEAD_M: Final = 2.0  # from here to there the distance to go tells whether the heading is right
+
+
+class Lattice(NamedTuple):
+    """One resolution of the search. The defaults are those of docs/planners.md."""
+
+    steps: int = 5  # of a primitive
+    speeds: int = 1  # how many of ``SPEEDS`` there are primitives for
+    turn: float = 1.0  # the ``SHARES`` are multiplied by this
+    cell_m: float = 1.0  # side of a cell
+    headings: int = 24  # cells of headings
+    paces: int = 4  # cells of speeds
+    greed: float = 2.0  # weight of the time to go; with 1 driving times are shorter and searches longer
+    heading_s: float = 0.4  # time to go for each radian of turning
+
+
+class LatticeSettings(NamedTuple):
+    """Defaults of docs/planners.md, Lattice."""
+
+    levels: tuple[Lattice, ...] = (
+        Lattice(),
+        Lattice(steps=4, speeds=3, cell_m=0.5, headings=32),
+        Lattice(steps=3, speeds=3, cell_m=0.25, headings=48),
+    )  # one after another, each when the one before has nothing left to drive or has taken too long
+    improving_greed: float = 1.2  # where only a plan better than a given one will do
+    restart_after: int = 400  # expansions; every second trial is grown by RRT
+
+
+@inlined
+def _controls(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> tuple[float, float]:
+    """The controls that lead towards a primitive's speed and steering."""
+    share = SPEEDS[motion // len(SHARES)]
+    speed = share * vehicle.max_speed if share > 0.0 else -share * vehicle.min_speed
+    turn = min(max(lattice.turn * SHARES[motion % len(SHARES)], -1.0), 1.0) * turn_limit(vehicle)
+    limit_1, limit_2 = control_limits(vehicle)
+    control_1 = min(max((speed - state[3]) / vehicle.dt, -limit_1), limit_1)
+    control_2 = min(max((turn - state[4]) / vehicle.dt, -limit_2), limit_2)
+    return admissible(state, control_1, control_2, vehicle)
+
+
+@inlined
+def _key(state: State, search: int, lattice: Lattice, vehicle: Vehicle) -> int:
+    """The cell of a state: ten bits each for row and column, seven for the heading, three for the speed."""
+    row = int((state[1] - BOUNDS[1]) / lattice.cell_m) & 1023
+    column = int((state[0] - BOUNDS[0]) / lattice.cell_m) & 1023
+    heading = int((wrapped(state[2]) + math.pi) * (lattice.headings / (2.0 * math.pi))) & 127
+    share = (state[3] - vehicle.min_speed) / (vehicle.max_speed - vehicle.min_speed)
+    pace = min(int(share * lattice.paces), lattice.paces - 1)
+    return (((search << 10 | row) << 10 | column) << 7 | heading) << 3 | pace
+
+
+@inlined
+def _seconds_to_go(state: State, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> float:
+    """The estimated driving time to the goal: the distance at full speed, getting to it, and turning."""
+    metres = metres_to_go(state[0], state[1], go)
+    sin, cos = sincos(state[2])
+    ahead = metres_to_go(state[0] + LOOK_AHEAD_M * cos, state[1] + LOOK_AHEAD_M * sin, go)
+    turn = min(max(1.0 - (metres - ahead) / LOOK_AHEAD_M, 0.0), 2.0)  # 1 - cos of the angle to turn by
+    missing = vehicle.max_speed - state[3]
+    acceleration = control_limits(vehicle)[0]
+    slow = missing * missing / (2.0 * acceleration * vehicle.max_speed)
+    return float(metres / vehicle.max_speed + slow + lattice.heading_s * turn)
+
+
+@lean
+def open_vertex(
+    tree: trees.Tree, vertex: int, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
+) -> None:
+    """Let all primitives from a vertex wait. Each is checked for collisions when it is driven."""
+    for motion in range(len(SHARES) * lattice.speeds):
+        state = load(tree.states, vertex, vehicle)
+        for _ in range(lattice.steps):
+            control_1, control_2 = _controls(state, motion, lattice, vehicle)
+            state = step(state, control_1, control_2, vehicle)
+        if not was_reached(frontier, _key(state, frontier.counts[1], lattice, vehicle)):
+            spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
+            push(
+                frontier, spent + lattice.greed * _seconds_to_go(state, go, lattice, vehicle), vertex, motion
+            )
+
+
+@lean
+def begin_lattice(
+    tree: trees.Tree, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
+) -> None:
+    """Begin a search from the vertices that the tree has: its root, or a drive that is given."""
+    clear_frontier(frontier)
+    last = tree.counts[trees.SIZE] - 1
+    open_vertex(tree, last, frontier, go, lattice, vehicle)
+    for vertex in range(0, last, lattice.steps):
+        open_vertex(tree, vertex, frontier, go, lattice, vehicle)
+
+
+@lean
+def drive_primitive(
+    tree: trees.Tree, vertex: int, motion: int, goal: Floats, lattice: Lattice, vehicle: Vehicle, scene: Scene
+) -> int:
+    """Add the states of a primitive to the tree, and return the last; -1 if one is blocked or too late."""
+    counts = tree.counts
+    state = load(tree.states, vertex, vehicle)
+    parent = vertex
+    for _ in range(lattice.steps):
+        control_1, control_2 = _controls(state, motion, lattice, vehicle)
+        state = step(state, control_1, control_2, vehicle)
+        to_goal = length(state[0] - goal[0], state[1] - goal[1]) - goal[2]
+        depth = tree.depths[parent] + 1
+        if depth * vehicle.dt + max(to_goal, 0.0) / vehicle.max_speed >= tree.bound[0]:
+            return -1
+        counts[trees.CHECKS] += 1
+        if not state_is_free(state, vehicle, scene):
+            return -1
+        new = counts[trees.SIZE]
+        counts[trees.SIZE] += 1
+        store(tree.states, new, state)
+        tree.controls[new, 0] = control_1
+        tree.controls[new, 1] = control_2
+        tree.parents[new] = parent
+        tree.depths[new] = depth
+        parent = new
+        if to_goal <= 0.0:
+            counts[trees.GOAL_VERTEX] = new
+            break
+    return parent
+
+
+@lean
+def grow_lattice(
+    tree: trees.Tree,
+    goal: Floats,
+    until: int,
+    frontier: Frontier,
+    go: CostToGo,
+    lattice: Lattice,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> None:
+    """Drive the primitive with the least estimate until solved, nothing is left, or ``until`` expansions."""
+    counts = tree.counts
+    while (
+        counts[trees.EXPANSIONS] < until
+        and counts[trees.SIZE] + lattice.steps <= tree.states.shape[0]
+        and not is_empty(frontier)
+    ):
+        counts[trees.EXPANSIONS] += 1
+        vertex, motion = pop(frontier)
+        last = drive_primitive(tree, vertex, motion, goal, lattice, vehicle, scene)
+        if counts[trees.GOAL_VERTEX] >= 0:
+            return
+        if last >= 0:
+            key = _key(load(tree.states, last, vehicle), frontier.counts[1], lattice, vehicle)
+            if not was_reached(frontier, key):
+                reach(frontier, key)
+                open_vertex(tree, last, frontier, go, lattice, vehicle)
+
+
+def _varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
+    """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
+    bits = query.rng.bit_generator
+    return lattice._replace(
+        greed=greed, steps=lattice.steps + int(3.0 * uniform(bits)) - 1, turn=0.7 + 0.6 * uniform(bits)
+    )
+
+
+def lattice(query: Query, settings: LatticeSettings) -> Outcome:
+    """Plan from the problem's start to its goal disc. A guide is not looked at."""
+    go = query.workspace.buffers(allocate_cost_to_go)
+    frontier = query.workspace.buffers(allocate_frontier)
+    vehicle, scene = query.vehicle, query.scene
+    improving = math.isfinite(query.limits.bound_s)
+    level = settings.levels[0]
+
+    def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
+        nonlocal level
+        if trial == 0:
+            occupied = drawing_of(query.problem, query.workspace).occupied
+            fill_cost_to_go(occupied, goal[0], goal[1], goal[2], go)
+        level = settings.levels[min(trial // 2, len(settings.levels) - 1)]
+        if improving:
+            level = _varied(level, settings.improving_greed, query)
+        begin_lattice(tree, frontier, go, level, vehicle)
+
+    def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
+        grow_lattice(tree, goal, until, frontier, go, level, vehicle, scene)
+
+    return attempt(query, settings.restart_after, prepare, grow, towards_anywhere(query))
