@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Floats, Point
+from planners.world.arrays import Bounds, Floats, Point
+from planners.world.jit import inlined, jit, lean
 from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
@@ -58,18 +59,82 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
     alignment = Alignment((x, y), 0.0 if abs(turn) < SAME_ANGLE else -turn)
     if alignment == Alignment((0.0, 0.0), 0.0):
         return problem, alignment
-    x_min, y_min, x_max, y_max = problem.bounds
-    corners = _turned(np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]]), alignment)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    cut_off = _cut_off(corners, low, high) if alignment.turn != 0.0 else []
-    goal_x, goal_y = _turned(np.array([goal]), alignment)[0]
-    return replace(
-        problem,
-        start=(0.0, 0.0, heading + alignment.turn),
-        goal=(float(goal_x), float(goal_y)),
-        bounds=(float(low[0]), float(low[1]), float(high[0]), float(high[1])),
-        obstacles=_joined(_turned(problem.obstacles.vertices, alignment), problem.obstacles, cut_off),
-    ), alignment
+    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
+    obstacles, bounds = _moved(problem.obstacles, problem.bounds, alignment.origin, cos, sin)
+    goal_x, goal_y = goal[0] - x, goal[1] - y
+    moved = Problem(
+        problem.id,
+        problem.class_name,
+        (0.0, 0.0, heading + alignment.turn),
+        (cos * goal_x - sin * goal_y, sin * goal_x + cos * goal_y),
+        problem.goal_radius,
+        bounds,
+        obstacles,
+        problem.scale,
+    )
+    return moved, alignment
+
+
+@jit
+def _moved(
+    obstacles: Obstacles, bounds: Bounds, origin: Point, cos: float, sin: float
+) -> tuple[Obstacles, Bounds]:
+    """Move ``origin`` to 0, turn about it, and round to float32: obstacles, and the box around the bounds.
+
+    Triangles behind the obstacles cover what the box has more than the turned bounds.
+    """
+    count = obstacles.vertices.shape[0]
+    pieces = obstacles.piece_starts.shape[0] - 1
+    groups = obstacles.obstacle_starts.shape[0] - 1
+    vertices = np.empty((count + 12, 2))
+    piece_starts = np.empty(pieces + 5, np.int32)
+    obstacle_starts = np.empty(groups + 5, np.int32)
+    for i in range(count):
+        x, y = _turned(obstacles.vertices[i, 0] - origin[0], obstacles.vertices[i, 1] - origin[1], cos, sin)
+        vertices[i, 0] = np.float64(np.float32(x))
+        vertices[i, 1] = np.float64(np.float32(y))
+    for p in range(pieces + 1):
+        piece_starts[p] = obstacles.piece_starts[p]
+    for o in range(groups + 1):
+        obstacle_starts[o] = obstacles.obstacle_starts[o]
+    corners = np.empty((5, 2))
+    for k in range(5):
+        x, y = _turned(
+            bounds[2 if k in (1, 2) else 0] - origin[0], bounds[3 if k in (2, 3) else 1] - origin[1], cos, sin
+        )
+        corners[k, 0] = x
+        corners[k, 1] = y
+    low_x, low_y = corners[:, 0].min(), corners[:, 1].min()
+    high_x, high_y = corners[:, 0].max(), corners[:, 1].max()
+    added = 0
+    for k in range(4):
+        along_x = corners[k + 1, 0] - corners[k, 0]
+        along_y = corners[k + 1, 1] - corners[k, 1]
+        if min(abs(along_x), abs(along_y)) > SLIVER:
+            triangle = vertices[count + 3 * added : count + 3 * added + 3]
+            triangle[0, 0] = corners[k, 0]
+            triangle[0, 1] = corners[k, 1]
+            triangle[1, 0] = high_x if along_y > 0.0 else low_x
+            triangle[1, 1] = high_y if along_x < 0.0 else low_y
+            triangle[2, 0] = corners[k + 1, 0]
+            triangle[2, 1] = corners[k + 1, 1]
+            added += 1
+            piece_starts[pieces + added] = count + 3 * added
+            obstacle_starts[groups + added] = pieces + added
+    for i in range(count, count + 3 * added):
+        vertices[i, 0] = np.float64(np.float32(vertices[i, 0]))
+        vertices[i, 1] = np.float64(np.float32(vertices[i, 1]))
+    turned = Obstacles(
+        vertices[: count + 3 * added],
+        piece_starts[: pieces + added + 1],
+        obstacle_starts[: groups + added + 1],
+    )
+    return turned, (low_x, low_y, high_x, high_y)
+
+
+@inlined
+def _turned(x: float, y: float, cos: float, sin: float) -> Point:
+    return cos * x - sin * y, sin * x + cos * y
 
 
 def mirrored(problem: Problem) -> Problem:
@@ -87,12 +152,19 @@ def mirrored(problem: Problem) -> Problem:
 
 def from_canonical(plan: Plan, alignment: Alignment) -> Plan:
     """Move a plan back into the frame of its problem. Controls are the same in every frame."""
-    cos, sin = math.cos(-alignment.turn), math.sin(-alignment.turn)
+    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
     states = plan.states.copy()
-    states[:, 0] = alignment.origin[0] + cos * plan.states[:, 0] - sin * plan.states[:, 1]
-    states[:, 1] = alignment.origin[1] + sin * plan.states[:, 0] + cos * plan.states[:, 1]
-    states[:, 2] -= alignment.turn
+    _move_back(states, alignment.origin, alignment.turn, cos, sin)
     return Plan(states, plan.controls, plan.dt)
+
+
+@lean
+def _move_back(states: Floats, origin: Point, turn: float, cos: float, sin: float) -> None:
+    for i in range(states.shape[0]):
+        x, y = _turned(states[i, 0], states[i, 1], cos, -sin)
+        states[i, 0] = origin[0] + x
+        states[i, 1] = origin[1] + y
+        states[i, 2] -= turn
 
 
 def scaled(plan: Plan, scale: float) -> Plan:
@@ -105,38 +177,8 @@ def scaled(plan: Plan, scale: float) -> Plan:
     return Plan(states, controls, plan.dt)
 
 
-def _turned(points: Floats, alignment: Alignment) -> Floats:
-    """Turn points ``[n, 2]`` (metres) of the problem's own frame into the canonical frame."""
-    cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
-    turned: Floats = (points - alignment.origin) @ np.array([[cos, sin], [-sin, cos]])
-    return turned
-
-
-def _joined(vertices: Floats, obstacles: Obstacles, triangles: list[Floats]) -> Obstacles:
-    """The same obstacles with other vertices ``[V, 2]``, and triangles ``[3, 2]`` behind them, in float32."""
-    more = obstacles_of([[triangle] for triangle in triangles])
-    _, piece_starts, obstacle_starts = obstacles
-    return Obstacles(
-        np.concatenate((vertices.astype(np.float32).astype(np.float64), more.vertices)),
-        np.concatenate((piece_starts, piece_starts[-1] + more.piece_starts[1:])),
-        np.concatenate((obstacle_starts, obstacle_starts[-1] + more.obstacle_starts[1:])),
-    )
-
-
 def _groups(problem: Problem) -> list[list[Floats]]:
     """List the obstacles, each as convex pieces ``[n, 2]``."""
     pieces = problem.obstacles.pieces()
     starts = problem.obstacles.obstacle_starts
     return [pieces[first:last] for first, last in pairwise(starts)]
-
-
-def _cut_off(corners: Floats, low: Floats, high: Floats) -> list[Floats]:
-    """Cover the box from ``low`` to ``high`` around the turned rectangle with triangles ``[3, 2]``."""
-    triangles = []
-    for begin, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        edge = end - begin
-        outward = np.array([edge[1], -edge[0]])
-        triangle = np.array([begin, np.where(outward > 0.0, high, low), end])
-        if np.abs(edge).min() > SLIVER:
-            triangles.append(triangle)
-    return triangles

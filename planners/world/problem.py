@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Integers, Point, Pose
+from planners.world.jit import lean
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 CANONICAL_START = (0.0, 0.0, math.pi / 4)  # metres, metres, radians: facing the goal
@@ -55,12 +56,20 @@ class Plan:
     @property
     def length_m(self) -> float:
         """Length of the path of the reference point, in metres."""
-        return float(np.hypot(*np.diff(self.states[:, :2], axis=0).T).sum())
+        return _path_length(self.states)
 
     @property
     def duration_s(self) -> float:
         """Driving time in seconds."""
         return self.dt * len(self.controls)
+
+
+@lean
+def _path_length(states: Floats) -> float:
+    metres = 0.0
+    for i in range(1, states.shape[0]):
+        metres += math.hypot(states[i, 0] - states[i - 1, 0], states[i, 1] - states[i - 1, 1])
+    return metres
 
 
 def obstacles_of(groups: list[list[Floats]]) -> Obstacles:

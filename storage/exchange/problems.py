@@ -11,9 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.geometry.polygons import cut_polygons
-from planners.world.problem import Obstacles, Problem
-from planners.world.problem_faults import problem_fault
+from planners.world.checked_problem import checked_problem
+from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
 from storage.exchange.problem_files import FIELDS, ProblemSlice, format_of, raw_problems, raw_slice
@@ -112,38 +111,32 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
     bounds = _numbers(fields, "bounds", 4)
     scale = scale_of(fields.get("scale"))
-    problem = Problem(
-        id=_text(fields, "id", default_id),
-        class_name=_text(fields, "class", UNKNOWN_CLASS),
-        start=(start[0] / scale, start[1] / scale, start[2]),
-        goal=(goal[0] / scale, goal[1] / scale),
-        goal_radius=number_of(fields["goal_radius"], "goal_radius") / scale,
-        bounds=(bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
-        obstacles=_obstacles(fields["obstacles"], fields.get("groups"), scale),
-        scale=scale,
-    )
-    fault = problem_fault(problem, vehicle)
-    if fault is not None:
-        raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
-    return problem
-
-
-def _obstacles(polygons: object, groups: object, scale: float) -> Obstacles:
+    polygons = fields["obstacles"]
     if not isinstance(polygons, list):
         raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
-    points = _points(polygons)
-    starts = np.cumsum([0] + [len(polygon) for polygon in polygons], dtype=np.int64)
-    obstacles = cut_polygons(points / scale, starts)
+    return checked_problem(
+        (start[0], start[1], start[2]),
+        (goal[0], goal[1]),
+        number_of(fields["goal_radius"], "goal_radius"),
+        (bounds[0], bounds[1], bounds[2], bounds[3]),
+        _points(polygons),
+        np.cumsum([0] + [len(polygon) for polygon in polygons], dtype=np.int64),
+        vehicle=vehicle,
+        problem_id=_text(fields, "id", default_id),
+        class_name=_text(fields, "class", UNKNOWN_CLASS),
+        scale=scale,
+        groups=_groups(fields.get("groups"), len(polygons)),
+    )
+
+
+def _groups(groups: object, polygons: int) -> list[int] | None:
     if groups is None:
-        return obstacles
+        return None
     if not isinstance(groups, list) or not all(type(size) is int and size > 0 for size in groups):
         raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
-    if sum(groups) != len(polygons):
-        raise ValueError(
-            f"groups are of {sum(groups)} polygons, obstacles are {len(polygons)}; make them agree"
-        )
-    ends = np.cumsum([0, *groups])
-    return obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
+    if sum(groups) != polygons:
+        raise ValueError(f"groups are of {sum(groups)} polygons, obstacles are {polygons}; make them agree")
+    return groups
 
 
 def _points(polygons: list[Any]) -> Floats:

@@ -8,18 +8,23 @@ Everything is loaded, checked and compiled before ``load_planner`` returns.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.recall import RECALLS, default_recall
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, to_canonical
-from planners.world.problem import Plan, Problem
+from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
+from planners.world.checked_problem import checked_problem
+from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
@@ -27,7 +32,7 @@ from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
 from tasks.attempts.attempt_rows import check_attempt
-from tasks.attempts.compile_assists import EMPTY, compile_assists
+from tasks.attempts.compile_assists import compile_assists
 from tasks.registry.memory_at import memory_at
 from tasks.settings.checks import check_known
 from tasks.settings.errors import UsageError
@@ -63,7 +68,8 @@ class RobotPlanner:
         Parameters
         ----------
         problem
-            A ``Problem``, or a problem in the exchange format (docs/contract.md) as a mapping or JSON text.
+            A ``Problem``, which is not checked again, or a problem in the exchange format
+            (docs/problem-files.md) as a mapping or JSON text.
 
         Raises
         ------
@@ -73,11 +79,58 @@ class RobotPlanner:
             The independent judge refuses the plan.
 
         """
-        vehicle = self.memory.vehicle
         if isinstance(problem, str):
             problem = _parsed(problem)
         if not isinstance(problem, Problem):
-            problem = problem_of(problem, "problem", vehicle)
+            problem = problem_of(problem, "problem", self.memory.vehicle)
+        return self._planned(problem)
+
+    def plan_arrays(
+        self,
+        start: Pose,
+        goal: Point,
+        points: Floats,
+        polygon_starts: Indices | Integers,
+        goal_radius: float = GOAL_RADIUS,
+        bounds: Bounds = BOUNDS,
+        scale: float = 1.0,
+    ) -> Answer:
+        """Plan for a problem that is in arrays already; otherwise like ``plan``.
+
+        Parameters
+        ----------
+        start
+            x, y in metres, heading in radians.
+        goal
+            x, y in metres.
+        points
+            ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after another.
+        polygon_starts
+            ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i + 1]]``.
+        goal_radius
+            Metres.
+        bounds
+            x_min, y_min, x_max, y_max in metres.
+        scale
+            Metres of these lengths in one metre of the memory's problems.
+
+        Raises
+        ------
+        ValueError
+            A polygon is none, or the problem is impossible.
+        PlanFaultError
+            The independent judge refuses the plan.
+
+        """
+        problem = checked_problem(
+            *(start, goal, goal_radius, bounds, points, polygon_starts),
+            vehicle=self.memory.vehicle,
+            scale=scale,
+        )
+        return self._planned(problem)
+
+    def _planned(self, problem: Problem) -> Answer:
+        vehicle = self.memory.vehicle
         canonical, alignment = to_canonical(problem)
         with self._workspace() as workspace:
             attempt = solve(
@@ -159,5 +212,11 @@ def load_planner(
     strategy = recall or default_recall(archive)
     compile_assists(archive.vehicle, planner, [strategy])
     ready = RobotPlanner(archive, planner, assist, top_k, strategy, seed, judged)
-    ready.plan(replace(EMPTY, scale=archive.scales[0]))
+    scale = archive.scales[0]
+    away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
+    bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
+    ready.plan_arrays(
+        *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),
+        *(scale * GOAL_RADIUS, bounds, scale),
+    )
     return ready

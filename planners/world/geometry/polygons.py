@@ -22,7 +22,7 @@ class PolygonError(ValueError):
     """Says what is wrong with a polygon and what to do, as the end of a sentence that names the polygon."""
 
 
-def cut_polygons(points: Floats, starts: Indices) -> Obstacles:
+def cut_polygons(points: Floats, starts: Indices | Integers) -> Obstacles:
     """Cut simple polygons into convex pieces, as ``convex_pieces`` does, those that are convex in one go.
 
     Args:
@@ -35,7 +35,8 @@ def cut_polygons(points: Floats, starts: Indices) -> Obstacles:
     Raises:
         PolygonError: As for ``convex_pieces``. The message names the polygon, "obstacle 1" being the first.
     """
-    vertices, piece_starts, convex = _convex_polygons(np.ascontiguousarray(points, np.float64), starts)
+    points, starts = np.ascontiguousarray(points, np.float64), np.asarray(starts, np.int64)
+    vertices, piece_starts, convex = _convex_polygons(points, starts)
     if convex.all():
         return Obstacles(vertices, piece_starts, np.arange(len(starts), dtype=np.int32))
     pieces: list[Floats] = []

@@ -48,6 +48,11 @@ def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> 
         assert plan is not None
         assert same(answer, planner.plan(fields_of(problem(i)) | {"id": answer.problem_id}))
         assert same(answer, planner.plan(json.dumps(fields_of(problem(i)))))
+        given = problem(i)
+        vertices, polygon_starts, _ = given.obstacles
+        arrays = planner.plan_arrays(given.start, given.goal, vertices, polygon_starts)
+        assert arrays.plan is not None
+        assert same(replace(answer, problem_id=arrays.problem_id), arrays) or answer.source != "recalled"
         assert answer.plan is not None
         assert np.array_equal(answer.plan.states, plan.states)
         assert faults(problem(i), answer.plan, CAR) == []

@@ -1,0 +1,63 @@
+"""Makes a problem of polygons of any kind, ready for planners and checked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
+from planners.world.geometry.polygons import cut_polygons
+from planners.world.problem import Problem
+from planners.world.problem_faults import problem_fault
+from planners.world.vehicles.vehicle import CAR, Vehicle
+
+
+def checked_problem(
+    start: Pose,
+    goal: Point,
+    goal_radius: float,
+    bounds: Bounds,
+    points: Floats,
+    polygon_starts: Indices | Integers,
+    *,
+    vehicle: Vehicle = CAR,
+    problem_id: str = "problem",
+    class_name: str = "unknown",
+    scale: float = 1.0,
+    groups: list[int] | None = None,
+) -> Problem:
+    """Make a problem in any frame, with obstacles of polygons that lie end to end in one array.
+
+    Args:
+        start: x, y in metres, heading in radians.
+        goal: x, y in metres.
+        goal_radius: metres.
+        bounds: x_min, y_min, x_max, y_max in metres.
+        points: ``[m, 2]`` metres, the corners of all polygons, each in any orientation.
+        polygon_starts: ``[n + 1]`` polygon i owns ``points[polygon_starts[i] : polygon_starts[i + 1]]``.
+        vehicle: what has to have room at the start.
+        problem_id: the id of the problem.
+        class_name: the class that it belongs to.
+        scale: metres of the lengths here in one metre of the problem.
+        groups: how many polygons belong to each obstacle; by default one.
+
+    Raises:
+        ValueError: A polygon is none, or the problem makes no sense (``problem_fault``).
+    """
+    obstacles = cut_polygons(points if scale == 1.0 else points / scale, polygon_starts)
+    if groups is not None:
+        ends = np.cumsum([0, *groups])
+        obstacles = obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
+    problem = Problem(
+        problem_id,
+        class_name,
+        (start[0] / scale, start[1] / scale, start[2]),
+        (goal[0] / scale, goal[1] / scale),
+        goal_radius / scale,
+        (bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
+        obstacles,
+        scale,
+    )
+    fault = problem_fault(problem, vehicle)
+    if fault is not None:
+        raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
+    return problem
