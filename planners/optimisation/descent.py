@@ -1,0 +1,244 @@
+"""Shortens a drive by changes of its controls, each tried by driving, until none helps.
+
+The drive is always exactly what its controls lead to. Its end is pulled towards the goal as far as it will
+go; where the drive enters the goal disc it is cut off, so it gets fewer and fewer steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from planners.optimisation.gains import Aim, effort, miss, sweep_back
+from planners.optimisation.gaps import Barrier
+from planners.optimisation.local_model import (
+    Model,
+    differentiate_nearness,
+    differentiate_steps,
+    nearness_cost,
+)
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.jit import lean
+from planners.world.trigonometry import length
+from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.vehicle import Vehicle
+
+TRIES: Final = 6  # shares 1, 1/2 ... of a change that are tried
+LEAST_SHARE: Final = 0.1  # of the expected gain that a change must bring
+FIRST_DAMPING: Final = 0.01
+MOST_DAMPING: Final = 1e3
+TURN_GAIN: Final = 10.0  # of the controller that drives along points
+
+
+class Stage(NamedTuple):
+    """One stage of a descent: how obstacles push, and with what expected gain (metres) it ends."""
+
+    barrier: Barrier
+    least_gain: float
+
+
+@lean
+def _cost(
+    states: Floats,
+    controls: Floats,
+    steps: int,
+    aim: Aim,
+    vehicle: Vehicle,
+    scene: Scene,
+    circles: Floats,
+    barrier: Barrier,
+    enough: float,
+) -> float:
+    """What a drive costs; it is not computed further if it is clearly more than ``enough``."""
+    cost = miss(states[steps, 0], states[steps, 1], aim)
+    for k in range(1, steps + 1):
+        cost += effort(controls[k - 1, 0], controls[k - 1, 1], vehicle)
+        cost += nearness_cost(states, k, vehicle, scene, circles, barrier)
+        if cost > enough:
+            break
+    return cost
+
+
+@lean
+def _drive_changed(model: Model, steps: int, share: float, vehicle: Vehicle) -> None:
+    """Drive with a share of the change, and its feedback, into ``model.tried_states``."""
+    states, tried = model.states, model.tried_states
+    size = states.shape[1]
+    most_0, most_1 = control_limits(vehicle)
+    for c in range(size):
+        tried[0, c] = states[0, c]
+    for k in range(steps):
+        first = model.controls[k, 0] + share * model.change[k, 0]
+        second = model.controls[k, 1] + share * model.change[k, 1]
+        for c in range(size):
+            off = tried[k, c] - states[k, c]
+            first += model.feedback[k, 0, c] * off
+            second += model.feedback[k, 1, c] * off
+        here = load(tried, k, vehicle)
+        first, second = admissible(
+            here, min(max(first, -most_0), most_0), min(max(second, -most_1), most_1), vehicle
+        )
+        model.tried_controls[k, 0] = first
+        model.tried_controls[k, 1] = second
+        store(tried, k + 1, step(here, first, second, vehicle))
+
+
+@lean
+def copy_drive(
+    states: Floats, controls: Floats, steps: int, other_states: Floats, other_controls: Floats
+) -> None:
+    """Copy a drive of ``steps`` steps into other buffers."""
+    for k in range(steps + 1):
+        for c in range(states.shape[1]):
+            other_states[k, c] = states[k, c]
+    for k in range(steps):
+        other_controls[k, 0] = controls[k, 0]
+        other_controls[k, 1] = controls[k, 1]
+
+
+@lean
+def steps_to_goal(states: Floats, steps: int, goal: Floats) -> int:
+    """The first state in the disc ``goal [3]``, -1 if there is none."""
+    for k in range(steps + 1):
+        if length(states[k, 0] - goal[0], states[k, 1] - goal[1]) <= goal[2]:
+            return k
+    return -1
+
+
+@lean
+def drive_is_free(states: Floats, steps: int, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether the first ``steps + 1`` states are free, with the margins of the planners' own check."""
+    for k in range(steps + 1):  # noqa: SIM110 Numba has no generators for all()
+        if not state_is_free(load(states, k, vehicle), vehicle, scene):
+            return False
+    return True
+
+
+@lean
+def _gone_on(model: Model, steps: int, goal: Floats, vehicle: Vehicle) -> int:
+    """Go straight on from the end until the goal could be reached; how many steps the drive has then."""
+    gap = length(model.states[steps, 0] - goal[0], model.states[steps, 1] - goal[1]) - goal[2]
+    more = 1 + int(gap / (vehicle.dt * max(abs(model.states[steps, 3]), 0.5 * vehicle.max_speed)))
+    more = min(more, model.controls.shape[0] - steps)
+    for k in range(steps, steps + more):
+        here = load(model.states, k, vehicle)
+        model.controls[k, 0] = 0.0
+        model.controls[k, 1] = 0.0
+        store(model.states, k + 1, step(here, 0.0, 0.0, vehicle))
+    return steps + more
+
+
+@lean
+def _aim_from(model: Model, steps: int, goal: Floats) -> Aim:
+    dx = model.states[steps, 0] - goal[0]
+    dy = model.states[steps, 1] - goal[1]
+    far = max(length(dx, dy), 1e-9)
+    return Aim(goal[0], goal[1], goal[2], dx / far, dy / far, max(far, goal[2]))
+
+
+@lean
+def descend(
+    model: Model,
+    steps: int,
+    goal: Floats,
+    stage: Stage,
+    iterations: int,
+    best: int,
+    vehicle: Vehicle,
+    scene: Scene,
+    circles: Floats,
+) -> tuple[int, int, int]:
+    """Shorten the drive in ``model.states`` and ``model.controls`` as far as it will go.
+
+    Args:
+        model: with the drive; the quickest free one is kept in ``model.best_states``.
+        steps: of the drive.
+        goal: ``[3]`` x, y and radius in metres.
+        stage: how obstacles push, and when to end.
+        iterations: at most.
+        best: steps of the free drive that is kept already, a large number if there is none.
+        vehicle: what is driven.
+        scene: what must not be met.
+        circles: ``[P, 3]`` around the scene's pieces.
+
+    Returns:
+        Steps of the drive, iterations used, and steps of the quickest free drive.
+    """
+    barrier = stage.barrier
+    used = 0
+    damping = 0.0
+    anew = True
+    aim = _aim_from(model, steps, goal)
+    cost = 0.0
+    while used < iterations:
+        if anew:
+            aim = _aim_from(model, steps, goal)
+            differentiate_steps(model, steps, vehicle)
+            for k in range(1, steps + 1):
+                differentiate_nearness(model, k, vehicle, scene, circles, barrier)
+            cost = _cost(
+                *(model.states, model.controls, steps, aim, vehicle, scene, circles, barrier, math.inf)
+            )
+        linear, quadratic = sweep_back(model, steps, aim, damping, vehicle)
+        used += 1
+        if -(linear + quadratic) < stage.least_gain:
+            if steps_to_goal(model.states, steps, goal) >= 0 or steps == model.controls.shape[0]:
+                break
+            steps = _gone_on(model, steps, goal, vehicle)
+            anew = True
+            continue
+        share = 1.0
+        found = False
+        for _ in range(TRIES):
+            _drive_changed(model, steps, share, vehicle)
+            allowed = cost + LEAST_SHARE * share * (linear + share * quadratic)
+            tried = _cost(
+                *(model.tried_states, model.tried_controls, steps, aim, vehicle, scene, circles, barrier),
+                allowed + 2.0 * goal[2] + vehicle.dt * vehicle.max_speed * steps,
+            )
+            if tried < allowed:
+                found = True
+                break
+            share *= 0.5
+        if not found:
+            if damping > MOST_DAMPING:
+                break
+            damping = max(5.0 * damping, FIRST_DAMPING)
+            anew = False
+            continue
+        if share == 1.0:
+            damping = 0.3 * damping if damping > 1e-3 else 0.0
+        copy_drive(model.tried_states, model.tried_controls, steps, model.states, model.controls)
+        anew = True
+        arrived = steps_to_goal(model.states, steps, goal)
+        if arrived > 0:
+            steps = arrived
+            if steps < best and drive_is_free(model.states, steps, vehicle, scene):
+                best = steps
+                copy_drive(model.states, model.controls, steps, model.best_states, model.best_controls)
+    return steps, used, best
+
+
+@lean
+def drive_along(model: Model, points: Floats, goal: Floats, ahead_m: float, vehicle: Vehicle) -> int:
+    """Drive along ``points [M, 2]`` at full speed from ``model.states[0]``; how many steps.
+
+    Obstacles are ignored. Pure pursuit: towards the first point that is farther away than ``ahead_m``.
+    """
+    states = model.states
+    most_0, most_1 = control_limits(vehicle)
+    at = 0
+    last = points.shape[0] - 1
+    for k in range(model.controls.shape[0]):
+        here = load(states, k, vehicle)
+        while at < last and length(points[at, 0] - here[0], points[at, 1] - here[1]) < ahead_m:
+            at += 1
+        turn = turn_error(here, points[at, 0], points[at, 1], vehicle)
+        first, second = admissible(here, most_0, min(max(TURN_GAIN * turn, -most_1), most_1), vehicle)
+        model.controls[k, 0] = first
+        model.controls[k, 1] = second
+        store(states, k + 1, step(here, first, second, vehicle))
+        if length(states[k + 1, 0] - goal[0], states[k + 1, 1] - goal[1]) <= goal[2]:
+            return k + 1
+    return model.controls.shape[0]

@@ -1,0 +1,192 @@
+"""A model of a drive near itself: derivatives of its steps and of what nearness to obstacles costs."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.optimisation.gaps import Axis, Barrier, gap_along, nearness, wall, widest_gap
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import length
+from planners.world.vehicles.dynamics import load, step, swept_bodies
+from planners.world.vehicles.vehicle import Vehicle
+
+NUDGE: Final = 1e-6  # of a state or control, for derivatives by differences
+HITCH_STRENGTH: Final = 0.01
+HITCH_RANGE: Final = 0.2  # radians
+
+
+class Model(NamedTuple):
+    """Buffers for a drive of at most C steps, its derivatives, and the change that is tried."""
+
+    states: Floats  # [C + 1, S]
+    controls: Floats  # [C, 2]
+    tried_states: Floats  # [C + 1, S]
+    tried_controls: Floats  # [C, 2]
+    best_states: Floats  # [C + 1, S]
+    best_controls: Floats  # [C, 2]
+    by_state: Floats  # [C, S, S] derivative of the next state by the state
+    by_control: Floats  # [C, S, 2]
+    gradient: Floats  # [C + 1, S] of what nearness to obstacles costs
+    curvature: Floats  # [C + 1, S, S]
+    feedback: Floats  # [C, 2, S] change of the controls for a change of the state
+    change: Floats  # [C, 2] of the controls
+    vectors: Floats  # [6, S] scratch
+    squares: Floats  # [2, S, S] scratch
+    nudged: Floats  # [1, S] scratch
+
+
+def allocate_model(steps: int, size: int) -> Model:
+    """Buffers for drives of up to ``steps`` steps with states of ``size`` numbers."""
+    shapes = (
+        *((steps + 1, size), (steps, 2)) * 3,
+        (steps, size, size),
+        (steps, size, 2),
+        (steps + 1, size),
+        (steps + 1, size, size),
+        (steps, 2, size),
+        (steps, 2),
+        (6, size),
+        (2, size, size),
+        (1, size),
+    )
+    return Model(*(np.zeros(shape) for shape in shapes))
+
+
+@lean
+def differentiate_steps(model: Model, steps: int, vehicle: Vehicle) -> None:
+    """Fill in the derivatives of all steps."""
+    states, controls = model.states, model.controls
+    size = states.shape[1]
+    nudged = model.nudged
+    for k in range(steps):
+        by_state = model.by_state[k]
+        by_control = model.by_control[k]
+        first = controls[k, 0]
+        second = controls[k, 1]
+        here = load(states, k, vehicle)
+        after = step(here, first, second, vehicle)
+        more_first = step(here, first + NUDGE, second, vehicle)
+        more_second = step(here, first, second + NUDGE, vehicle)
+        for r in range(size):
+            nudged[0, r] = states[k, r]
+            by_control[r, 0] = (more_first[r] - after[r]) / NUDGE
+            by_control[r, 1] = (more_second[r] - after[r]) / NUDGE
+            for c in range(3):
+                by_state[r, c] = 1.0 if r == c else 0.0
+        by_state[0, 2] = states[k, 1] - after[1]  # the step turns with the heading
+        by_state[1, 2] = after[0] - states[k, 0]
+        for c in range(3, size):
+            nudged[0, c] += NUDGE
+            moved = step(load(nudged, 0, vehicle), first, second, vehicle)
+            nudged[0, c] = states[k, c]
+            for r in range(size):
+                by_state[r, c] = (moved[r] - after[r]) / NUDGE
+        for r in range(3, 5):  # linear, whatever ``step`` clamps
+            for c in range(size):
+                by_state[r, c] = 1.0 if r == c else 0.0
+            by_control[r, 0] = vehicle.dt if r == 3 else 0.0
+            by_control[r, 1] = vehicle.dt if r == 4 else 0.0
+
+
+@lean
+def nearness_cost(
+    states: Floats, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
+) -> float:
+    """What nearness to obstacles, bounds and jack-knifing costs in state ``i`` of ``states [T, S]``."""
+    cost = 0.0
+    bounds = scene.bounds
+    far = barrier.range_m + barrier.margin_m
+    for box in swept_bodies(load(states, i, vehicle), vehicle):
+        x = box[0]
+        y = box[1]
+        reach = length(box[4], box[5]) + far
+        if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
+            for k in range(4):
+                gap = gap_along(wall(k, bounds), box) - barrier.margin_m
+                cost += nearness(gap, barrier.strength, barrier.range_m)[0]
+        for p in range(circles.shape[0]):
+            dx = x - circles[p, 0]
+            dy = y - circles[p, 1]
+            near = reach + circles[p, 2]
+            if dx * dx + dy * dy < near * near:
+                gap, _ = widest_gap(box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far)
+                cost += nearness(gap - barrier.margin_m, barrier.strength, barrier.range_m)[0]
+    for h in range(5, states.shape[1]):
+        cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH_STRENGTH, HITCH_RANGE)[0]
+    return cost
+
+
+@lean
+def differentiate_nearness(
+    model: Model, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
+) -> None:
+    """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``."""
+    states = model.states
+    size = states.shape[1]
+    gradient = model.gradient[i]
+    curvature = model.curvature[i]
+    for r in range(size):
+        gradient[r] = 0.0
+        for c in range(size):
+            curvature[r, c] = 0.0
+    bounds = scene.bounds
+    far = barrier.range_m + barrier.margin_m
+    for body, box in enumerate(swept_bodies(load(states, i, vehicle), vehicle)):
+        x = box[0]
+        y = box[1]
+        reach = length(box[4], box[5]) + far
+        if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
+            for k in range(4):
+                axis = wall(k, bounds)
+                _add_gap(model, i, body, axis, gap_along(axis, box), vehicle, barrier)
+        for p in range(circles.shape[0]):
+            dx = x - circles[p, 0]
+            dy = y - circles[p, 1]
+            near = reach + circles[p, 2]
+            if dx * dx + dy * dy < near * near:
+                gap, axis = widest_gap(
+                    box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far
+                )
+                _add_gap(model, i, body, axis, gap, vehicle, barrier)
+    for h in range(5, size):
+        hitch = states[i, h]
+        _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH_STRENGTH, HITCH_RANGE)
+        gradient[h] += -slope if hitch > 0.0 else slope
+        curvature[h, h] += bend
+
+
+@lean
+def _add_gap(
+    model: Model, i: int, body: int, axis: Axis, gap: float, vehicle: Vehicle, barrier: Barrier
+) -> None:
+    """Add what the gap (metres) of a body along an axis contributes."""
+    _, slope, bend = nearness(gap - barrier.margin_m, barrier.strength, barrier.range_m)
+    if bend == 0.0:
+        return
+    size = model.states.shape[1]
+    nudged = model.nudged
+    by_state = model.vectors[0]
+    for c in range(size):
+        nudged[0, c] = model.states[i, c]
+    for c in range(size):
+        nudge = -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
+        nudged[0, c] += nudge
+        by_state[c] = (_moved_gap(nudged, body, axis, vehicle) - gap) / nudge
+        nudged[0, c] = model.states[i, c]
+    for r in range(size):
+        model.gradient[i, r] += slope * by_state[r]
+        for c in range(size):
+            model.curvature[i, r, c] += bend * by_state[r] * by_state[c]
+
+
+@inlined
+def _moved_gap(nudged: Floats, body: int, axis: Axis, vehicle: Vehicle) -> float:
+    gap = 0.0
+    for number, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
+        if number == body:
+            gap = gap_along(axis, box)
+    return gap

@@ -1,0 +1,131 @@
+"""Makes a plan locally time-optimal in milliseconds, or a blocked one free: a descent in compiled code.
+
+The work is counted in iterations, so the same plan gives the same result on any machine.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.optimisation.descent import Stage, descend, drive_along, drive_is_free, steps_to_goal
+from planners.optimisation.gaps import Barrier, circles_around
+from planners.optimisation.local_model import Model, allocate_model
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle, state_size
+from planners.world.workspace import Workspace
+
+ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
+ROOM: Final = 256  # steps, in which buffers grow
+NEVER: Final = 1 << 30  # steps
+# strength, range and least gain in metres: obstacles push from far and softly first, then only close to them
+STAGES: Final = ((0.1, 1.0, 0.2), (0.03, 0.5, 0.06), (0.01, 0.3, 0.02))
+
+
+class Polished(NamedTuple):
+    """The result of a polish."""
+
+    plan: Plan | None  # None if a blocked plan stayed blocked
+    iterations: int
+
+
+def polish(
+    problem: Problem,
+    plan: Plan,
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    iterations: int = ITERATIONS,
+    margin_m: float = 0.0,
+) -> Polished:
+    """Make a plan as quick as it can be by small changes, or free if it is blocked.
+
+    Args:
+        problem: what the plan is for.
+        plan: where to begin: driven from the problem's start by its controls. It may be blocked, and need not
+            end in the goal.
+        vehicle: what is driven.
+        scene: ``scene_of(problem)``.
+        workspace: the caller's buffers.
+        iterations: at most; each takes a third of a millisecond for a car.
+        margin_m: how many metres more than it needs the plan keeps from obstacles, where there is room.
+
+    Returns:
+        The quickest free plan that was found, never a longer one than was given; the given plan if none was.
+    """
+    model, goal = _ready(problem, len(plan.controls) + ROOM, vehicle, workspace)
+    steps = len(plan.controls)
+    model.controls[:steps] = plan.controls
+    model.states[: steps + 1] = simulate(start_state(problem, vehicle), plan.controls, vehicle)
+    return _polished(problem, plan, model, steps, goal, vehicle, scene, iterations, margin_m)
+
+
+def polish_path(
+    problem: Problem,
+    points: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    iterations: int = ITERATIONS,
+    margin_m: float = 0.0,
+    ahead_m: float = 3.0,
+) -> Polished:
+    """Find a plan along a path ``points [M, 2]`` (metres): drive along it at full speed, then polish that.
+
+    The other arguments are those of ``polish``; ``ahead_m`` says how far ahead on the path the drive aims.
+    """
+    ways = np.hypot(*np.diff(points, axis=0).T).sum() if len(points) > 1 else 0.0
+    most = 50 + math.ceil(1.5 * ways / (vehicle.max_speed * vehicle.dt))
+    model, goal = _ready(problem, most, vehicle, workspace)
+    steps = drive_along(model, np.ascontiguousarray(points[:, :2]), goal, ahead_m, vehicle)
+    return _polished(problem, None, model, steps, goal, vehicle, scene, iterations, margin_m)
+
+
+def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:
+    """Buffers for some more than ``steps`` steps, at the problem's start, and the goal ``[3]``."""
+    room = ROOM * (1 + steps // ROOM)
+    model = workspace.buffers(allocate_model, room, state_size(vehicle))
+    model.states[0] = start_state(problem, vehicle)
+    return model, np.array([*problem.goal, problem.goal_radius])
+
+
+def _polished(
+    problem: Problem,
+    given: Plan | None,
+    model: Model,
+    steps: int,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+    iterations: int,
+    margin_m: float,
+) -> Polished:
+    """Descend through all stages from the drive in ``model``."""
+    arrived = int(steps_to_goal(model.states, steps, goal))
+    if arrived == 0:
+        return Polished(given, 0)
+    best = NEVER
+    if arrived > 0:
+        steps = arrived
+        if drive_is_free(model.states, steps, vehicle, scene):
+            best = steps
+            model.best_states[: steps + 1] = model.states[: steps + 1]
+            model.best_controls[:steps] = model.controls[:steps]
+    widest = vehicle.max_hitch if isinstance(vehicle, CarWithTrailers) else math.inf
+    circles = circles_around(scene)
+    used = 0
+    for strength, range_m, least_gain in STAGES:
+        stage = Stage(Barrier(strength, range_m, margin_m, widest), least_gain)
+        steps, more, best = descend(
+            *(model, steps, goal, stage, iterations - used, best, vehicle, scene, circles)
+        )
+        used += more
+    if best == NEVER:
+        return Polished(None, used)
+    plan = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
+    return Polished(plan, used)
