@@ -53,7 +53,7 @@ def recollections(
     """
     view = View(problem, workspace)
     embedding = memory.forward(view.bits)
-    scores = memory.vectors[1:] @ embedding + memory.biases[1:]
+    scores = memory.scores(embedding, view.bits, view.workspace)[1:]
     blocked_cells = rank_by_cells(memory.masks, view.bits, view.workspace).cells
     as_stored = memory.begins_with(problem.start[2])
     uses = _uses(problem, attempt, memory, view)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.memory.memory import Memory
-from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.cell_masks import CELL_SCORES, masks_of
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.ranking.inverted_lists import FROM_PLANS, list_readout
@@ -25,6 +25,7 @@ from planners.world.geometry.occupancy import occupancy_of
 from planners.world.jit import lean
 from planners.world.problem import Plan, Problem
 
+EVEN_CELLS = 5  # blocked cells: a plan with so many is about as often free as not
 RIDGE = 1e-3  # of the mean variance of an embedding's numbers; 1e-4 to 1e-1 measured alike
 
 
@@ -61,7 +62,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
     if memory.objective == "triplet":
         vectors, biases = nearest_readout(centroids, scatter(moments, centroids))
     else:
-        vectors, biases = ridge_readout(embeddings, moments)
+        vectors, biases = beside_cells(*ridge_readout(embeddings, moments))
     return replace(
         memory,
         plans=plans,
@@ -104,8 +105,7 @@ def scatter(moments: Moments, centroids: Floats32) -> float:
 def ridge_readout(embeddings: Floats32, moments: Moments) -> tuple[Floats32, Floats32]:
     """Vectors ``[N + 1, D]`` and biases ``[N + 1]`` by ridge regression of "this plan is free" on embeddings.
 
-    Scores estimate probabilities. Row 0, "no plan is free", is to win only by clear odds, so its bias is
-    lowered by the difference in probability that these odds mean.
+    Scores estimate probabilities. Row 0 is "no plan is free".
     """
     count, width = embeddings.shape
     mean = embeddings.mean(0, dtype=np.float64)
@@ -116,5 +116,16 @@ def ridge_readout(embeddings: Floats32, moments: Moments) -> tuple[Floats32, Flo
     products = moments.sums / count - shares[:, np.newaxis] * mean
     vectors = np.linalg.solve(covariance, products.T).T
     biases = shares - vectors @ mean
-    biases[0] -= (NO_PLAN_ODDS - 1.0) / (NO_PLAN_ODDS + 1.0)
     return np.ascontiguousarray(vectors, np.float32), biases.astype(np.float32)
+
+
+def beside_cells(vectors: Floats32, biases: Floats32) -> tuple[Floats32, Floats32]:
+    """Turn a readout of probabilities into logits, to which ``Memory.scores`` adds what blocked cells tell.
+
+    A probability p has about the logit 4 (p - 1/2). A plan with ``EVEN_CELLS`` blocked cells is to have it as
+    it is; row 0 is to win only by clear odds.
+    """
+    vectors, biases = 4.0 * vectors, 4.0 * (biases - 0.5)
+    biases[0] -= np.log(NO_PLAN_ODDS)
+    biases[1:] -= CELL_SCORES[EVEN_CELLS]
+    return vectors.astype(np.float32), biases.astype(np.float32)

@@ -11,14 +11,16 @@ import numpy as np
 
 from planners.memory.encoder.encoder import Encoder, Weights, to_onnx
 from planners.memory.encoder.forward_pass import Forward, forward_of
+from planners.memory.plans.cell_masks import CELL_SCORES, rank_by_cells
 from planners.memory.plans.free import START_TOLERANCE
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.memory.ranking.inverted_lists import InvertedLists
 from planners.memory.ranking.readout import nearest_readout
-from planners.world.arrays import Floats32
+from planners.world.arrays import Floats32, Integers
 from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,33 @@ class Memory:
     def begins_with(self, heading: float) -> bool:
         """Whether all stored plans begin with this heading (radians)."""
         return self.heading is not None and abs(heading - self.heading) <= START_TOLERANCE
+
+    def scores(
+        self,
+        embedding: Floats32,
+        bits: Bits,
+        workspace: Workspace | None = None,
+        among: Integers | None = None,
+    ) -> Floats32:
+        """Score "no plan" and plans for a problem, by the readout and what their blocked cells tell.
+
+        A readout of the triplet objective knows distances, to which cells have nothing to add.
+
+        Args:
+            embedding: ``[D]`` of the problem.
+            bits: ``[64]`` the cells of the problem that are not free.
+            workspace: the caller's buffers; by default new ones.
+            among: ``[n]`` the plans to score; by default all N.
+
+        Returns:
+            Scores ``[n + 1]``, "no plan" first.
+        """
+        rows = slice(None) if among is None else np.concatenate(([0], among + 1))
+        scores: Floats32 = self.vectors[rows] @ embedding + self.biases[rows]
+        if self.objective == "labels":
+            masks = self.masks if among is None else self.masks[among]
+            scores[1:] += CELL_SCORES[rank_by_cells(masks, bits, workspace).cells]
+        return scores
 
 
 def scale_fault(memory: Memory, scale: float) -> str | None:

@@ -2,7 +2,7 @@
 
 | strategy | who ranks | which plans are checked exactly |
 |---|---|---|
-| encoder | the readout that the encoder was trained with | the first k |
+| encoder | the readout that the encoder was trained with, and blocked cells | the first k |
 | centroid | the distance of the embedding to each plan's centroid | the first k |
 | mask | blocked cells | the first k |
 | hybrid | the encoder picks some hundred, blocked cells rank these | all of these |
@@ -24,12 +24,14 @@ from planners.memory.plans.cell_masks import rank_by_cells
 from planners.memory.plans.free import ends_of, first_fitting, first_fitting_drawn
 from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
-from planners.world.arrays import Integers
-from planners.world.geometry.occupancy import Grid, bits_of
+from planners.world.arrays import Floats32, Integers
+from planners.world.geometry.occupancy import Bits, Grid, bits_of
 from planners.world.view import View
+from planners.world.workspace import Workspace
 
 RECALLS: Final = ("encoder", "centroid", "exhaustive", "mask", "hybrid", "random")
-CANDIDATES: Final = 256  # plans that the encoder picks for hybrid
+CANDIDATES: Final = 256  # plans that the encoder picks of a large memory
+MOST_SCORED: Final = 1_000  # plans: with more, scoring by cells costs more than the encoder
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
 TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
 CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the others mostly are, too
@@ -149,12 +151,36 @@ def by_encoder(memory: Memory, view: View, k: int, never_none: bool = False) -> 
     """
     embedding = memory.forward(view.bits)
     view.lap("encode")
-    if memory.lists is None:
-        return best_plans(memory.vectors, memory.biases, embedding, k, never_none)
-    best = best_listed(memory.lists, embedding, k)
-    rows = np.concatenate(([0], best[:1] + 1))
-    scores = memory.vectors[rows] @ embedding + memory.biases[rows]
-    return best if never_none or scores[0] <= scores[-1] else best[:0]
+    among, scores = scored(memory, embedding, view.bits, k, view.workspace)
+    return among[best_plans(scores, k, never_none)]
+
+
+def scored(
+    memory: Memory, embedding: Floats32, bits: Bits, k: int, workspace: Workspace | None = None
+) -> tuple[Integers, Floats32]:
+    """Score all plans, or of a large memory those ``CANDIDATES``, at least k, that the readout finds.
+
+    Args:
+        memory: of the plans.
+        embedding: ``[D]`` of the problem.
+        bits: ``[64]`` the cells of the problem that are not free.
+        k: how many plans are wanted.
+        workspace: the caller's buffers; by default new ones.
+
+    Returns:
+        The plans ``[n]``, and scores ``[n + 1]`` of "no plan" and of these.
+    """
+    if len(memory.plans) <= MOST_SCORED:
+        return np.arange(len(memory.plans), dtype=np.int32), memory.scores(embedding, bits, workspace)
+    among = by_readout(memory, embedding, max(k, CANDIDATES))
+    return among, memory.scores(embedding, bits, workspace, among)
+
+
+def by_readout(memory: Memory, embedding: Floats32, k: int) -> Integers:
+    """Find the ``k`` plans that score best for an embedding ``[D]`` by the readout alone, best first."""
+    if memory.lists is not None:
+        return best_listed(memory.lists, embedding, k)
+    return best_plans(memory.vectors @ embedding + memory.biases, k, never_none=True)
 
 
 def by_centroids(memory: Memory, view: View, k: int) -> Integers:
@@ -164,7 +190,8 @@ def by_centroids(memory: Memory, view: View, k: int) -> Integers:
     """
     embedding = memory.forward(view.bits)
     view.lap("encode")
-    return best_plans(*memory.nearest, embedding, k)
+    vectors, biases = memory.nearest
+    return best_plans(vectors @ embedding + biases, k)
 
 
 def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, Integers]:
@@ -196,10 +223,12 @@ def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) ->
 
 
 def rank(memory: Memory, grid: Grid) -> tuple[Integers, bool]:
-    """Rank all plans ``[N]`` by the encoder, best first, and tell whether "no plan" scores better than each.
+    """Rank plans by the encoder, best first, and tell whether "no plan" scores better than each.
 
-    ``grid [64, 64]`` is the problem's occupancy.
+    ``grid [64, 64]`` is the problem's occupancy. All plans ``[N]`` are ranked, or the candidates of a large
+    memory.
     """
-    embedding = memory.forward(bits_of(grid))
-    order = best_plans(memory.vectors, memory.biases, embedding, len(memory.plans), never_none=True)
-    return order, len(best_plans(memory.vectors, memory.biases, embedding, 1)) == 0
+    bits = bits_of(grid)
+    among, scores = scored(memory, memory.forward(bits), bits, 1)
+    order = among[best_plans(scores, len(among), never_none=True)]
+    return order, len(best_plans(scores, 1)) == 0

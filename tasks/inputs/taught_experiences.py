@@ -6,7 +6,10 @@ from typing import Final
 
 from planners.memory.growth import grow
 from planners.memory.memory import Memory
+from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
+from planners.memory.plans.sweeps import sweep_plans
+from planners.world.geometry.occupancy import Bits
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences
@@ -25,6 +28,13 @@ def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list
         for each in settings.classes_of(name)
         for experience in read_experiences(run.experiences(each), vehicle, settings.taught)
     ]
+
+
+def taught_masks(run: RunFolder, settings: RunSettings, name: str) -> Bits:
+    """The cells ``[N, 64]`` that the plans of a memory sweep, those that encoders are taught."""
+    vehicle = vehicle_named(settings.vehicle)
+    plans = [experience.plan for experience in taught_experiences(run, settings, name)]
+    return masks_of(sweep_plans(plans, vehicle))
 
 
 def grown_memory(chunk: Chunk, memory: Memory) -> Memory:

@@ -15,6 +15,7 @@ from storage.errors import StorageError
 from storage.places.files import read_json, write_json
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
+from tasks.inputs.taught_experiences import taught_masks
 from tasks.settings.encoder_training import Learning
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.relabel import problems_of_memory
@@ -46,7 +47,8 @@ def sweep_chunk(chunk: Chunk) -> None:
     problems = problems_of_memory(chunk.data, settings, chunk.class_name)
     learning = variants(settings)[chunk.index]
     training = learning.settings(settings.objective, settings.epochs, settings.seed)
-    trained = train(problems.grids, problems.plan_index, problems.free, training)
+    masks = taught_masks(chunk.run, settings, chunk.class_name)
+    trained = train(problems.grids, problems.plan_index, problems.free, masks, training)
     best = max(trained.history, key=lambda epoch: epoch.hit_1)
     row = {
         "class": chunk.class_name,

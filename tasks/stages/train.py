@@ -14,6 +14,7 @@ from storage.archives.memories import load_memory
 from storage.places.mirror import remove
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage, is_marked, mark_done
+from tasks.inputs.taught_experiences import taught_masks
 from tasks.settings.retraining_settings import champions_of
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.relabel import labelling_of, problems_of_memory
@@ -44,7 +45,9 @@ def train_chunk(chunk: Chunk) -> Trained:
 
     before = load_checkpoint(path, chunk.key)
     warm = _champion_weights(chunk, settings.architecture)
-    trained = train(problems.grids, problems.plan_index, problems.free, settings, on_epoch, before, warm)
+    masks = taught_masks(chunk.run, run_settings, chunk.class_name)
+    given = (problems.grids, problems.plan_index, problems.free, masks)
+    trained = train(*given, settings, on_epoch, before, warm)
     folder = _model(chunk)
     save_encoder(folder, trained, chunk.vehicle)
     mark_done(folder, chunk.key)

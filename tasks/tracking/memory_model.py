@@ -113,15 +113,15 @@ class MemoryModel(PythonModel):
     def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
         canonical, alignment = to_canonical(problem)
         memory, scene = self.memory, scene_of(canonical)
-        embedding = memory.forward(drawing_of(canonical).occupied)
-        scores = memory.vectors[1:] @ embedding + memory.biases[1:]
+        bits = drawing_of(canonical).occupied
+        scores = memory.scores(memory.forward(bits), bits)
         rows = []
-        best = best_plans(memory.vectors, memory.biases, embedding, top_k).tolist()
+        best = best_plans(scores, top_k).tolist()
         for rank, i in enumerate(best, start=1):
             free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
             aligned = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
             plan = scaled(aligned, problem.scale)
-            row = (problem.id, rank, i, bool(free), float(scores[i]), plan.dt)
+            row = (problem.id, rank, i, bool(free), float(scores[1 + i]), plan.dt)
             rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
         return rows
 

@@ -26,6 +26,7 @@ from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.memory import Memory
+from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
@@ -110,7 +111,9 @@ def _made(source: ProblemClass, count: int, hallucinated: int) -> Memory:
     made_for += [-1] * (count * hallucinated)
     packed, free = label_problems(problems, sweeps)
     index_of = np.array(made_for, np.int32)
-    trained = train(packed, index_of, free, TrainingSettings(epochs=EPOCHS, seed=COLLECTING))
+    trained = train(
+        packed, index_of, free, masks_of(sweeps), TrainingSettings(epochs=EPOCHS, seed=COLLECTING)
+    )
     return build_memory(trained, plans, name)
 
 

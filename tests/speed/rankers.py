@@ -24,7 +24,7 @@ def rankers(memory: Memory) -> dict[str, tuple[Ranker, float]]:
     """Ways to find the plans that score best for an embedding, and the seconds that it took to make each."""
     vectors, biases = memory.vectors, memory.biases
     made: dict[str, tuple[Ranker, float]] = {
-        "all scored": (lambda e: best_plans(vectors, biases, e, CANDIDATES, never_none=True), 0.0)
+        "all scored": (lambda e: best_plans(vectors @ e + biases, CANDIDATES, never_none=True), 0.0)
     }
     began = thread_time()
     lists = list_readout(vectors, biases)

@@ -27,7 +27,7 @@ from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.world.arrays import Floats32
 from planners.world.geometry.collision import scene_of
-from planners.world.geometry.occupancy import GRID, occupancy_of
+from planners.world.geometry.occupancy import GRID, drawing_of, occupancy_of
 from planners.world.problem import Problem
 from storage.places.run_folder import RunFolder
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
@@ -71,7 +71,7 @@ def memory(data: DataReader, params: Parameters) -> Page:
     if problem is not None and embedding is not None:
         values["near"] = {
             "id": problem.id,
-            "none": int((loaded.vectors @ embedding + loaded.biases).argmax()) == 0,
+            "none": int(loaded.scores(embedding, drawing_of(problem).occupied).argmax()) == 0,
             "plans": _nearest_plans(data, params.run, name, loaded, problem, embedding),
             "problems": _nearest_problems(data, run, name, loaded, embedding, embedded),
         }
@@ -148,7 +148,7 @@ def _nearest_plans(
     data: DataReader, run: str, name: str, loaded: Memory, problem: Problem, embedding: Floats32
 ) -> list[dict[str, Any]]:
     """The plans that the encoder ranks first for a problem, in that problem."""
-    scores = loaded.vectors[1:] @ embedding + loaded.biases[1:]
+    scores = loaded.scores(embedding, drawing_of(problem).occupied)[1:]
     plans = []
     scene = scene_of(problem)
     for rank, number in enumerate(np.argsort(-scores)[:NEAREST].tolist(), start=1):

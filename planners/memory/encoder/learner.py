@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from planners.memory.encoder.adamw import AdamW, FlatParameters, one_cycle
 from planners.memory.encoder.device import forward_on
 from planners.memory.encoder.encoder import Weights
 from planners.memory.encoder.objectives import Objective
-from planners.memory.encoder.torch_network import embed_all
+from planners.memory.encoder.torch_network import embed_all, unpacked
+from planners.memory.plans.cell_masks import CELL_SCORES, MOST_CELLS
 from planners.world.arrays import Flags, Floats32, Integers
-from planners.world.geometry.occupancy import Grid
+from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, Grid
+
+BATCH = 1024  # problems that are scored at once
 
 LearnerState = tuple[Floats32, Floats32, Floats32, Floats32]
 
@@ -23,16 +27,24 @@ class Learner:
     def __init__(
         self,
         problems: tuple[Grid, Integers, Flags],
+        masks: Bits,
         weights: Weights,
         own: Weights,
         weight_decay: float,
         device: torch.device,
     ) -> None:
-        """Begin with ``weights`` of the encoder and the ``own`` parameters of an objective."""
+        """Begin with ``weights`` of the encoder and the ``own`` parameters of an objective.
+
+        ``masks [N, 64]`` are the cells that each plan sweeps.
+        """
         grids, rows, free = problems
         self._bits = torch.from_numpy(np.ascontiguousarray(grids)).to(device)
         self._rows = torch.from_numpy(rows.astype(np.int64)).to(device)
         self._free = torch.from_numpy(free).to(device)
+        cells = np.unpackbits(np.ascontiguousarray(masks, "<u8").view(np.uint8), axis=1, bitorder="little")
+        self._masks = torch.from_numpy(cells.astype(np.float32)).to(device)  # [N, 4096]
+        self._outside = torch.from_numpy(masks[:, 0] == ALL_CELLS).to(device)
+        self._cell_scores = torch.from_numpy(CELL_SCORES).to(device)
         self._parameters = FlatParameters(weights | own, device)
         self._optimiser = AdamW(self._parameters.values, weight_decay)
         self._forward = forward_on(device)
@@ -44,10 +56,15 @@ class Learner:
         ``rate`` is the highest learning rate of a schedule over ``steps`` in all.
         """
         losses = []
+        rng = torch.Generator(self._bits.device).manual_seed(self._optimiser.steps)
         for part in torch.split(torch.from_numpy(order).to(self._bits.device), batch):
             named = self._parameters.named()
             embeddings = self._forward(named, self._bits[part])
-            loss = objective.loss(named, embeddings, self._rows[part], self._free[part])
+            if objective.dropout:
+                kept = torch.rand(embeddings.shape, generator=rng, device=embeddings.device)
+                embeddings = embeddings * (kept >= objective.dropout) / (1.0 - objective.dropout)
+            known = self._known(objective, part)
+            loss = objective.loss(named, embeddings, self._rows[part], self._free[part], known)
             (gradient,) = torch.autograd.grad(loss, self._parameters.values)
             self._optimiser.step(gradient, one_cycle(self._optimiser.steps, steps, rate))
             losses.append(loss.detach())
@@ -60,7 +77,19 @@ class Learner:
         embeddings = embed_all(named, self._bits[sample])
         rows = self._rows[sample]
         vectors, biases = objective.readout(named, embeddings, rows, self._free.shape[1])
-        return _array((embed_all(named, self._bits[problems]) @ vectors.T + biases)[:, 1:])
+        numbers = torch.from_numpy(problems).to(self._bits.device)
+        known = [self._known(objective, part) for part in torch.split(numbers, BATCH)]
+        scores = embed_all(named, self._bits[problems]) @ vectors.T + biases + torch.cat(known)
+        return _array(scores[:, 1:])
+
+    def _known(self, objective: Objective, problems: Tensor) -> Tensor:
+        """What blocked cells add to the scores of ``problems [m]``: ``[m, N + 1]``."""
+        if not objective.by_cells:
+            return torch.zeros((len(problems), len(self._masks) + 1), device=self._bits.device)
+        grids = unpacked(self._bits[problems]).view(-1, GRID * GRID)
+        blocked = (grids @ self._masks.T).long().clamp(max=MOST_CELLS)
+        blocked.masked_fill_(self._outside, MOST_CELLS)
+        return pad(self._cell_scores[blocked], (1, 0))
 
     def keep(self) -> None:
         """Keep the present parameters as the best so far."""

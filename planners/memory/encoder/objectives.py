@@ -21,8 +21,14 @@ class Labels:
 
     The loss sums up the cross entropy of each row, for which plans are free; minus the logarithm of the share
     of the free rows in the softmax, so that a free plan comes first; and the cross entropy of the softmax, so
-    that the plan for which a problem was made comes first.
+    that the plan for which a problem was made comes first. What a plan's blocked cells tell is added to its
+    logit beforehand (``cell_masks.CELL_SCORES``), so the encoder learns what they do not tell. Half of each
+    embedding is dropped while learning: without that it ranks worse in worlds that it never saw
+    (docs/studies/encoder-and-mask.md).
     """
+
+    by_cells = True
+    dropout = 0.5  # share of an embedding's numbers (Srivastava et al. 2014)
 
     def __init__(self, first_weight: float, origin_weight: float) -> None:
         self.first_weight = first_weight
@@ -33,7 +39,14 @@ class Labels:
         vectors = rng.normal(0.0, dimensions**-0.5, (rows, dimensions)).astype(np.float32)
         return {VECTORS: vectors, BIASES: np.zeros(rows, np.float32)}
 
-    def loss(self, own: Mapping[str, Tensor], embeddings: Tensor, rows: Tensor, targets: Tensor) -> Tensor:
+    def loss(
+        self,
+        own: Mapping[str, Tensor],
+        embeddings: Tensor,
+        rows: Tensor,
+        targets: Tensor,
+        known: Tensor | float = 0.0,
+    ) -> Tensor:
         """Compute the loss of a batch, the mean over problems of the sum over rows.
 
         Args:
@@ -41,8 +54,9 @@ class Labels:
             embeddings: ``[B, D]`` of the batch.
             rows: ``[B]`` the row of the plan that each problem was made for, -1 for none.
             targets: bool ``[B, N + 1]`` which rows are free.
+            known: ``[B, N + 1]`` what blocked cells add to each logit.
         """
-        logits = linear(embeddings, own[VECTORS], own[BIASES])
+        logits = linear(embeddings, own[VECTORS], own[BIASES]) + known
         wanted = targets.to(logits.dtype)
         loss = binary_cross_entropy_with_logits(logits, wanted, reduction="none").sum(1)
         whole = torch.logsumexp(logits, 1)
@@ -66,6 +80,9 @@ class Triplet:
     farther than s, but by less than the margin (Schroff, Kalenichenko and Philbin 2015).
     """
 
+    by_cells = False
+    dropout = 0.0
+
     def __init__(self, margin: float, semi_hard: bool = False) -> None:
         self.margin = margin
         self.semi_hard = semi_hard
@@ -74,8 +91,15 @@ class Triplet:
         """Return no parameters."""
         return {}
 
-    def loss(self, own: Mapping[str, Tensor], embeddings: Tensor, rows: Tensor, targets: Tensor) -> Tensor:
-        """Average over the triplets of a batch; zero if there are none."""
+    def loss(
+        self,
+        own: Mapping[str, Tensor],
+        embeddings: Tensor,
+        rows: Tensor,
+        targets: Tensor,
+        known: Tensor | float = 0.0,
+    ) -> Tensor:
+        """Average over the triplets of a batch; zero if there are none. Cells do not count."""
         distances = torch.cdist(embeddings, embeddings, compute_mode="donot_use_mm_for_euclid_dist")
         # whether the plan that the problem of the column was made for is free in the problem of the row
         free = targets[:, rows.clamp(min=0)] & (rows >= 0)

@@ -14,7 +14,7 @@ from planners.memory.encoder.encoder import Architecture, Weights, architecture_
 from planners.memory.encoder.splits import first_of_each, split
 from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
 from planners.world.arrays import Flags, Floats32, Integers
-from planners.world.geometry.occupancy import Grid
+from planners.world.geometry.occupancy import Bits, Grid
 from planners.world.randomness import generator
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class TrainingSettings:
     learning_rate: float = 3e-3  # the highest of a one-cycle schedule
     weight_decay: float = 0.1  # decoupled, AdamW
     first_weight: float = 1.0  # label objective: how much it counts that a free plan comes first
-    origin_weight: float = 40.0  # label objective: how much it counts, at first, that the origin comes first
+    origin_weight: float = 0.0  # label objective: how much it counts, at first, that the origin comes first
     margin: float = 1.0  # triplet objective
     semi_hard: bool = False  # triplet objective: count only semi-hard triplets
     architecture: Architecture = field(default_factory=Architecture)
@@ -109,6 +109,7 @@ def train(
     grids_packed: Grid,
     plan_index: Integers,
     labels: Flags,
+    masks: Bits,
     settings: TrainingSettings,
     on_epoch: Callable[[Checkpoint], None] | None = None,
     checkpoint: Checkpoint | None = None,
@@ -120,14 +121,15 @@ def train(
         grids_packed: uint8 ``[n, 512]`` their occupancy grids, packed.
         plan_index: ``[n]`` the plan that each was made for, -1 for none.
         labels: bool ``[n, N]`` which plans are free in each.
+        masks: ``[N, 64]`` the cells that each plan sweeps.
         settings: of the training.
         on_epoch: is called with a checkpoint after each epoch.
         checkpoint: of an earlier training, which goes on from there to the same end.
         warm: weights for the encoder to begin with instead of random ones.
 
     Raises:
-        ValueError: There is not one of each for every problem, some plan has no problems, or ``warm`` is of
-            another architecture.
+        ValueError: There is not one of each for every problem, or not a mask for each plan; some plan has no
+            problems; or ``warm`` is of another architecture.
     """
     from planners.memory.encoder.device import deterministic
     from planners.memory.encoder.learner import Learner
@@ -137,6 +139,8 @@ def train(
             f"{len(grids_packed)} grids, {len(plan_index)} plan indices and {len(labels)} label vectors: "
             "training needs one of each for every problem"
         )
+    if labels.shape[1] != len(masks):
+        raise ValueError(f"labels are of {labels.shape[1]} plans, masks of {len(masks)}: give one each")
     if warm is not None and architecture_of(warm) != settings.architecture:
         raise ValueError(
             f"weights to begin with are of {architecture_of(warm)}, expected {settings.architecture}: "
@@ -157,7 +161,7 @@ def train(
     began = time.perf_counter() - (history[-1].seconds if history else 0.0)
     with deterministic(settings.threads) as device:
         problems = (grids_packed, rows, free)
-        learner = Learner(problems, weights, own, settings.weight_decay, device)
+        learner = Learner(problems, masks, weights, own, settings.weight_decay, device)
         if checkpoint is not None:
             learner.restore(checkpoint[1:], len(history) * steps)
         while len(history) < settings.epochs and not _is_tired(history, settings.patience):

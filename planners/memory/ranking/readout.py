@@ -1,4 +1,7 @@
-"""The readout: each row has a vector and a bias, from centroids or learned. Row 0 stands for "no plan"."""
+"""The readout: each row has a vector and a bias, from centroids or learned. Row 0 stands for "no plan".
+
+A learned readout says how much likelier a plan is to be free than its blocked cells tell.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""The encoder's ranking: finds the stored plans that score best for an embedding.
+"""The encoder's ranking: finds the stored plans that score best.
 
 Both training objectives score by an inner product and a bias, one row for each plan. For the triplet
 objective ``w = c, b = -|c|^2 / 2``, which orders by the distance to the centroids; for the label objective
-both are learned. Row 0 stands for "no stored plan is free": if it scores best, nothing is recalled.
+both are learned, and the blocked cells of a plan count as well (``Memory.scores``). Row 0 stands for "no
+stored plan is free": if it scores best, nothing is recalled.
 """
 
 from __future__ import annotations
@@ -31,24 +32,20 @@ def insert(item: int, score: float, count: int, items: Integers, scores: Floats3
 
 
 @lean
-def _select(scores: Floats32, biases: Floats32, best: Integers, highest: Floats32) -> tuple[int, bool]:
+def _select(scores: Floats32, best: Integers, highest: Floats32) -> tuple[int, bool]:
     """Fill in ``best [k]``, the plans that score highest: how many, and whether row 0 scores higher."""
     count = 0
-    nothing = scores[0] + biases[0]
+    nothing = scores[0]
     for row in range(1, scores.shape[0]):
-        count = insert(row - 1, scores[row] + biases[row], count, best, highest)
+        count = insert(row - 1, scores[row], count, best, highest)
     return count, count == 0 or nothing > highest[0]
 
 
-def best_plans(
-    vectors: Floats32, biases: Floats32, embedding: Floats32, k: int, never_none: bool = False
-) -> Integers:
-    """Find the plans with the best scores for an embedding.
+def best_plans(scores: Floats32, k: int, never_none: bool = False) -> Integers:
+    """Find the plans with the best scores.
 
     Args:
-        vectors: ``[N + 1, D]`` of a memory's readout.
-        biases: ``[N + 1]`` of the readout.
-        embedding: ``[D]`` of the problem.
+        scores: ``[N + 1]`` of "no plan", and of N plans.
         k: how many plans to return at most.
         never_none: return plans even if row 0 scores best.
 
@@ -60,13 +57,12 @@ def best_plans(
     """
     if k < 1:
         raise ValueError(f"top k is {k}, it must be at least 1")
-    k = min(k, len(biases) - 1)
+    k = min(k, len(scores) - 1)
     if k == 0:
         return np.empty(0, np.int32)
     if k > MOST_INSERTED:
-        scores = vectors @ embedding + biases
         sorted_plans = np.argsort(-scores[1:], kind="stable")[:k].astype(np.int32)
         return sorted_plans if never_none or scores[0] <= scores[1 + sorted_plans[0]] else sorted_plans[:0]
     best = np.empty(k, np.int32)
-    count, nothing = _select(vectors @ embedding, biases, best, np.empty(k, np.float32))
+    count, nothing = _select(scores, best, np.empty(k, np.float32))
     return best[:0] if nothing and not never_none else best[:count]

@@ -73,7 +73,7 @@ def test_centroids_are_the_mean_embeddings(memory):
 def test_ranking_by_centroids_is_ranking_by_euclidean_distance(memory, seed, k):
     embedding = memory.encoder(np.unpackbits(problems(seed)[0][seed % 27]).reshape(64, 64))
     distances = cdist(embedding[np.newaxis], memory.centroids)[0]
-    recalled = best_plans(memory.vectors, memory.biases, embedding, k)
+    recalled = best_plans(memory.vectors @ embedding + memory.biases, k)
     bits, plan_index = problems()
     embeddings = memory.encoder(np.unpackbits(bits, axis=1).reshape(-1, 64, 64))
     scatter = (np.linalg.norm(embeddings - memory.centroids[plan_index + 1], axis=1) ** 2).mean()
@@ -222,6 +222,21 @@ def test_what_the_encoder_recalls_is_the_head_of_the_rank(memory, problem_in, se
 
 
 @given(seed=SEEDS, k=st.integers(1, 8))
+def test_an_encoder_that_knows_nothing_ranks_by_blocked_cells(memory, problem_in, seed, k):
+    knows_nothing = dataclasses.replace(
+        memory,
+        objective="labels",
+        vectors=np.zeros_like(memory.vectors),
+        biases=np.array([-1e6] + [0.0] * PLANS, np.float32),
+    )
+    problem = problem_in(seed)
+    by_cells = rank_by_cells(memory.masks, bits_of(occupancy_of(problem))).order[:k].tolist()
+    assert rank(knows_nothing, occupancy_of(problem))[0][:k].tolist() == by_cells
+    with mock.patch("planners.memory.recall.MOST_SCORED", 1):  # as in a large memory
+        assert rank(knows_nothing, occupancy_of(problem))[0][:k].tolist() == by_cells
+
+
+@given(seed=SEEDS, k=st.integers(1, 8))
 def test_centroids_recall_the_nearest_plans_and_the_first_free_one_is_the_answer(memory, problem_in, seed, k):
     rng = generator(seed, "readout")  # which a trained readout may contradict
     learned = dataclasses.replace(memory, vectors=rng.normal(size=memory.vectors.shape).astype(np.float32))
@@ -254,9 +269,9 @@ def test_the_best_are_those_of_a_stable_sort(seed, k, count):
     embedding = rng.integers(-2, 3, 4).astype(np.float32)
     scores = vectors @ embedding + biases
     expected = np.argsort(-scores[1:], kind="stable")[:k].tolist()
-    assert best_plans(vectors, biases, embedding, k, never_none=True).tolist() == expected
+    assert best_plans(scores, k, never_none=True).tolist() == expected
     nothing = scores[0] > scores[1:].max()
-    assert best_plans(vectors, biases, embedding, k).tolist() == ([] if nothing else expected)
+    assert best_plans(scores, k).tolist() == ([] if nothing else expected)
 
 
 def test_the_default_is_exhaustive_until_there_are_too_many_plans(memory):
