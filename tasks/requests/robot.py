@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,10 @@ class Answer:
     status: str  # "solved", or how planning failed (planners.search.outcome.Status)
     source: str | None  # "recalled", "repaired" or "searched"; None when not solved
     plan: Plan | None  # in the frame and units of the given problem; None when not solved
-    planning_seconds: float  # without reading the problem and judging the plan
+    planning_seconds: float  # from convex pieces in the canonical frame to the plan
+    call_seconds: (
+        float  # of the whole call, reading and checking the problem included, but not judging the plan
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +83,12 @@ class RobotPlanner:
             The independent judge refuses the plan.
 
         """
+        began = perf_counter()
         if isinstance(problem, str):
             problem = _parsed(problem)
         if not isinstance(problem, Problem):
             problem = problem_of(problem, "problem", self.memory.vehicle)
-        return self._planned(problem)
+        return self._planned(problem, began)
 
     def plan_arrays(
         self,
@@ -122,14 +127,15 @@ class RobotPlanner:
             The independent judge refuses the plan.
 
         """
+        began = perf_counter()
         problem = checked_problem(
             *(start, goal, goal_radius, bounds, points, polygon_starts),
             vehicle=self.memory.vehicle,
             scale=scale,
         )
-        return self._planned(problem)
+        return self._planned(problem, began)
 
-    def _planned(self, problem: Problem) -> Answer:
+    def _planned(self, problem: Problem, began: float) -> Answer:
         vehicle = self.memory.vehicle
         canonical, alignment = to_canonical(problem)
         with self._workspace() as workspace:
@@ -139,10 +145,11 @@ class RobotPlanner:
                 strategy=self.recall,
                 workspace=workspace,
             )
+        plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
+        spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), vehicle)
-        plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
-        return Answer(problem.id, attempt.status, attempt.source, plan, attempt.planning_seconds)
+        return Answer(problem.id, attempt.status, attempt.source, plan, *spent)
 
     @contextmanager
     def _workspace(self) -> Iterator[Workspace]:

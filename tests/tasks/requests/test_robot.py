@@ -52,6 +52,7 @@ def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> 
         vertices, polygon_starts, _ = given.obstacles
         arrays = planner.plan_arrays(given.start, given.goal, vertices, polygon_starts)
         assert arrays.plan is not None
+        assert 0.0 < arrays.planning_seconds < arrays.call_seconds
         assert same(replace(answer, problem_id=arrays.problem_id), arrays) or answer.source != "recalled"
         assert answer.plan is not None
         assert np.array_equal(answer.plan.states, plan.states)
