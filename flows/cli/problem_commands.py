@@ -76,7 +76,7 @@ def optimise(
     plan
         Begin with the plan of this .json file, made for this problem or another.
     planner
-        Begin with the plan of rrt, gust or follow; default follow.
+        Begin with the plan of rrt, gust, follow or lattice; default follow.
     straight
         Begin with a straight line from start to goal.
     clearance_weight

@@ -19,7 +19,7 @@ class SolveOptions:
     Parameters
     ----------
     planner
-        rrt, gust or follow.
+        rrt, gust, follow or lattice.
     top_k
         How many plans to recall.
     recall
@@ -33,7 +33,7 @@ class SolveOptions:
 
     """
 
-    planner: str = "gust"
+    planner: str = "lattice"
     top_k: int = 5
     recall: str | None = None
     memory: str | None = None

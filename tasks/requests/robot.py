@@ -175,7 +175,7 @@ def load_planner(
     memory: str | Path,
     *,
     vehicle: str = "car",
-    planner: str = "gust",
+    planner: str = "lattice",
     assist: str = "repair",
     top_k: int = 5,
     recall: str | None = None,

@@ -57,7 +57,7 @@ def try_it(data: DataReader, params: Parameters) -> Page:
     else:
         raise BadRequestError(f"{class_name[:60]!r} is no class that can be drawn; name a problem of it.")
     memory = params.one_of("memory", names, class_name if class_name in names else (names or [""])[0])
-    planner = params.one_of("planner", tuple(PLANNERS), "gust")
+    planner = params.one_of("planner", tuple(PLANNERS), "lattice")
     assist = params.one_of("assist", ASSISTS, "repair")
     values: dict[str, Any] = {
         "menus": [
@@ -94,7 +94,7 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
     except ValueError as error:
         raise BadRequestError(f"What was sent: {error}.") from None
     choices = Parameters(params.path, texts, params.run)
-    planner = choices.one_of("planner", tuple(PLANNERS), "gust")
+    planner = choices.one_of("planner", tuple(PLANNERS), "lattice")
     assist = choices.one_of("assist", ASSISTS, "repair")
     name = choices.text("memory")
     memory = data.memory(run, name) if name else None

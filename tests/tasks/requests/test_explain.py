@@ -63,7 +63,7 @@ def test_the_command_tells_and_draws_it(
     assert "recall" not in capsys.readouterr().out
     assert call([*asked, "--picture", str(marked), "--explain"]) == 0
     told = capsys.readouterr().out
-    attempt = solve(WALL, "gust", "open", 5, memory, seed=1)
+    attempt = solve(WALL, "lattice", "open", 5, memory, seed=1)
     assert f"{len(attempt.recalled)} of 6 plans of test, none of them free" in told
     rows = [match for line in told.splitlines() if (match := re.match(r" \d+ +(\d+) .* of ", line))]
     assert [int(row[1]) for row in rows] == list(attempt.recalled)
