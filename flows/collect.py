@@ -8,18 +8,17 @@ from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
 from tasks.stages.curate import CURATE
-from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
+from tasks.stages.keep_experiences import COMBINE, KEEP
 from tasks.stages.read_worlds import READ_WORLDS, print_skipped
 
 
 @stage_flow
 def collect(settings: RunSettings, data: str) -> None:
-    """Draw problems of each class, solve them, check the plans, and keep the N most useful of each class."""
+    """Draw problems of each class, solve them, polish and check the plans, and keep the N best of each."""
     keep_settings(data, settings)
     worlds = run_stage(READ_WORLDS, data, settings)
     print_skipped(worlds.values())
     run_stage(COLLECT, data, settings)
     run_stage(CURATE, data, settings)
-    run_stage(IMPROVE, data, settings)
     run_stage(KEEP, data, settings)
     run_stage(COMBINE, data, settings)

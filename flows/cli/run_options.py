@@ -44,8 +44,6 @@ class Options:
         Stop at a bad world instead of skipping it.
     continual
         Also measure with 20, 40 ... % of the experiences: none, paper (GUST on curves) or all.
-    optimised
-        Optimise collected plans, for length and clearance, before they are kept: about a second each.
     experiences
         Solved problems to keep of each class; the preset gives the default, as for the next four.
     candidates
@@ -96,7 +94,6 @@ class Options:
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
     continual: str | None = None
-    optimised: Annotated[bool, Parameter(negative=())] = False
     experiences: int | None = None
     candidates: int | None = None
     problems_per_experience: int | None = None

@@ -99,7 +99,6 @@ def settings_of(options: Options) -> RunSettings:
         objective=options.objective,
         strict=options.strict,
         vehicle=options.vehicle,
-        optimised=options.optimised,
         continual=options.continual,
         experiences=options.experiences,
         candidates=options.candidates,

@@ -148,7 +148,7 @@ def descend(
     vehicle: Vehicle,
     scene: Scene,
     circles: Floats,
-) -> tuple[int, int, int]:
+) -> tuple[int, int, int, bool]:
     """Shorten the drive in ``model.states`` and ``model.controls`` as far as it will go.
 
     Args:
@@ -163,10 +163,12 @@ def descend(
         circles: ``[P, 3]`` around the scene's pieces.
 
     Returns:
-        Steps of the drive, iterations used, and steps of the quickest free drive.
+        Steps of the drive, iterations used, steps of the quickest free drive, and whether more iterations
+        would gain nothing.
     """
     barrier = stage.barrier
     used = 0
+    ended = False
     damping = 0.0
     anew = True
     aim = _aim_from(model, steps, goal)
@@ -184,6 +186,7 @@ def descend(
         used += 1
         if -(linear + quadratic) < stage.least_gain:
             if steps_to_goal(model.states, steps, goal) >= 0 or steps == model.controls.shape[0]:
+                ended = True
                 break
             steps = _gone_on(model, steps, goal, vehicle)
             anew = True
@@ -203,6 +206,7 @@ def descend(
             share *= 0.5
         if not found:
             if damping > MOST_DAMPING:
+                ended = True
                 break
             damping = max(5.0 * damping, FIRST_DAMPING)
             anew = False
@@ -217,7 +221,7 @@ def descend(
             if steps < best and drive_is_free(model.states, steps, vehicle, scene):
                 best = steps
                 copy_drive(model.states, model.controls, steps, model.best_states, model.best_controls)
-    return steps, used, best
+    return steps, used, best, ended
 
 
 @lean

@@ -6,6 +6,7 @@ The work is counted in iterations, so the same plan gives the same result on any
 from __future__ import annotations
 
 import math
+from time import perf_counter
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle, state_size
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
+SLICE: Final = 8  # iterations between two looks at the clock
 ROOM: Final = 256  # steps, in which buffers grow
 NEVER: Final = 1 << 30  # steps
 # strength, range and least gain in metres: obstacles push from far and softly first, then only close to them
@@ -42,6 +44,7 @@ def polish(
     workspace: Workspace,
     iterations: int = ITERATIONS,
     margin_m: float = 0.0,
+    seconds: float = math.inf,
 ) -> Polished:
     """Make a plan as quick as it can be by small changes, or free if it is blocked.
 
@@ -54,6 +57,7 @@ def polish(
         workspace: the caller's buffers.
         iterations: at most; each takes a third of a millisecond for a car.
         margin_m: how many metres more than it needs the plan keeps from obstacles, where there is room.
+        seconds: when to end, some iterations late; then another machine may give another result.
 
     Returns:
         The quickest free plan that was found, never a longer one than was given; the given plan if none was.
@@ -62,7 +66,7 @@ def polish(
     steps = len(plan.controls)
     model.controls[:steps] = plan.controls
     model.states[: steps + 1] = simulate(start_state(problem, vehicle), plan.controls, vehicle)
-    return _polished(problem, plan, model, steps, goal, vehicle, scene, iterations, margin_m)
+    return _polished(plan, model, steps, goal, vehicle, scene, iterations, margin_m, seconds)
 
 
 def polish_path(
@@ -83,7 +87,7 @@ def polish_path(
     most = 50 + math.ceil(1.5 * ways / (vehicle.max_speed * vehicle.dt))
     model, goal = _ready(problem, most, vehicle, workspace)
     steps = drive_along(model, np.ascontiguousarray(points[:, :2]), goal, ahead_m, vehicle)
-    return _polished(problem, None, model, steps, goal, vehicle, scene, iterations, margin_m)
+    return _polished(None, model, steps, goal, vehicle, scene, iterations, margin_m, math.inf)
 
 
 def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:
@@ -95,7 +99,6 @@ def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace)
 
 
 def _polished(
-    problem: Problem,
     given: Plan | None,
     model: Model,
     steps: int,
@@ -104,8 +107,10 @@ def _polished(
     scene: Scene,
     iterations: int,
     margin_m: float,
+    seconds: float,
 ) -> Polished:
     """Descend through all stages from the drive in ``model``."""
+    began = perf_counter()
     arrived = int(steps_to_goal(model.states, steps, goal))
     if arrived == 0:
         return Polished(given, 0)
@@ -121,10 +126,13 @@ def _polished(
     used = 0
     for strength, range_m, least_gain in STAGES:
         stage = Stage(Barrier(strength, range_m, margin_m, widest), least_gain)
-        steps, more, best = descend(
-            *(model, steps, goal, stage, iterations - used, best, vehicle, scene, circles)
-        )
-        used += more
+        ended = False
+        while not ended and used < iterations and perf_counter() - began < seconds:
+            most = min(SLICE, iterations - used)
+            steps, more, best, ended = descend(
+                *(model, steps, goal, stage, most, best, vehicle, scene, circles)
+            )
+            used += more
     if best == NEVER:
         return Polished(None, used)
     plan = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)

@@ -1,7 +1,8 @@
-"""Improves a plan: searches again and again for a plan that takes less time than the best so far.
+"""Improves a plan: polishes it, then searches again and again for one that is better once it is polished.
 
-Each search has a bound on driving time that only a better plan keeps, and random numbers of its own (AO-x,
-Hauser and Zhou, T-RO 2016, with any of the planners as x).
+Each search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with
+any of the planners as x). A plan within the bound is polished. The bound is a little above the best driving
+time at first, because a plan as a search finds it takes longer, and falls with each search in vain.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
 
+from planners.optimisation.polish import ITERATIONS, polish
 from planners.search.guides.guidance import guidance
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
@@ -23,7 +25,10 @@ from planners.world.workspace import Workspace
 
 FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner mostly needs
 GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer
-LEAST_GAIN = 0.01  # share of the driving time that a new plan must save
+LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when all slack is used up
+FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer before it is polished
+SLACK_KEPT = 0.5  # after each search in vain
+EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
 
 
 class Improvement(NamedTuple):
@@ -61,6 +66,7 @@ def improve(
     """Improve a plan, or find a first one, until a limit is reached.
 
     A limit in expansions gives the same result for the same seed on any machine; a limit in seconds does not.
+    An iteration of a polish counts as ``EXPANSIONS_AN_ITERATION``.
     Every second search is guided along the best plan.
 
     Args:
@@ -86,12 +92,29 @@ def improve(
     best = given
     history = [] if given is None else [Improvement(0.0, 0, given.duration_s)]
     spent = searches = checks = nodes = 0
-    budget = float(FIRST_EXPANSIONS)
+    budget, slack = float(FIRST_EXPANSIONS), FIRST_SLACK
+
+    def consider(plan: Plan) -> bool:
+        """Polish a plan and keep it if it is the best; say whether it is."""
+        nonlocal best, spent
+        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, ITERATIONS))
+        left = seconds - (perf_counter() - began)
+        better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
+        spent += EXPANSIONS_AN_ITERATION * better.iterations
+        plan = better.plan or plan
+        if best is not None and plan.duration_s >= best.duration_s:
+            return False
+        best = plan
+        history.append(Improvement(perf_counter() - began, spent, plan.duration_s))
+        return True
+
+    if given is not None:
+        consider(given)
     while spent < most and (left := seconds - (perf_counter() - began)) > 0.0:
         limits = Limits(
             expansions=int(min(budget, most - spent)),
             seconds=min(left, Limits.seconds),
-            bound_s=math.inf if best is None else (1.0 - LEAST_GAIN) * best.duration_s,
+            bound_s=math.inf if best is None else (1.0 - LEAST_GAIN + slack) * best.duration_s,
         )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
@@ -100,9 +123,7 @@ def improve(
         checks += outcome.collision_checks
         nodes += outcome.nodes
         spent += max(outcome.expansions, 1)  # a search from a blocked start costs none, and must end as well
-        if outcome.plan is not None:
-            best = outcome.plan
-            history.append(Improvement(perf_counter() - began, spent, best.duration_s))
-        else:
+        if outcome.plan is None or not consider(outcome.plan):
             budget *= GROWTH
+            slack *= SLACK_KEPT
     return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes)

@@ -119,16 +119,6 @@ def copy_experiences(source: Path, path: Path, key: str) -> int:
     return int(table.num_rows)
 
 
-def replace_plans(source: Path, path: Path, first: int, plans: Sequence[Plan], key: str = "") -> None:
-    """Write rows of the file ``source`` to ``path`` with other ``plans`` for their problems.
-
-    ``first``: number of the first row. ``key``: what they were made from.
-    """
-    table = read_table(source, EXPERIENCES).slice(first, len(plans))
-    columns = {name: table[name] for name in table.schema.names} | _plan_columns(plans)
-    write_table(path, pa.table(columns, schema=table.schema), key)
-
-
 def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
     return {
         "states": list_column([plan.states for plan in plans], np.float64),

@@ -25,14 +25,16 @@ from planners.world.problem import (
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
-from tasks.settings.run_settings import COLLECTOR
+from tasks.settings.run_settings import ABLATION_PLANNER
 
 EMPTY: Final = Problem(
     "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
 )
 
 
-def compile_assists(vehicle: Vehicle, planner: str = COLLECTOR, strategies: Sequence[str] = RECALLS) -> None:
+def compile_assists(
+    vehicle: Vehicle, planner: str = ABLATION_PLANNER, strategies: Sequence[str] = RECALLS
+) -> None:
     """Plan with a small memory by each strategy of recall: copies of one plan, with a box put in its way.
 
     Args:

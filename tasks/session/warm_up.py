@@ -13,13 +13,16 @@ from planners.memory.hallucination.mixture import hallucinate
 from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
+from planners.optimisation.polish import polish
 from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from planners.world.workspace import Workspace
 from tasks.attempts.compile_assists import EMPTY, compile_assists
 from tasks.fan_out.fan_out import Client
 from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
@@ -44,8 +47,10 @@ def warm_up(cluster: Any, vehicle: str) -> Iterator[None]:
 
 
 def _compile_collecting(vehicle: Vehicle) -> None:
-    """Compile the planner that collects experiences."""
-    solve(EMPTY, COLLECTOR, vehicle=vehicle)
+    """Compile the planner that collects experiences, and what polishes its plans."""
+    found = solve(EMPTY, COLLECTOR, vehicle=vehicle).plan
+    if found is not None:
+        polish(EMPTY, found, vehicle, scene_of(EMPTY), Workspace())
 
 
 def _compile_hallucination(vehicle: Vehicle) -> None:

@@ -39,7 +39,7 @@ ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
     Assist("random-open", 5),
     Assist("random-repair", 5),
 )
-COLLECTOR: Final = "follow"  # its plans keep clear of obstacles, so more of them fit a new problem
+COLLECTOR: Final = "lattice"  # its plans drive shortest, and polish makes them clear of obstacles
 ABLATION_PLANNER: Final = "gust"
 CONTINUAL: Final = ("none", "paper", "all")  # the second: one planner on one class, as published
 CONTINUAL_PLANNER: Final = "gust"
@@ -53,7 +53,6 @@ DEFAULT_MIXTURE: Final[Mixture] = (("rearrange", 1.0),)
 
 _LATER: Final[dict[str, Any]] = {  # fields that were added
     "vehicle": DEFAULT_VEHICLE,
-    "optimised": False,
     "learning": asdict(Learning()),
     "hallucination": DEFAULT_MIXTURE,
     "candidates": 0,
@@ -89,7 +88,6 @@ class RunSettings:
     combined: bool  # also one memory for all classes together
     strict: bool = False  # a bad world stops the run instead of being skipped
     vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicles.vehicle``)
-    optimised: bool = False  # collected plans are made shorter and clearer before they are kept
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
     candidates: int = 0  # solved problems of a class to choose experiences from; few: the first are kept
@@ -158,6 +156,7 @@ class RunSettings:
     def from_json(cls, text: str) -> RunSettings:
         """The settings that ``to_json`` wrote; ValueError with one line if they are of another version."""
         values: dict[str, Any] = _LATER | json.loads(text)
+        values.pop("optimised", None)  # once a choice; now every collected plan is polished
         version = values.pop("version", 1)
         names = {field.name for field in fields(cls)}
         if set(values) != names:

@@ -1,12 +1,17 @@
-"""Collect: draw problems of a class, solve them, check every plan: the candidates to choose from."""
+"""Collect: draw problems of a class, solve them, polish and check the plans: candidates to choose from."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
-from planners.solve import solve
+from planners.optimisation.polish import polish
+from planners.solve import Attempt, solve
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.tables.experiences import copy_experiences, write_experiences
 from storage.tables.shards import shard_is_done
@@ -21,6 +26,7 @@ from tasks.settings.run_settings import RunSettings
 SMALLEST_CHUNK: Final = 25
 LARGEST_CHUNK: Final = 100  # a second of work
 PATIENCE: Final = 2  # problems tried for each wanted candidate, once as many are solved as must be kept
+MARGIN_M: Final = 0.4  # of polished plans: tighter ones fit fewer problems (docs/optimisation.md)
 GIVE_UP: Final = 20  # problems tried for each wanted experience; a class this hard is no class to remember
 
 
@@ -49,6 +55,7 @@ def collect_chunk(chunk: Chunk) -> Collected:
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
         attempt = solve(problem, planner, seed=seed, vehicle=vehicle, workspace=workspace)
+        attempt = _polished(problem, attempt, vehicle, workspace)
         if attempt.plan is not None:
             check_attempt(problem, attempt, set(), vehicle)
             experiences.append(Experience(problem, attempt.plan, vehicle))
@@ -63,6 +70,18 @@ def collect_chunk(chunk: Chunk) -> Collected:
         vehicle=vehicle,
     )
     return Collected(len(experiences), tried)
+
+
+def _polished(problem: Problem, attempt: Attempt, vehicle: Vehicle, workspace: Workspace) -> Attempt:
+    """The attempt with its plan, if it has one, as quick as small changes make it."""
+    if attempt.plan is None:
+        return attempt
+    plan = polish(problem, attempt.plan, vehicle, scene_of(problem), workspace, margin_m=MARGIN_M).plan
+    return (
+        attempt
+        if plan is None
+        else replace(attempt, plan=plan, length_m=plan.length_m, duration_s=plan.duration_s)
+    )
 
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:

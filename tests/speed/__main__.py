@@ -22,6 +22,7 @@ SECTIONS: Final = {
     "cold_clock": "tests.speed.cold_clock",
     "cold_recall": "tests.speed.cold_recall",
     "one_problem": "tests.speed.one_problem",
+    "optimiser": "tests.speed.optimiser",
     "warm_start": "tests.speed.warm_start",
     "curation": "tests.speed.curation",
     "hallucination": "tests.speed.hallucination",

@@ -9,7 +9,7 @@ from tasks.fan_out.stage import Stage, Values
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
 from tasks.stages.curate import CURATE
-from tasks.stages.keep_experiences import COMBINE, IMPROVE, KEEP
+from tasks.stages.keep_experiences import COMBINE, KEEP
 
 Result = TypeVar("Result", bound=Values | None)
 
@@ -27,5 +27,5 @@ def run_stage(
 def collect(data: str, settings: RunSettings, backwards: bool = False) -> None:
     """Leave the experiences of a run in a data folder."""
     keep_settings(data, settings)
-    for stage in (COLLECT, CURATE, IMPROVE, KEEP, COMBINE):
+    for stage in (COLLECT, CURATE, KEEP, COMBINE):
         run_stage(stage, data, settings, backwards)

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.curation import AGAIN, ALIKE, choose, coverage, curate, similarity
-from planners.memory.plans.cell_masks import masks_of
+from planners.memory.curation import LEFT, MISSED_S, choose, coverage, curate
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
@@ -19,84 +18,64 @@ SEEDS = st.integers(0, 2**32 - 1)
 CLASS = problem_class("trap", "easy")
 
 
-def drawn(seed: int, problems: int, plans: int, doubles: int = 0):
-    """Labels and masks of plans, of which some are the same as others."""
+def drawn(seed: int, problems: int, plans: int):
+    """Labels and driving times of plans, and what the problems cost without any."""
     rng = generator(seed, "curation")
     labels = rng.random((problems, plans)) < rng.random(plans) ** 3
-    cells = rng.random((plans, 64, 64)) < 0.1
-    masks = np.packbits(cells, axis=2, bitorder="little").view("<u8").reshape(plans, 64)
-    for _ in range(doubles):
-        one, other = rng.integers(plans, size=2)
-        labels[:, one], masks[one] = labels[:, other], masks[other]
-    return labels, masks.astype(np.uint64)
+    return labels, rng.uniform(18.0, 30.0, plans), rng.uniform(20.0, 32.0, problems)
 
 
-def brute_force(labels, masks, count):
+def brute_force(labels, durations, without, count):
     """The same choice, every gain from the definition at every step."""
-    order: list[int] = []
-    aside: set[int] = set()
+    costs, order = without.copy(), []
     for _ in range(count):
-        weights = np.array([AGAIN**covered for covered in labels[:, order].sum(1)], float)
-        left = [i for i in range(len(masks)) if i not in order and i not in aside]
-        if not left:
-            left, aside = [i for i in range(len(masks)) if i not in order], set()
-        gains = [sum(weights[labels[:, i]].tolist()) for i in left]
-        best = left[int(np.flatnonzero(np.isclose(gains, max(gains), rtol=1e-12, atol=0.0))[0])]
+        savings = np.where(labels, np.maximum(costs[:, None] - durations, 0.0), 0.0)
+        gains = savings.sum(0)
+        gains[order] = -1.0
+        best = int(np.flatnonzero(np.isclose(gains, gains.max(), rtol=1e-12, atol=1e-12))[0])
         order.append(best)
-        aside |= {i for i in left if i != best and shared(masks[i], masks[best]) >= ALIKE}
+        costs -= (1.0 - LEFT) * savings[:, best]
     return order
 
 
-def shared(one, other):
-    both = sum(bin(a & b).count("1") for a, b in zip(one.tolist(), other.tolist(), strict=True))
-    either = sum(bin(a | b).count("1") for a, b in zip(one.tolist(), other.tolist(), strict=True))
-    return both / max(either, 1)
-
-
-@given(seed=SEEDS, problems=st.integers(0, 40), plans=st.integers(1, 25), doubles=st.integers(0, 6))
-def test_the_lazy_choice_is_that_of_a_brute_force_greedy(seed, problems, plans, doubles):
-    labels, masks = drawn(seed, problems, plans, doubles)
-    assert choose(labels, masks, plans).tolist() == brute_force(labels, masks, plans)
+@given(seed=SEEDS, problems=st.integers(0, 40), plans=st.integers(1, 25))
+def test_the_lazy_choice_is_that_of_a_brute_force_greedy(seed, problems, plans):
+    drawing = drawn(seed, problems, plans)
+    assert choose(*drawing, plans).tolist() == brute_force(*drawing, plans)
 
 
 @given(seed=SEEDS, plans=st.integers(1, 30), share=st.floats(0.0, 1.0))
-def test_coverage_grows_with_each_plan_and_fewer_are_the_beginning_of_more(seed, plans, share):
-    labels, masks = drawn(seed, 50, plans)
-    order = choose(labels, masks, plans)
+def test_fewer_are_the_beginning_of_more(seed, plans, share):
+    labels, durations, without = drawn(seed, 50, plans)
+    order = choose(labels, durations, without, plans)
     grown = coverage(labels, order)
     assert (np.diff(grown) >= 0.0).all()
     assert grown[-1] == labels.any(1).mean()
     count = int(share * plans)
-    assert choose(labels, masks, count).tolist() == order[:count].tolist()
+    assert choose(labels, durations, without, count).tolist() == order[:count].tolist()
     assert sorted(order) == list(range(plans))
 
 
-@given(seed=SEEDS, plans=st.integers(2, 20), doubles=st.integers(1, 12))
-def test_two_that_are_alike_are_not_both_kept_while_others_are_left(seed, plans, doubles):
-    labels, masks = drawn(seed, 30, plans, doubles)
-    different = len({mask.tobytes() for mask in masks})
-    kept = choose(labels, masks, different)
-    assert len({masks[i].tobytes() for i in kept}) == different
-    assert all(similarity(masks[kept], masks[i]).max() <= 1.0 for i in kept)
+def test_of_two_plans_that_fit_alike_the_quicker_is_kept():
+    labels = np.ones((10, 2), bool)
+    assert choose(labels, np.array([21.0, 20.0]), np.full(10, 25.0), 1).tolist() == [1]
 
 
 def test_plans_that_answer_no_problem_are_kept_last():
-    labels, masks = drawn(3, 60, 20)
+    labels, _, without = drawn(3, 60, 20)
     labels[:, ::2] = False
     labels[:10, 1::2] |= np.eye(10, dtype=bool)  # each of the others answers some
-    assert set(choose(labels, masks, 10).tolist()) == set(range(1, 20, 2))
+    assert set(choose(labels, np.full(20, 18.0), without, 10).tolist()) == set(range(1, 20, 2))
 
 
-def test_nothing_is_like_a_plan_that_leaves_the_window():
-    _, masks = drawn(0, 1, 4)
-    masks[:2] = ~np.uint64(0)
-    assert similarity(masks, masks[0]).tolist() == [0.0] * 4
-    assert similarity(masks, masks[2]).tolist()[2] == 1.0
-
-
-def test_labels_and_masks_must_be_of_the_same_plans():
-    labels, masks = drawn(0, 5, 4)
-    for wrong in ((labels[:, :3], masks, 2), (labels, masks, 5), (labels, masks, -1)):
+def test_the_arrays_must_be_of_the_same_plans_and_problems():
+    labels, durations, without = drawn(0, 5, 4)
+    for wrong in (
+        (labels[:, :3], durations, without, 2),
+        (labels, durations, without[:4], 2),
+        (labels, durations, without, 5),
+        (labels, durations, without, -1),
+    ):
         with pytest.raises(ValueError, match="cannot be chosen"):
             choose(*wrong)
 
@@ -123,8 +102,8 @@ def test_a_plans_own_problem_says_nothing_of_it(candidates):
     )
     assert labels.diagonal().all()
     np.fill_diagonal(labels, False)
-    masks = masks_of(sweep_plans([candidate.plan for candidate in candidates]))
-    assert curate(candidates, 20).tolist() == choose(labels, masks, 20).tolist()
+    durations = np.array([candidate.plan.duration_s for candidate in candidates])
+    assert curate(candidates, 20).tolist() == choose(labels, durations, durations + MISSED_S, 20).tolist()
 
 
 def test_as_many_as_there_are_stay_in_their_order(candidates):

@@ -40,7 +40,6 @@ SETTINGS = st.builds(
     combined=st.booleans(),
     strict=st.booleans(),
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
-    optimised=st.booleans(),
     learned=st.sampled_from(["", "monday-12345678"]),
     retraining=st.none()
     | st.builds(
@@ -105,12 +104,18 @@ def _first_version(settings: RunSettings) -> dict[str, Any]:
 def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
     settings = for_preset("smoke")
     values = _first_version(settings)
-    del values["vehicle"], values["optimised"], values["learning"], values["hallucination"]
+    del values["vehicle"], values["learning"], values["hallucination"]
     del values["learned"], values["retraining"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"], values["continual"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
     assert settings.run_name == f"smoke-labels-{digest}"
+
+
+def test_settings_that_chose_whether_plans_are_optimised_still_read() -> None:
+    settings = for_preset("smoke")
+    values = json.loads(settings.to_json()) | {"optimised": True}
+    assert RunSettings.from_json(json.dumps(values)) == settings
 
 
 def test_nearest_centroids_are_not_what_was_once_called_centroid() -> None:
