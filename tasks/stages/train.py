@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -38,6 +38,8 @@ def train_chunk(chunk: Chunk) -> Trained:
     settings = run_settings.learning.settings(
         run_settings.objective, run_settings.epochs, run_settings.seed + chunk.index
     )
+    # of very many plans the readout alone picks candidates, so it has to know all that cells tell
+    settings = replace(settings, by_cells=not run_settings.grown)
     path = _checkpoint(chunk)
 
     def on_epoch(checkpoint: Checkpoint) -> None:

@@ -27,10 +27,9 @@ class Labels:
     (docs/studies/encoder-and-mask.md).
     """
 
-    by_cells = True
-    dropout = 0.5  # share of an embedding's numbers (Srivastava et al. 2014)
-
-    def __init__(self, first_weight: float, origin_weight: float) -> None:
+    def __init__(self, first_weight: float, origin_weight: float, by_cells: bool = True) -> None:
+        self.by_cells = by_cells
+        self.dropout = 0.5 if by_cells else 0.0  # share of an embedding's numbers (Srivastava et al. 2014)
         self.first_weight = first_weight
         self.origin_weight = origin_weight
 

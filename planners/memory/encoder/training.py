@@ -37,6 +37,7 @@ class TrainingSettings:
     weight_decay: float = 0.1  # decoupled, AdamW
     first_weight: float = 1.0  # label objective: how much it counts that a free plan comes first
     origin_weight: float = 0.0  # label objective: how much it counts, at first, that the origin comes first
+    by_cells: bool = True  # label objective: what blocked cells tell is known, and not learned
     margin: float = 1.0  # triplet objective
     semi_hard: bool = False  # triplet objective: count only semi-hard triplets
     architecture: Architecture = field(default_factory=Architecture)
@@ -212,7 +213,7 @@ def _objective(settings: TrainingSettings, epoch: int) -> Objective:
 
     if settings.objective == "labels":
         left = 1.0 - (1.0 - ORIGIN_LEFT) * epoch / max(1, settings.epochs - 1)
-        return Labels(settings.first_weight, left * settings.origin_weight)
+        return Labels(settings.first_weight, left * settings.origin_weight, settings.by_cells)
     return Triplet(settings.margin, settings.semi_hard)
 
 

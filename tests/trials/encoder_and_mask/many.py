@@ -81,7 +81,7 @@ def taught_memories(experiences: Sequence[Experience]) -> list[Memory]:
     every = [each.plan for each in experiences]
     memories = []
     for seed in SEEDS:
-        settings = TrainingSettings(epochs=EPOCHS, seed=seed)
+        settings = TrainingSettings(epochs=EPOCHS, seed=seed, by_cells=False)
         trained = train(grids, origins, free, masks_of(sweeps), settings)
         memories.append(grow(build_memory(trained, plans, CLASS), every, plain[:READ_OUT]))
     return memories
@@ -175,7 +175,7 @@ def enlarged(
     grids = np.stack([occupancy_of(problem) for problem in problems])
     bits = bits_of(grids)
     embeddings = [memory.encoder(grids) for memory in memories]
-    free = 1.0 / (1.0 + np.exp(CELL_SCORES[EVEN_CELLS] - CELL_SCORES))  # by blocked cells
+    free = 1.0 / (1.0 + np.exp(np.minimum(CELL_SCORES[EVEN_CELLS] - CELL_SCORES, 50.0)))  # by blocked cells
     counts = np.zeros(len(masks) + 1)
     sums = [np.zeros((len(masks) + 1, each.shape[1])) for each in embeddings]
     for first in range(0, len(masks), PART):
