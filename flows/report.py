@@ -18,5 +18,5 @@ def report(settings: RunSettings, data: str) -> None:
     run_stage(DRAW_EXAMPLES, data, settings)
     results, run = report_run(data, settings), run_folder(data, settings)
     log_report(data, settings, results)
-    publish(run, results.claims)
+    publish(run, results.claims + results.others)
     show(results, run)

@@ -95,11 +95,14 @@ def time_split(split: pd.DataFrame) -> Figure:
 
 
 def paper_configurations(summary: pd.DataFrame) -> list[Configuration]:
-    """The five configurations of the paper's panels; recalled by the encoder, if any is."""
+    """The five configurations of the paper's panels; recalled by the encoder, if any is.
+
+    The bars of a run by the paper's method are those of its own open box.
+    """
     measured = configurations_in(summary)
     if any(each.recall == "encoder" for each in measured):
         measured = [each for each in measured if each.recall in ("", "encoder")]
-    by_bar = {(each.assist, each.top_k): each for each in reversed(measured)}
+    by_bar = {(each.assist.removeprefix("published-"), each.top_k): each for each in reversed(measured)}
     return [
         by_bar.get((assist, k), Configuration(assist, "encoder" if k else "", k)) for assist, k in PAPER_BARS
     ]

@@ -40,7 +40,15 @@ _RETRIEVAL_NOTE: Final = (
 _CLAIMS_NOTE: Final = (
     "Decided by the stated rules from the rows of this run, with 95 % intervals. A claim of several figures "
     "fails if one of them speaks against it with an interval widened for their number (Bonferroni). A claim "
-    "cannot be compared if the intervals leave it open, or if this run did not measure it."
+    "cannot be compared if the intervals leave it open, or if the run did not measure it."
+)
+_ONCE_NOTE: Final = "The data folder has no run of the other method with these classes and this seed."
+_METHODS_NOTE: Final = (
+    "The paper's method: plans as they come, an encoder with pooling that learns by triplets from problems "
+    "around them, the plans of the nearest centroids tried in order, targets and roadmap nodes drawn near "
+    "them. The product's defaults: plans chosen for their use, an encoder that learns which plans are free, "
+    "of the free ones the one that drives shortest, a search that goes on along the least blocked plan. The "
+    "planners, the vehicle and the problems are the same."
 )
 
 
@@ -59,6 +67,7 @@ def page(
     retrieval: pd.DataFrame,
     endings: pd.DataFrame,
     claims: Sequence[Claim],
+    others: Sequence[Claim] = (),
     pictures: Sequence[Picture],
     made: Mapping[str, Mapping[str, str]],
 ) -> str:
@@ -66,7 +75,8 @@ def page(
 
     ``title``, ``introduction``: its first texts. ``summary``: of ``panels.summarise``. ``retrieval``: of
     ``retrieval_rates.summarise_retrieval``. ``endings``: of ``distributions.endings``. ``claims``,
-    ``pictures``: in the order of the page. ``made``: names and values of what made the run, by title.
+    ``pictures``: in the order of the page. ``others``: the claims as a run by the other method decides them;
+    empty if there is no such run. ``made``: names and values of what made the run, by title.
 
     Raises OSError if a picture cannot be read.
     """
@@ -77,16 +87,19 @@ def page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    counts = Counter(claim.verdict for claim in claims)
+    judged = [(claim, *other) for claim, *other in zip(claims, *([others] if others else []), strict=True)]
     return environment.get_template("page.html.jinja").render(
         colours=style_sheet(),
         title=title,
         introduction=introduction,
         words=NAMES,
         keys=("configuration", "class"),  # which stay in sight when a table is scrolled
-        claims=[claim._asdict() | {"kind": _KINDS[claim.verdict]} for claim in claims],
-        verdicts=[(verdict, counts[verdict]) for verdict in _KINDS],
-        claims_note=_CLAIMS_NOTE,
+        claims=judged,
+        kinds=_KINDS,
+        verdicts=[_counted(each) for each in (claims, others) if each],
+        differing=sum(len({each.verdict for each in pair}) > 1 for pair in judged),
+        claims_note=_CLAIMS_NOTE if others else f"{_CLAIMS_NOTE} {_ONCE_NOTE}",
+        methods_note=_METHODS_NOTE,
         times=titled_rows(summary, full_cells),
         time_headings=FULL_HEADINGS,
         times_note=_TIMES_NOTE,
@@ -103,6 +116,12 @@ def page(
         ],
         made=[(name, list(entries.items())) for name, entries in made.items()],
     )
+
+
+def _counted(claims: Sequence[Claim]) -> str:
+    """How many claims have which verdict, in words."""
+    counts = Counter(claim.verdict for claim in claims)
+    return f"By {claims[0].method}: {', '.join(f'{counts[verdict]} {verdict}' for verdict in _KINDS)}."
 
 
 def _inline(path: Path) -> str:

@@ -110,12 +110,17 @@ def experience_table(rows: pd.DataFrame) -> Table:
     return rich_table(title, ["experiences", *panels], [[line] for line in lines])
 
 
-def claims_markdown(claims: Sequence[Claim]) -> str:
-    """The ``claims`` of the paper and their verdicts, as a Markdown list."""
-    return "".join(
-        f"- **{claim.verdict}**: {claim.text} ({claim.where}) Here: {claim.ours}. *Rule: {claim.rule}*\n"
-        for claim in claims
-    )
+def claims_markdown(claims: Sequence[Claim], others: Sequence[Claim] = ()) -> str:
+    """The ``claims`` of the paper and their verdicts, as a Markdown list.
+
+    ``others``: the same claims, judged by the other method, if that was measured too.
+    """
+    lines = []
+    for claim, *other in zip(claims, *([others] if others else []), strict=True):
+        judged = "; ".join(f"by {each.method}: {each.ours}" for each in (claim, *other))
+        verdicts = " / ".join(each.verdict for each in (claim, *other))
+        lines.append(f"- **{verdicts}**: {claim.text} ({claim.where}) {judged}. *Rule: {claim.rule}*\n")
+    return "".join(lines)
 
 
 def as_csv(table: pd.DataFrame) -> str:

@@ -26,6 +26,7 @@ class Claim(NamedTuple):
     rule: str  # by which it is decided
     ours: str  # what was measured, in words
     verdict: str  # HOLDS, FAILS or OPEN
+    method: str = ""  # what was measured: the product's defaults, or the paper's method
 
 
 class Statement(NamedTuple):

@@ -39,11 +39,12 @@ _IN_TURN: Final = (BASELINE, CLOSED_1, CLOSED_5, OPEN_1, OPEN_5)
 
 
 def claims(evidence: Evidence) -> list[Claim]:
-    """All claims of the paper, decided by ``evidence``."""
+    """All claims of the paper, always in the same order, decided by ``evidence``."""
     of_planning = [
         decided(text, where, rule, statements(evidence)) for where, statements, text, rule in _CLAIMS
     ]
-    return of_planning + [_recall_claim(evidence, *published) for published in RECALL]
+    of_recall = [_recall_claim(evidence, *published) for published in RECALL]
+    return [claim._replace(method=evidence.method) for claim in of_planning + of_recall]
 
 
 def _recall_claim(evidence: Evidence, name: str, memory: str, first: float, five: float) -> Claim:

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 _LEARNING: Final = (
     "patience", "learning_rate", "origin_weight", "margin", "semi_hard", "channels", "hidden", "dimensions",
+    "network",
 )  # fmt: skip
 
 
@@ -21,7 +22,8 @@ class Options:
     Parameters
     ----------
     preset
-        Size of the run: smoke (a minute), laptop (minutes) or paper (an hour).
+        Size of the run: smoke (a minute), laptop (minutes) or paper (an hour). paper-method is the paper's
+        method as published (hours), paper-method-laptop the same with fewer problems.
     classes
         Generated problem classes; default all of them, or none if --worlds is given.
     worlds
@@ -33,7 +35,7 @@ class Options:
     seed
         Everything random follows from it.
     objective
-        What the encoder is trained for: labels or triplet.
+        What the encoder is trained for: labels or triplet; default labels, triplet by the paper's method.
     data
         Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
     workers
@@ -73,6 +75,8 @@ class Options:
         Widths of the encoder's fully connected layers.
     dimensions
         Dimensions of the embedding.
+    network
+        patches, or pooled: the paper's, which has a max-pool after each convolution.
     learned
         Also use the experiences that --learn has added to the data folder. The name freezes those that exist
         when it is first used; later the same name means the same experiences.
@@ -88,7 +92,7 @@ class Options:
     difficulty: str = "standard"
     vehicle: str = "car"
     seed: int = 1
-    objective: str = "labels"
+    objective: str | None = None
     data: Path | None = None
     workers: int | None = None
     scheduler: str | None = None
@@ -108,6 +112,7 @@ class Options:
     channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
     dimensions: int | None = None
+    network: str | None = None
     learned: str | None = None
     hallucination: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
 

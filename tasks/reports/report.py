@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -56,6 +57,7 @@ MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared b
     "experiences", "preset", "classes", "worlds", "planners", "assists", "test_problems", "combined",
     "strict", "candidates", "continual",
 )  # fmt: skip
+ALIKE: Final = ("classes", "worlds", "difficulty", "seed", "vehicle")  # of runs by the two methods
 MEASURED_ON: Final = ["problem_class", "planner"]
 
 
@@ -65,6 +67,9 @@ class Report(NamedTuple):
     summary: pd.DataFrame  # ``dashboards.statistics.panels.summarise``
     retrieval: pd.DataFrame  # ``dashboards.statistics.retrieval_rates.summarise_retrieval``
     claims: list[Claim]
+    others: list[
+        Claim
+    ]  # the claims by the other method: the paper's, or the product's; empty if not measured
 
 
 def report_run(data: str, settings: RunSettings) -> Report:
@@ -74,9 +79,11 @@ def report_run(data: str, settings: RunSettings) -> Report:
     check_verified(attempts)
     continual = continual_rows(data, settings, attempts)
     summary, recalls = summarise(attempts), _recall_rows(data, settings)
-    report = Report(summary, report_retrieval(data, settings), claims(Evidence(attempts, recalls, continual)))
+    judged = claims(Evidence(attempts, recalls, continual))
+    report = Report(summary, report_retrieval(data, settings), judged, claims_by_other(data, settings))
     _write(run.summary("csv"), as_csv(summary))
-    texts = [summary_markdown(summary), retrieval_markdown(report.retrieval), claims_markdown(report.claims)]
+    judgement = claims_markdown(report.claims, report.others)
+    texts = [summary_markdown(summary), retrieval_markdown(report.retrieval), judgement]
     _write(run.summary("md"), "\n".join(texts))
     figures = {
         "planning-times": planning_times(summary),
@@ -115,6 +122,40 @@ def check_verified(attempts: pd.DataFrame) -> None:
         )
 
 
+def claims_by_other(data: str, settings: RunSettings) -> list[Claim]:
+    """The claims as a run by the other method decides them, the paper's or the product's.
+
+    Args:
+        data: the data folder.
+        settings: those of the run that is reported.
+
+    Returns:
+        the claims by the run of that folder with the same classes, vehicle, difficulty and seed and the most
+        experiences and test problems; none if there is no such run.
+
+    """
+    found = []
+    for run, other in _runs_with_rows(data):
+        alike = all(getattr(other, name) == getattr(settings, name) for name in ALIKE)
+        if alike and other.as_published != settings.as_published:
+            found.append((other.experiences, other.test_problems, run.path.name, other))
+    if not found:
+        return []
+    other = max(found, key=lambda each: each[:3])[-1]
+    with suppress(StorageError):  # some of its files are missing
+        attempts = read_attempts(run_folder(data, other).results, NOT_NEEDED)
+        return claims(Evidence(attempts, _recall_rows(data, other), continual_rows(data, other, attempts)))
+    return []
+
+
+def _runs_with_rows(data: str) -> Iterator[tuple[RunFolder, RunSettings]]:
+    """The runs of a data folder that have results, with their settings."""
+    for run in open_data_folder(data).runs():
+        if is_there(run.settings) and is_there(run.results):
+            with suppress(StorageError):  # of another version, or edited
+                yield run, recorded_settings(run)
+
+
 def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> pd.DataFrame:
     """The attempts of all runs that are like this one but for the number of their experiences.
 
@@ -132,12 +173,8 @@ def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> 
     """
     own = run_folder(data, settings)
     results: dict[int, Path] = {}  # by number of experiences
-    for run in open_data_folder(data).runs():
-        if run.path == own.path or not (is_there(run.settings) and is_there(run.results)):
-            continue
-        try:
-            other = recorded_settings(run)
-        except StorageError:  # of another version, or edited
+    for run, other in _runs_with_rows(data):
+        if run.path == own.path:
             continue
         may_differ = {name: getattr(settings, name) for name in MAY_DIFFER}
         if replace(other, **may_differ) == settings and other.experiences != settings.experiences:

@@ -38,6 +38,7 @@ def page_of(
     summary: pd.DataFrame,
     retrieval: pd.DataFrame,
     claims: Sequence[Claim],
+    others: Sequence[Claim],
     made_by: Mapping[str, Sequence[str]],
 ) -> str:
     """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from.
@@ -49,6 +50,7 @@ def page_of(
         summary: planning times, as ``summarise`` gives them.
         retrieval: what the memories recall, as ``summarise_retrieval`` gives it.
         claims: the paper's claims, with a verdict each.
+        others: the same by the other method; empty if that was not measured.
         made_by: "host" and "commit", and all that the rows say of them.
 
     """
@@ -61,6 +63,7 @@ def page_of(
         retrieval=retrieval,
         endings=endings(attempts),
         claims=claims,
+        others=others,
         pictures=_pictures(run),
         made=_made(run, settings, made_by),
     )

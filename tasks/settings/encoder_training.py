@@ -20,6 +20,10 @@ class Learning:
     origin_weight: float = _DEFAULT.origin_weight
     margin: float = _DEFAULT.margin
     semi_hard: bool = _DEFAULT.semi_hard
+    own_anchors: bool = _DEFAULT.own_anchors
+    batch: int = _DEFAULT.batch
+    weight_decay: float = _DEFAULT.weight_decay
+    network: str = _DEFAULT.architecture.network
     channels: tuple[int, ...] = _DEFAULT.architecture.channels
     hidden: tuple[int, ...] = _DEFAULT.architecture.hidden
     dimensions: int = _DEFAULT.architecture.dimensions
@@ -41,6 +45,9 @@ class Learning:
             origin_weight=self.origin_weight,
             margin=self.margin,
             semi_hard=self.semi_hard,
-            architecture=Architecture(self.channels, self.hidden, self.dimensions),
+            own_anchors=self.own_anchors,
+            batch=self.batch,
+            weight_decay=self.weight_decay,
+            architecture=Architecture(self.channels, self.hidden, self.dimensions, self.network),
             seed=seed,
         )

@@ -18,6 +18,8 @@ from tasks.settings.run_settings import (
     CONTINUAL,
     DEFAULT_MIXTURE,
     DEFAULT_VEHICLE,
+    PUBLISHED_ASSISTS,
+    Assist,
     Mixture,
     Objective,
     RunSettings,
@@ -26,22 +28,45 @@ from tasks.settings.run_settings import (
 LARGEST_WEIGHT: Final = 1e9  # so that a sum of weights is a number
 
 
+class Method(NamedTuple):
+    """How memories are made and measured; the fields are those of ``RunSettings``."""
+
+    objective: Objective
+    as_published: bool
+    assists: tuple[Assist, ...]
+    learning: Mapping[str, Any]
+    collector: str = COLLECTOR
+    planners: tuple[str, ...] = ()  # none: all
+
+
+OURS: Final = Method("labels", False, ASSISTS, {})
+PUBLISHED: Final = Method(  # the paper, and the code of its authors (docs/studies/paper-method.md)
+    "triplet", True, PUBLISHED_ASSISTS,
+    {"network": "pooled", "channels": (8, 16, 32), "hidden": (128, 64), "own_anchors": True,
+     "batch": 64, "learning_rate": 1e-3, "weight_decay": 0.0, "patience": 60},
+    "follow", ("rrt", "gust", "follow"),
+)  # fmt: skip
+
+
 class Preset(NamedTuple):
-    """The size of a run; the fields are those of ``RunSettings``."""
+    """The size of a run and its method; the fields are those of ``RunSettings``."""
 
     experiences: int
-    candidates: int
+    candidates: int  # 0: as many as experiences, so that none is chosen
     problems_per_experience: int
     test_problems: int
     epochs: int
     combined: bool
     continual: str
+    method: Method = OURS
 
 
 PRESETS: Final = {
     "smoke": Preset(6, 20, 20, 20, 2, False, "none"),
     "laptop": Preset(100, 1_000, 200, 1_000, 10, False, "none"),
     "paper": Preset(100, 1_000, 1_000, 10_000, 10, True, "paper"),
+    "paper-method": Preset(100, 0, 1_000, 10_000, 60, True, "paper", PUBLISHED),
+    "paper-method-laptop": Preset(100, 0, 200, 1_000, 20, False, "none", PUBLISHED),
 }
 
 
@@ -52,7 +77,7 @@ def for_preset(
     worlds: Sequence[str] = (),
     difficulty: str = "standard",
     seed: int = 1,
-    objective: str = "labels",
+    objective: str | None = None,
     planners: Sequence[str] | None = None,
     experiences: int | None = None,
     candidates: int | None = None,
@@ -77,8 +102,10 @@ def for_preset(
 
     check_known("preset", [preset], PRESETS)
     base = PRESETS[preset]
+    method = base.method
+    objective = objective or method.objective
     generated = tuple(CLASSES) if classes is None and not worlds else tuple(dict.fromkeys(classes or ()))
-    measured = tuple(PLANNERS) if planners is None else tuple(dict.fromkeys(planners))
+    measured = method.planners or tuple(PLANNERS) if planners is None else tuple(dict.fromkeys(planners))
     check_known("class", generated, CLASSES)
     check_known("planner", measured, PLANNERS)
     check_known("difficulty", [difficulty], DIFFICULTIES)
@@ -107,17 +134,18 @@ def for_preset(
             "problems a plan", problems_per_experience, base.problems_per_experience
         ),
         test_problems=_count("test problems", test_problems, base.test_problems),
-        collector=COLLECTOR,
+        collector=method.collector,
         planners=measured,
-        assists=ASSISTS,
+        assists=method.assists,
         epochs=_count("epochs", epochs, base.epochs),
         combined=base.combined,
         strict=strict,
         vehicle=vehicle,
-        learning=_learning(learning or {}),
+        learning=_learning({**method.learning, **(learning or {})}),
         hallucination=DEFAULT_MIXTURE if hallucination is None else mixture_of(hallucination),
         candidates=max(base.candidates, kept) if candidates is None else candidates,
         continual=continual or base.continual,
+        as_published=method.as_published,
     )
     names = settings.class_names
     twice = sorted({name for name in names if names.count(name) > 1} | ({COMBINED} & set(names)))

@@ -34,10 +34,18 @@ ASSISTS: Final = (
     Assist("open", 5, "encoder"),
     Assist("fresh", 0),  # a control: no memory, a guide made on the spot
 )
-ABLATION: Final = (  # plans drawn blindly; the first two are the paper's
+PUBLISHED_ASSISTS: Final = (
+    Assist("closed", 1, "centroid"),
+    Assist("closed", 5, "centroid"),
+    Assist("published-open", 1, "centroid"),
+    Assist("published-open", 5, "centroid"),
+)
+ABLATION: Final = (  # plans drawn blindly, for runs that have the same assist with plans recalled
     Assist("random-open", 1),
     Assist("random-open", 5),
     Assist("random-repair", 5),
+    Assist("random-published-open", 1),
+    Assist("random-published-open", 5),
 )
 COLLECTOR: Final = "lattice"  # its plans drive shortest, and polish makes them clear of obstacles
 ABLATION_PLANNER: Final = "gust"
@@ -59,7 +67,9 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "continual": "none",
     "learned": "",
     "retraining": None,
+    "as_published": False,
 }
+_LATER_IN_LEARNING: Final = ("own_anchors", "batch", "weight_decay", "network")
 
 VERSION: Final = 2  # of the JSON; in the first, which has no number, ``encoder`` was called ``centroid``
 _DIGESTED: Final = {
@@ -94,6 +104,7 @@ class RunSettings:
     learned: str = ""  # a snapshot of experiences gained on the job: more candidates
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
     retraining: Retraining | None = None  # what it begins from, if it is one
+    as_published: bool = False  # plans stay as they were found; no problems but those made around them
 
     @property
     def wanted(self) -> int:
@@ -119,6 +130,12 @@ class RunSettings:
         return [class_name, COMBINED] if self.combined else [class_name]
 
     @property
+    def ablation(self) -> list[Assist]:
+        """Plans drawn blindly, for each assist that is measured with plans recalled."""
+        recalled = {assist.name for assist in self.assists}
+        return [each for each in ABLATION if each.name.removeprefix("random-") in recalled]
+
+    @property
     def taught(self) -> int:
         """How many experiences of a class, the first ones, encoders are taught."""
         return min(self.experiences, TAUGHT)
@@ -137,6 +154,9 @@ class RunSettings:
         for name, default in _LATER.items():  # so that runs from before a field was added keep their names
             if values.get(name) == default:
                 del values[name]
+        for name in _LATER_IN_LEARNING if "learning" in values else ():
+            if values["learning"][name] == _LATER["learning"][name]:
+                del values["learning"][name]
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
 
     @property

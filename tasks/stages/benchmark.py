@@ -11,7 +11,7 @@ from tasks.attempts.side_by_side import Contestant, side_by_side
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import source_key, source_of
-from tasks.settings.run_settings import ABLATION, ABLATION_PLANNER, UNASSISTED, RunSettings
+from tasks.settings.run_settings import ABLATION_PLANNER, UNASSISTED, RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
 
 CHUNK_PROBLEMS: Final = 100  # some 10 s of work
@@ -27,7 +27,7 @@ def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
             assists = [each for each in settings.assists if each not in alone]
             everyone += [Contestant(planner, assist, memory, run) for assist in assists]
         if planner == ABLATION_PLANNER:
-            everyone += [Contestant(planner, assist, class_name, run) for assist in ABLATION]
+            everyone += [Contestant(planner, assist, class_name, run) for assist in settings.ablation]
     return everyone
 
 

@@ -55,7 +55,8 @@ def collect_chunk(chunk: Chunk) -> Collected:
     for index in range(chunk.first, chunk.last):
         problem = source.problem("collect", index)
         attempt = solve(problem, planner, seed=seed, vehicle=vehicle, workspace=workspace)
-        attempt = _polished(problem, attempt, vehicle, workspace)
+        if not chunk.settings.as_published:
+            attempt = _polished(problem, attempt, vehicle, workspace)
         if attempt.plan is not None:
             check_attempt(problem, attempt, set(), vehicle)
             experiences.append(Experience(problem, attempt.plan, vehicle))
@@ -88,7 +89,7 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     """As many problems as are needed to solve enough of them, judging by the chunks that are done."""
     source = source_of(data, settings, name)
     size = max(SMALLEST_CHUNK, min(LARGEST_CHUNK, settings.wanted // 10))
-    inputs = [settings.seed, settings.collector, *source_key(settings, name)]
+    inputs = [settings.seed, settings.collector, settings.as_published, *source_key(settings, name)]
     results: list[Collected] = []
     while True:
         cut = Cut(_problems_to_try(settings, name, source, size, results), size, inputs)

@@ -14,7 +14,7 @@ from planners.memory.hallucination.no_plan import no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans
-from planners.world.arrays import Integers
+from planners.world.arrays import Bounds, Integers
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from storage.archives.hallucinators import load_hallucinator
@@ -28,7 +28,7 @@ from storage.tables.hallucinated import (
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of
-from tasks.inputs.problem_sources import source_key, source_of
+from tasks.inputs.problem_sources import Source, source_key, source_of
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.keep_experiences import experiences_key
@@ -56,7 +56,7 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
     """Make problems for a range of experiences, problems that no plan solves, and ordinary ones of the class.
 
     Ordinary problems are like those that a robot meets. They are labelled like the others, so the encoder
-    learns from them which plans are free there.
+    learns from them which plans are free there. By the paper's method there are only the first.
     """
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
@@ -78,19 +78,34 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
             ]
         problems += around_plan
     made_for = np.repeat(np.arange(chunk.first, chunk.last), settings.problems_per_experience)
+    if not settings.as_published:
+        problems += problems_for_none(chunk, source, sweeps, experiences[0].problem.bounds)
+    for_none = np.full(len(problems) - len(made_for), -1)
+    write_labelled(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
+    return Hallucinated(len(problems), len(copied), len(chunk_experiences))
+
+
+def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: Bounds) -> list[MadeProblem]:
+    """A chunk's share of the problems that no plan solves, and of those that the class gives as they come.
+
+    Args:
+        chunk: the chunk.
+        source: of problems of the class.
+        sweeps: the plans that are taught.
+        bounds: x_min, y_min, x_max, y_max in metres.
+
+    """
+    settings, name = chunk.settings, chunk.class_name
+    problems: list[MadeProblem] = []
     share = NO_PLAN_SHARE * settings.problems_per_experience
     first, last = round(share * chunk.first), round(share * chunk.last)
     for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
-        unsolved = no_plan(sweeps, source.draw, rng, name, index, experiences[0].problem.bounds)
-        problems.append((unsolved, NO_PLAN))
+        problems.append((no_plan(sweeps, source.draw, rng, name, index, bounds), NO_PLAN))
     wanted = round(DRAWN_SHARE * settings.taught * settings.problems_per_experience)
     drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
     first, last = (drawn * i // settings.taught for i in (chunk.first, chunk.last))
-    problems += [(source.problem("collect", index), DRAWN) for index in range(first, last)]
-    for_none = np.full(len(problems) - len(made_for), -1)
-    write_labelled(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
-    return Hallucinated(len(problems), len(copied), len(chunk_experiences))
+    return problems + [(source.problem("collect", index), DRAWN) for index in range(first, last)]
 
 
 def identity_of(experience: Experience) -> Identity:
@@ -183,7 +198,7 @@ def plans_at_once(settings: RunSettings) -> int:
 
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:
-    inputs = [*_inputs(settings, name), experiences_key(data, settings, name)]
+    inputs = [*_inputs(settings, name), settings.as_published, experiences_key(data, settings, name)]
     return Cut(settings.taught, plans_at_once(settings), inputs)
 
 

@@ -18,7 +18,10 @@ MAX_IMAGE_BYTES: Final = 700_000  # an artifact is one row in the server's datab
 
 
 def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
-    """Publish a link to the report, its summary, the verdicts on the claims, and each figure as an image."""
+    """Publish a link to the report, its summary, the verdicts on the claims, and each figure as an image.
+
+    ``claims``: by every method that judges them.
+    """
     from prefect.artifacts import (
         create_image_artifact,
         create_link_artifact,

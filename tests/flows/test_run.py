@@ -21,7 +21,8 @@ from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder
 from storage.tables.recalls import read_recalls
 from tasks.reports.stage_times import stages_of
-from tasks.settings.run_settings import ABLATION, ASSISTS
+from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import ASSISTS
 from tests.flows.same_rows import assert_same_rows, rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -68,7 +69,7 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
         "problem_id"
     ].nunique()
     assert (asked == 6).all()
-    assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(ABLATION))
+    assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(for_preset("smoke").ablation))
     counts = Counter(rows["memory"].fillna("none"))
     assert counts == {"none": 72, "random": 144, "trap": 144, "combined": 252}
     assert rows.loc[rows["solved"], "verified"].all()

@@ -76,15 +76,17 @@ class Triplet:
     The anchor a and the similar s share a plan: s was made for it, and it is free in a. In the dissimilar d
     that plan is blocked (paper, III-C), and so is d's own plan, if it has one, in a: recall needs a to be
     nearer to the centroid of s than to that of d. If ``semi_hard`` is set, only those d count that are
-    farther than s, but by less than the margin (Schroff, Kalenichenko and Philbin 2015).
+    farther than s, but by less than the margin (Schroff, Kalenichenko and Philbin 2015). With ``own_anchors``
+    the anchor was made for the plan, too, and nothing is asked of d's own plan: exactly the paper's triplets.
     """
 
     by_cells = False
     dropout = 0.0
 
-    def __init__(self, margin: float, semi_hard: bool = False) -> None:
+    def __init__(self, margin: float, semi_hard: bool = False, own_anchors: bool = False) -> None:
         self.margin = margin
         self.semi_hard = semi_hard
+        self.own_anchors = own_anchors
 
     def initial(self, rows: int, dimensions: int, rng: np.random.Generator) -> Weights:
         """Return no parameters."""
@@ -103,8 +105,13 @@ class Triplet:
         # whether the plan that the problem of the column was made for is free in the problem of the row
         free = targets[:, rows.clamp(min=0)] & (rows >= 0)
         others = ~torch.eye(len(rows), dtype=torch.bool, device=rows.device)
-        anchors, similar = (free & others).nonzero(as_tuple=True)
-        dissimilar = ~free[anchors] & ~free[:, similar].T
+        if self.own_anchors:
+            same_plan = (rows[:, None] == rows) & (rows >= 0)
+            anchors, similar = (same_plan & others).nonzero(as_tuple=True)
+            dissimilar = ~free[:, similar].T
+        else:
+            anchors, similar = (free & others).nonzero(as_tuple=True)
+            dissimilar = ~free[anchors] & ~free[:, similar].T
         excess = distances[anchors, similar][:, None] - distances[anchors]
         if self.semi_hard:
             dissimilar &= (excess < 0.0) & (excess > -self.margin)

@@ -40,6 +40,7 @@ class TrainingSettings:
     by_cells: bool = True  # label objective: what blocked cells tell is known, and not learned
     margin: float = 1.0  # triplet objective
     semi_hard: bool = False  # triplet objective: count only semi-hard triplets
+    own_anchors: bool = False  # triplet objective: anchors, too, were made for the plan, as published
     architecture: Architecture = field(default_factory=Architecture)
     held_out_share: float = 0.1  # of the problems, to measure recall with; training never sees them
     validation_share: float = 0.05  # of the problems, to choose the best epoch and the best seed with
@@ -214,7 +215,7 @@ def _objective(settings: TrainingSettings, epoch: int) -> Objective:
     if settings.objective == "labels":
         left = 1.0 - (1.0 - ORIGIN_LEFT) * epoch / max(1, settings.epochs - 1)
         return Labels(settings.first_weight, left * settings.origin_weight, settings.by_cells)
-    return Triplet(settings.margin, settings.semi_hard)
+    return Triplet(settings.margin, settings.semi_hard, settings.own_anchors)
 
 
 def _is_tired(history: list[Epoch], patience: int) -> bool:

@@ -16,9 +16,10 @@ from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_ret
 from dashboards.verdicts.claim_rules import FAILS, HOLDS, OPEN, Claim
 
 CLAIMS = [
-    Claim("Memory is <b>fast</b>.", "abstract", "rule & reason", "89 %", verdict)
+    Claim("Memory is <b>fast</b>.", "abstract", "rule & reason", "89 %", verdict, "our defaults")
     for verdict in (HOLDS, FAILS, OPEN)
 ]
+OTHERS = [claim._replace(method="the other way", verdict=HOLDS, ours="91 %") for claim in CLAIMS]
 
 
 class Reader(HTMLParser):
@@ -57,6 +58,7 @@ def html(
         retrieval=summarise_retrieval(retrieval_curve(recall_rows)),
         endings=endings(attempt_rows),
         claims=CLAIMS,
+        others=OTHERS,
         pictures=[Picture(png, "as PNG"), Picture(svg, "as SVG")],
         made={"Settings": {"seed": "1 < 2"}},
     )  # fmt: skip
@@ -80,7 +82,9 @@ def test_the_page_holds_every_table_claim_and_setting(html: str, attempt_rows: p
         assert panel in html
         assert f">{planner}</td><td" in html
         assert f">{label}</td>" in html
-    assert "1 holds, 1 does not hold, 1 cannot be compared" in html
+    assert "By our defaults: 1 holds, 1 does not hold, 1 cannot be compared." in html
+    assert "By the other way: 3 holds, 0 does not hold, 0 cannot be compared. 2 verdicts differ." in html
+    assert html.count("by our defaults: 89 %") == html.count("by the other way: 91 %") == 3
     assert "oracle" in html
     assert "budget-spent" in html
 

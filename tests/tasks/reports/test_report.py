@@ -8,15 +8,18 @@ from typing import Final
 import pandas as pd
 import pytest
 
+from dashboards.verdicts.evidence import PRODUCT, PUBLISHED
 from storage.errors import StorageError
 from storage.places.data_folder import open_data_folder
 from storage.places.files import write_json
 from storage.tables.attempts import read_attempts, write_attempts
 from tasks.fan_out.chunk import keep_settings
-from tasks.reports.report import check_verified, continual_rows
+from tasks.reports import report
+from tasks.reports.report import check_verified, claims_by_other, continual_rows
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import COMBINED, RunSettings
+from tests.dashboards.synthetic import recalls
 from tests.storage.tables.test_tables import ATTEMPT
 
 SETTINGS: Final = for_preset("laptop", continual="paper")
@@ -50,6 +53,22 @@ def test_no_report_is_made_of_plans_that_the_authority_did_not_accept(tmp_path: 
         check_verified(read_attempts(tmp_path / "wrong.parquet"))
 
 
+def test_claims_are_judged_a_second_time_by_the_largest_run_of_the_other_method(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(report, "_recall_rows", lambda data, settings: recalls())
+    ours, theirs = for_preset("laptop"), for_preset("paper-method-laptop")
+    measure(tmp_path, ours)
+    assert claims_by_other(str(tmp_path), ours) == []
+    for other in (replace(theirs, test_problems=9), theirs, replace(theirs, seed=2, test_problems=10**6)):
+        measure(tmp_path, other)
+        run = open_data_folder(tmp_path).run(other.run_name)
+        problem = {**ATTEMPT, "assist": "published-open", "recall": "centroid", "problem_class": "trap"}
+        write_attempts(run.shard("results", "trap", 1), [problem] if other == theirs else [])
+    assert {claim.method for claim in claims_by_other(str(tmp_path), ours)} == {PUBLISHED}
+    assert {claim.method for claim in claims_by_other(str(tmp_path), theirs)} == {PRODUCT}
+
+
 def test_growing_experience_is_that_of_the_planners_and_classes_that_several_runs_measured(
     tmp_path: Path,
 ) -> None:
@@ -68,7 +87,7 @@ def test_growing_experience_of_all_that_a_run_measures(tmp_path: Path) -> None:
         measure(tmp_path, each)
     rows = grown(tmp_path, settings)
     assert (rows.groupby(["problem_class", "planner"])["experiences"].nunique() == 5).all()
-    assert len(rows) == 5 * 9
+    assert len(rows) == 5 * len(SETTINGS.classes) * len(SETTINGS.planners)
 
 
 @pytest.mark.parametrize("other", [{"seed": 2}, {"difficulty": "hard"}, {"objective": "triplet"}, {}])

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.memory.encoder.encoder import Architecture
 from tasks.settings.encoder_training import Learning
 from tasks.settings.errors import UsageError
 from tasks.settings.presets import PRESETS, for_preset
@@ -40,6 +41,7 @@ SETTINGS = st.builds(
     combined=st.booleans(),
     strict=st.booleans(),
     vehicle=st.sampled_from(["car", "differential-drive", "car-1-trailer"]),
+    as_published=st.booleans(),
     learned=st.sampled_from(["", "monday-12345678"]),
     retraining=st.none()
     | st.builds(
@@ -54,6 +56,7 @@ SETTINGS = st.builds(
         seeds=st.integers(1, 3),
         semi_hard=st.booleans(),
         hidden=st.lists(st.integers(1, 200), max_size=2).map(tuple),
+        network=st.sampled_from(["patches", "pooled"]),
     ),
     hallucination=st.dictionaries(st.sampled_from(["minimal", "maximal"]), st.floats(0.1, 1.0)).map(
         lambda shares: tuple(shares.items())
@@ -105,7 +108,7 @@ def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_nam
     settings = for_preset("smoke")
     values = _first_version(settings)
     del values["vehicle"], values["learning"], values["hallucination"]
-    del values["learned"], values["retraining"]
+    del values["learned"], values["retraining"], values["as_published"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"], values["continual"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
@@ -116,6 +119,34 @@ def test_settings_that_chose_whether_plans_are_optimised_still_read() -> None:
     settings = for_preset("smoke")
     values = json.loads(settings.to_json()) | {"optimised": True}
     assert RunSettings.from_json(json.dumps(values)) == settings
+
+
+def test_runs_that_set_the_learning_rate_before_there_was_a_network_keep_their_name() -> None:
+    settings = for_preset("smoke", learning={"learning_rate": 0.01})
+    values = _first_version(settings)
+    for name in ("network", "batch", "weight_decay", "own_anchors"):
+        del values["learning"][name]
+    assert RunSettings.from_json(json.dumps(values)) == settings
+    for name in ("vehicle", "hallucination", "learned", "retraining", "strict", "continual"):
+        del values[name]
+    del values["as_published"]
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
+    assert settings.run_name == f"smoke-labels-{digest}"
+
+
+def test_the_papers_method_differs_in_plans_problems_network_objective_recall_and_open_box() -> None:
+    for preset in ("paper-method", "paper-method-laptop"):
+        settings = for_preset(preset)
+        training = settings.learning.settings(settings.objective, settings.epochs, settings.seed)
+        assert settings.wanted == settings.experiences == 100
+        assert settings.as_published
+        assert training.objective == "triplet"
+        assert training.architecture == Architecture((8, 16, 32), (128, 64), 30, "pooled")
+        assert {assist.recall for assist in settings.assists} == {"centroid"}
+        uses = {assist.name for assist in (*settings.assists, *settings.ablation)}
+        assert uses == {"closed", "published-open", "random-published-open"}
+        assert for_preset(preset, experiences=6).wanted == 6
+        assert for_preset(preset, learning={"batch": 8}).learning == replace(settings.learning, batch=8)
 
 
 def test_nearest_centroids_are_not_what_was_once_called_centroid() -> None:
@@ -139,7 +170,10 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"preset": "huge"}, "Unknown preset 'huge'. Known: smoke, laptop, paper."),
+        (
+            {"preset": "huge"},
+            "Unknown preset 'huge'. Known: smoke, laptop, paper, paper-method, paper-method-laptop.",
+        ),
         ({"classes": ["maze"]}, "Unknown class 'maze'. Known: curves, random, trap."),
         ({"classes": []}, "No class to work on. Name some of: curves, random, trap."),
         ({"planners": ["prm"]}, "Unknown planner 'prm'. Known: rrt, gust, follow, lattice."),

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from planners.memory.hallucination.mixture import METHODS
+from planners.solve import solve
 from storage.errors import StorageError
+from storage.tables.experiences import read_experiences
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, read_methods
 from tasks.fan_out.chunk import run_folder
 from tasks.settings.presets import for_preset
+from tasks.settings.run_settings import DEFAULT_MIXTURE
 from tasks.stages import hallucinate
 from tasks.stages.hallucinate import HALLUCINATE, hallucinate_chunk
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION, learn_chunk
@@ -70,6 +73,19 @@ def test_training_again_gives_the_same_bytes(data: Path) -> None:
     learn_chunk(chunk)
     assert {path.name: path.read_bytes() for path in place.iterdir()} == before
     assert {"hallucinator.json", "weights.safetensors"} == set(before)
+
+
+def test_the_papers_method_has_plans_as_they_were_found_and_the_problems_around_them(data: Path) -> None:
+    settings = replace(SETTINGS, hallucination=DEFAULT_MIXTURE, as_published=True, candidates=0)
+    collect(str(data), settings)
+    run_stage(HALLUCINATE, str(data), settings)
+    run = run_folder(str(data), settings)
+    made_for = read_labelled(run.shards("hallucinated", "trap")).plan_index
+    assert Counter(made_for.tolist()) == dict.fromkeys(range(6), 12)
+    for experience in read_experiences(run.experiences("trap")):
+        found = solve(experience.problem, settings.collector, seed=settings.seed).plan
+        assert found is not None
+        np.testing.assert_array_equal(experience.plan.states, found.states)
 
 
 def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from planners.memory.encoder.objectives import BIASES, VECTORS, Labels, Triplet
 from planners.memory.encoder.splits import first_of_each, split
 from planners.memory.encoder.training import OBJECTIVES, TrainingSettings, hit_rate
 from planners.world.randomness import generator
+from tasks.settings.presets import for_preset
 
 PLANS = 6
 SMALL = Architecture(channels=(4, 8), hidden=(32,), dimensions=12)
@@ -140,6 +142,33 @@ def test_the_triplet_loss_is_the_mean_over_checked_triplets(seed):
         losses = [max(s - d + 1.0, 0.0) for s, d in counted]
         loss = Triplet(1.0, semi_hard).loss({}, *given)
         assert float(loss) == pytest.approx(np.mean(losses) if losses else 0.0, abs=1e-6)
+
+
+@given(seed=st.integers(0, 1000))
+def test_published_triplets_are_two_problems_of_a_plan_and_one_that_it_does_not_solve(seed):
+    _, plan_index, labels = problems(12, seed)
+    embeddings = generator(seed).standard_normal((12, 5))
+    targets = np.concatenate([~labels.any(1, keepdims=True), labels], 1)
+    rows = plan_index.astype(np.int64) + 1  # 0: no plan solves it
+    distances = np.linalg.norm(embeddings[:, None] - embeddings[None], axis=2)
+    losses = [
+        max(distances[a, s] - distances[a, d] + 1.0, 0.0)
+        for a, s, d in itertools.product(range(12), repeat=3)
+        if a != s and rows[a] == rows[s] and not targets[d, rows[a]]
+    ]
+    given = (torch.from_numpy(array) for array in (embeddings, rows, targets))
+    loss = Triplet(1.0, own_anchors=True).loss({}, *given)
+    assert float(loss) == pytest.approx(np.mean(losses) if losses else 0.0, abs=1e-6)
+
+
+def test_the_published_training_gives_equal_encoders_for_equal_seeds():
+    bits, plan_index, labels = problems(300)
+    published = for_preset("paper-method").learning.settings("triplet", 2, 7)
+    around = plan_index >= 0
+    one, other = (train(bits[around], plan_index[around], labels[around], published) for _ in range(2))
+    assert all((weight == other.weights[name]).all() for name, weight in one.weights.items())
+    assert (one.centroids == other.centroids).all()
+    assert np.isinf(one.centroids[0]).all()  # no problems that no plan solves: nothing is ever nearest
 
 
 @given(seed=st.integers(0, 1000))
