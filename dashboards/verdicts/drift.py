@@ -1,8 +1,9 @@
-"""Whether a memory still fits the problems it gets: hits and planning times beside those of its benchmark.
+"""Whether a memory still fits the problems it gets: hits and total times beside those of its benchmark.
 
-A hit is a problem that a recalled plan answers as it is. Hits have fallen if, at the benchmark's rate, so few
-would come in at most one case of a thousand (Fisher's exact test, one-sided): rare enough for a retraining
-that nobody asked for.
+A hit is a problem that a recalled plan answers as it is; the total time is that of planning and driving, of
+the problems that were solved. A memory has drifted if its hits have fallen so far (Fisher's exact test,
+one-sided), or its total times have risen so far (Welch's test, one-sided), as they would in at most one case
+of a thousand if all were as in the benchmark: rare enough for a retraining that nobody asked for.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
-from scipy.stats import fisher_exact
+from scipy.stats import fisher_exact, ttest_ind_from_stats
 
+from planners.world.arrays import Floats
 from storage.tables.configurations import configured
 
-SIGNIFICANCE: Final = 0.001
+SIGNIFICANCE: Final = 0.001  # of both tests together
 FEWEST: Final = 20  # problems; fewer never count as a fall
 
 
@@ -29,6 +31,9 @@ class Usefulness:
     hits: int  # problems that a recalled plan answered
     mean_ms: float
     median_ms: float
+    solved: int = 0  # problems that the total times are of; benchmarks of earlier versions know none
+    total_s: float = 0.0  # mean of planning and driving
+    total_sd_s: float = 0.0  # its standard deviation over problems
 
     @property
     def hit_rate(self) -> float:
@@ -45,16 +50,27 @@ class Drift:
     now: Usefulness
     then: Usefulness
     p_value: float  # of so few hits by chance
+    later_p_value: float  # of so long total times by chance
 
     @property
     def has_fallen(self) -> bool:
         """Whether hits are significantly fewer than in the benchmark."""
-        return self.now.problems >= FEWEST and self.p_value < SIGNIFICANCE
+        return self.now.problems >= FEWEST and self.p_value < SIGNIFICANCE / 2
+
+    @property
+    def is_later(self) -> bool:
+        """Whether planning and driving take significantly longer than in the benchmark."""
+        return self.now.solved >= FEWEST and self.later_p_value < SIGNIFICANCE / 2
+
+    @property
+    def has_drifted(self) -> bool:
+        """Whether hits have fallen or total times have risen."""
+        return self.has_fallen or self.is_later
 
     def to_json(self) -> dict[str, Any]:
         """The fields as JSON values, for an event."""
         rates = {"hit_rate": self.now.hit_rate, "benchmark_hit_rate": self.then.hit_rate}
-        return asdict(self) | rates | {"has_fallen": self.has_fallen}
+        return asdict(self) | rates | {"has_fallen": self.has_fallen, "is_later": self.is_later}
 
     def to_row(self) -> dict[str, Any]:
         """The row of ``storage.tables.schemas.WATCHED``, without its time."""
@@ -64,14 +80,24 @@ class Drift:
             "problems": now.problems, "hits": now.hits, "mean_ms": now.mean_ms,
             "benchmark_problems": then.problems, "benchmark_hits": then.hits,
             "benchmark_mean_ms": then.mean_ms, "p_value": self.p_value, "has_fallen": self.has_fallen,
+            "total_s": now.total_s if now.solved else None,
+            "benchmark_total_s": then.total_s if then.solved else None,
+            "later_p_value": self.later_p_value, "is_later": self.is_later,
         }  # fmt: skip
 
     def __str__(self) -> str:
         verdict = "fallen" if self.has_fallen else "as it was"
+        total = ""
+        if self.now.solved and self.then.solved:
+            later = "later" if self.is_later else "as it was"
+            total = (
+                f"; planning and driving {self.now.total_s:.1f} s, {self.then.total_s:.1f} then ({later}, "
+                f"p = {self.later_p_value:.2g})"
+            )
         return (
             f"{self.memory}, {self.configuration}: {100 * self.now.hit_rate:.1f} % hits, "
             f"{100 * self.then.hit_rate:.1f} in its benchmark ({verdict}, p = {self.p_value:.2g}); "
-            f"mean {self.now.mean_ms:.2f} ms, {self.then.mean_ms:.2f} then"
+            f"mean {self.now.mean_ms:.2f} ms, {self.then.mean_ms:.2f} then{total}"
         )
 
 
@@ -80,21 +106,35 @@ def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
     rows, _ = configured(attempts)
     by_name = {}
     for (planner, configuration), of_both in rows.groupby(["planner", "configuration"], observed=True):
-        milliseconds = 1e3 * of_both["planning_seconds"].to_numpy(float)
-        by_name[f"{planner} {configuration}"] = Usefulness(
-            problems=len(of_both),
-            hits=int((of_both["source"] == "recalled").sum()),
-            mean_ms=float(milliseconds.mean()),
-            median_ms=float(pd.Series(milliseconds).median()),
-        )
+        hits = int((of_both["source"] == "recalled").sum())
+        times = [of_both[column].to_numpy(float) for column in ("planning_seconds", "duration_s")]
+        by_name[f"{planner} {configuration}"] = usefulness_of(hits, *times)
     return by_name
+
+
+def usefulness_of(hits: int, planning: Floats, driving: Floats) -> Usefulness:
+    """How useful a memory was in ``n`` problems.
+
+    ``hits``: problems that a recalled plan answered. ``planning [n]``: seconds. ``driving [n]``: seconds, NaN
+    where no plan was found.
+    """
+    total = (planning + driving)[~np.isnan(driving)]
+    return Usefulness(
+        problems=len(planning),
+        hits=hits,
+        mean_ms=1e3 * float(planning.mean()),
+        median_ms=1e3 * float(np.median(planning)),
+        solved=len(total),
+        total_s=float(total.mean()) if len(total) else 0.0,
+        total_sd_s=float(total.std(ddof=1)) if len(total) > 1 else 0.0,
+    )
 
 
 def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Usefulness]) -> Sequence[Drift]:
     """The drift of a ``memory`` in each planner and configuration that is in both ``now`` and ``then``."""
     return [
-        Drift(memory, name, now[name], then[name], _fewer(now[name], then[name]))
-        for name in now
+        Drift(memory, name, mine, then[name], _fewer(mine, then[name]), _later(mine, then[name]))
+        for name, mine in now.items()
         if name in then
     ]
 
@@ -102,3 +142,16 @@ def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Useful
 def _fewer(now: Usefulness, then: Usefulness) -> float:
     table = np.array([[each.hits, each.problems - each.hits] for each in (now, then)])
     return float(fisher_exact(table, alternative="less").pvalue)
+
+
+def _later(now: Usefulness, then: Usefulness) -> float:
+    """P-value of total times as long as ``now`` by chance; 1 if there is nothing to go by."""
+    if min(now.solved, then.solved) < 2 or now.total_sd_s == then.total_sd_s == 0.0:
+        return 1.0
+    found = ttest_ind_from_stats(
+        *(now.total_s, now.total_sd_s, now.solved),
+        *(then.total_s, then.total_sd_s, then.solved),
+        equal_var=False,
+        alternative="greater",
+    )
+    return float(found.pvalue)

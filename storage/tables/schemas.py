@@ -138,7 +138,15 @@ WATCHED: Final = _schema(
         ("benchmark_mean_ms", pa.float64()),
         ("p_value", pa.float64()),  # of so few hits by chance
         ("has_fallen", pa.bool_()),
+        (
+            "total_s",
+            pa.float64(),
+        ),  # mean of planning and driving where solved; null: not known
+        ("benchmark_total_s", pa.float64()),
+        ("later_p_value", pa.float64()),  # of so long total times by chance
+        ("is_later", pa.bool_()),
     ],
+    optional=("total_s", "benchmark_total_s", "later_p_value", "is_later"),
 )
 
 

@@ -34,5 +34,5 @@ def read_watched(folder: Path) -> tuple[pd.DataFrame, list[str]]:
             tables.append(read_table(path, WATCHED))
         except StorageError as error:
             faults.append(str(error))
-    rows: pd.DataFrame = pa.concat_tables(tables, promote_options="none").to_pandas()
+    rows: pd.DataFrame = pa.concat_tables(tables, promote_options="default").to_pandas()
     return rows.sort_values("at", kind="stable", ignore_index=True), faults

@@ -1,7 +1,8 @@
 """Compare what a memory answers at work with its benchmark, and send Prefect events about it.
 
-``motion-memory.solved`` is sent after every file of problems; ``motion-memory.drift`` too, if hits fell.
-They go to the server at PREFECT_API_URL, or to the one that ``motion-memory serve`` runs for a data folder.
+``motion-memory.solved`` is sent after every file of problems; ``motion-memory.drift`` too, if hits fell or
+total times rose. They go to the server at PREFECT_API_URL, or to the one that ``motion-memory serve`` runs
+for a data folder.
 """
 
 from __future__ import annotations
@@ -116,17 +117,17 @@ def report_drift(
     comparisons = drifts(memory.name, now, memory.benchmark)
     lines = [str(drift) for drift in comparisons]
     lines += _store(memory.data_folder, comparisons)
-    any_fallen = any(drift.has_fallen for drift in comparisons)
+    any_drifted = any(drift.has_drifted for drift in comparisons)
     server = _server([data, default_data()]) if comparisons else None
     if server is None:
-        return lines + ["no Prefect server got the event: `motion-memory serve` runs one"] * any_fallen
+        return lines + ["no Prefect server got the event: `motion-memory serve` runs one"] * any_drifted
     url = server["PREFECT_API_URL"]
     try:
         _send(server, comparisons)
     except Exception as error:  # whatever fails in Prefect, the problems are solved
         reason = (str(error) or type(error).__name__).splitlines()[0]
         return [*lines, f"Prefect at {url} did not get the events: {reason}"]
-    return lines + [f"event {DRIFT} sent to {url}"] * any_fallen
+    return lines + [f"event {DRIFT} sent to {url}"] * any_drifted
 
 
 def _store(data_folder: Path, comparisons: Sequence[Drift]) -> list[str]:
@@ -174,7 +175,7 @@ def _send(server: Mapping[str, str], comparisons: Sequence[Drift]) -> None:
         async with PrefectEventsClient(reconnection_attempts=1) as client:
             for drift in comparisons:
                 await client.emit(event(SOLVED, drift))
-                if drift.has_fallen:
+                if drift.has_drifted:
                     await client.emit(event(DRIFT, drift))
 
     with temporary_settings(server):

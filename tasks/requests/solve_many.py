@@ -42,10 +42,11 @@ FEW_PARTS: Final = 2  # solving so many here takes less time than starting a ser
 
 
 class Tally(NamedTuple):
-    """Counts and times of all problems; these take 16 bytes of memory for each problem."""
+    """Counts and times of all problems; these take 24 bytes of memory for each problem."""
 
     outcomes: Counter[str]  # problems by the source of their plan, or by the status of a failure, in brackets
     seconds: Floats  # [n] planning times
+    driving: Floats  # [n] driving times, NaN where no plan was found
     repeated_id: str | None  # a message about an id that occurs twice, or None
 
 
@@ -141,15 +142,19 @@ def _malformed(faults: Sequence[str]) -> StorageError:
 
 def _tally(parts: Sequence[FilePart]) -> Tally:
     outcomes: Counter[str] = Counter()
-    seconds, id_hashes = [], []
+    seconds, driving, id_hashes = [], [], []
     for part in parts:
-        rows = attempt_columns(part.shard, ["problem_id", "status", "source", "planning_seconds"])
+        rows = attempt_columns(
+            part.shard, ["problem_id", "status", "source", "planning_seconds", "duration_s"]
+        )
         outcomes.update(
             source or f"({status})" for source, status in zip(rows["source"], rows["status"], strict=True)
         )
         seconds.append(np.array(rows["planning_seconds"]))
+        driving.append(np.array(rows["duration_s"], float))
         id_hashes.append(np.array([hash(identity) for identity in rows["problem_id"]]))
-    return Tally(outcomes, np.concatenate(seconds), _repeated_id(parts, np.concatenate(id_hashes)))
+    repeated_id = _repeated_id(parts, np.concatenate(id_hashes))
+    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving), repeated_id)
 
 
 def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
@@ -162,14 +167,13 @@ def _print_drift(memory: BenchmarkedMemory, request: SolveRequest, tally: Tally)
     """Compare the memory with its benchmark; all rows are of one planner and configuration."""
     import pandas as pd
 
-    from dashboards.verdicts.drift import Usefulness
+    from dashboards.verdicts.drift import usefulness_of
     from storage.tables.configurations import configured
     from tasks.champions.drift_watch import report_drift
 
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
-    times = 1e3 * tally.seconds
-    now = Usefulness(len(times), tally.outcomes["recalled"], float(times.mean()), float(np.median(times)))
+    now = usefulness_of(tally.outcomes["recalled"], tally.seconds, tally.driving)
     for line in report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn):
         print(f"watched  {line}")
 

@@ -1,4 +1,4 @@
-"""Drift: told when hits have fallen, and never of what chance does."""
+"""Drift: told when hits have fallen or robots are there later, and never of what chance does."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dashboards.verdicts.drift import Usefulness, drifts, usefulness
+from dashboards.verdicts.drift import Usefulness, drifts, usefulness, usefulness_of
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import attempts
 
-THEN = Usefulness(problems=1_000, hits=800, mean_ms=1.0, median_ms=0.1)
+THEN = Usefulness(1_000, hits=800, mean_ms=1.0, median_ms=0.1, solved=990, total_s=21.0, total_sd_s=2.0)
 NAME = "gust open 5 exhaustive"
 
 
@@ -41,6 +41,38 @@ def test_chance_hardly_ever_is_a_drift() -> None:
     assert sum(_fallen(200, int(hits)) for hits in drawn) <= 8  # 2 are expected at most
 
 
+@pytest.mark.parametrize(
+    ("solved", "total_s", "drifted"),
+    [(200, 21.0, False), (200, 20.0, False), (200, 21.3, False), (200, 22.0, True), (10, 30.0, False)],
+)
+def test_a_memory_has_drifted_where_planning_and_driving_take_significantly_longer(
+    solved: int, total_s: float, drifted: bool
+) -> None:
+    now = replace(THEN, problems=solved, hits=4 * solved // 5, mean_ms=0.1, solved=solved, total_s=total_s)
+    (found,) = drifts("trap/2", {NAME: now}, {NAME: THEN})
+    assert not found.has_fallen
+    assert (found.is_later, found.has_drifted) == (drifted, drifted)
+
+
+def test_a_benchmark_of_an_earlier_version_says_nothing_of_driving() -> None:
+    then = Usefulness(problems=1_000, hits=800, mean_ms=1.0, median_ms=0.1)
+    (found,) = drifts("trap/2", {NAME: replace(THEN, total_s=90.0)}, {NAME: then})
+    assert not found.has_drifted
+    assert "driving" not in str(found)
+    assert found.to_row()["benchmark_total_s"] is None
+
+
+def test_chance_hardly_ever_is_later() -> None:
+    rng = np.random.default_rng(2)
+    later = 0
+    for _ in range(1_000):
+        driving = 18.0 + rng.lognormal(1.0, 0.6, 100)  # skewed as driving times are
+        now = usefulness_of(80, np.full(100, 1e-3), driving)
+        then = usefulness_of(800, np.full(1_000, 1e-3), 18.0 + rng.lognormal(1.0, 0.6, 1_000))
+        later += drifts("trap/2", {NAME: now}, {NAME: then})[0].has_drifted
+    assert later <= 6  # one is expected
+
+
 def test_only_configurations_that_both_know_are_compared() -> None:
     rows = attempts(("trap",), ("gust", "rrt"), [Configuration("open", "exhaustive", 5)], problems=30)
     known = usefulness(rows)
@@ -57,3 +89,5 @@ def test_usefulness_counts_recalled_plans() -> None:
     (found,) = usefulness(rows).values()
     assert (found.problems, found.hits) == (30, int((rows["source"] == "recalled").sum()))
     assert found.mean_ms == pytest.approx(1e3 * rows["planning_seconds"].mean())
+    assert found.solved == rows["solved"].sum()
+    assert found.total_s == pytest.approx((rows["planning_seconds"] + rows["duration_s"]).mean())

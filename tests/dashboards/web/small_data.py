@@ -40,7 +40,7 @@ VERSIONS = (
     MemoryVersion("motion-memory-trap", 2, 1, "second", "promoted", "1", 0.2, 0.1, 0.3, "sooner", True),
     MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not sooner", False),
 )
-SEEN = Usefulness(problems=200, hits=160, mean_ms=1.5, median_ms=0.5)
+SEEN = Usefulness(200, hits=160, mean_ms=1.5, median_ms=0.5, solved=200, total_s=21.0, total_sd_s=2.0)
 WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "encoder"))
 
 
@@ -59,8 +59,8 @@ def small_data(folder: Path, runs: Sequence[str] = ("first", "second")) -> DataF
         run.summary("csv").write_text(as_csv(summarise(pd.DataFrame(rows), resamples=50)), "utf-8")
         _write_recalls(run, memory, unseen)
         _write_hallucinated(run, memory, [drawn.draw(4, index) for index in range(30)])
-    for hits in (160, 150, 90):
-        now = replace(SEEN, hits=hits)
+    for hits, total_s in ((160, 21.0), (150, 21.1), (90, 21.0), (160, 23.0)):
+        now = replace(SEEN, hits=hits, total_s=total_s)
         seen = drifts("motion-memory-trap/2", {"gust closed 5": now}, {"gust closed 5": SEEN})
         add_watched(data.watched, [each.to_row() for each in seen])
     return data

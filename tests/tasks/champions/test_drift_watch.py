@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
-from dashboards.verdicts.drift import Drift, Usefulness
+from dashboards.cells import NOTHING
+from dashboards.verdicts.drift import Drift, Usefulness, drifts
+from dashboards.web.pages.retraining_charts import watched_charts, watched_rows
 from storage.places.data_folder import open_data_folder
-from storage.tables.watched import read_watched
+from storage.tables.watched import add_watched, read_watched
 from tasks.champions import drift_watch as task
 from tasks.champions.drift_watch import DRIFT, SOLVED, BenchmarkedMemory, benchmarked_memory, report_drift
 from tasks.registry.champion_registry import Version
 
 NAME = "gust open 5 exhaustive"
-THEN = Usefulness(problems=500, hits=400, mean_ms=1.0, median_ms=0.1)
+THEN = Usefulness(500, hits=400, mean_ms=1.0, median_ms=0.1, solved=500, total_s=21.0, total_sd_s=2.0)
 BENCHMARKED = BenchmarkedMemory("motion-memory-trap/2", {NAME: THEN}, Path("nowhere"))
 FALLEN = replace(THEN, problems=200, hits=90)
+LATER = replace(THEN, total_s=26.0)
 
 
 class Sent:
@@ -29,7 +33,7 @@ class Sent:
         self.events: list[str] = []
 
     def __call__(self, url: str, found: Sequence[Drift]) -> None:
-        self.events += [each for drift in found for each in (SOLVED, *([DRIFT] * drift.has_fallen))]
+        self.events += [each for drift in found for each in (SOLVED, *([DRIFT] * drift.has_drifted))]
 
 
 @pytest.fixture
@@ -51,6 +55,11 @@ def test_drift_is_told_exactly_when_hits_have_fallen(
     assert sent.events == events
     assert (f"event {DRIFT} sent to http://prefect.example/api" in lines) == (DRIFT in events)
     assert lines[0].startswith("motion-memory-trap/2, gust open 5 exhaustive: ")
+
+
+def test_drift_is_told_when_robots_are_there_later(sent: Sent) -> None:
+    report_drift(BENCHMARKED, {NAME: LATER}, None)
+    assert sent.events == [SOLVED, DRIFT]
 
 
 def test_nothing_is_told_of_what_no_benchmark_knows(sent: Sent) -> None:
@@ -83,6 +92,18 @@ def test_what_was_seen_is_kept_in_the_data_folder_of_the_memory(sent: Sent, tmp_
         (500, 400, False),
     ]
     assert set(seen["benchmark_hits"]) == {400}
+
+
+def test_what_an_earlier_version_saw_is_shown_beside_the_rest(tmp_path: Path) -> None:
+    (row,) = (each.to_row() for each in drifts("trap/2", {NAME: LATER}, {NAME: THEN}))
+    earlier = {name: row[name] for name in row if not re.search("total|later", name)} | {"has_fallen": True}
+    add_watched(tmp_path, [earlier])
+    add_watched(tmp_path, [row])
+    seen, faults = read_watched(tmp_path)
+    assert faults == []
+    shown = {(each["total_s"], each["verdict"]) for each in watched_rows(seen)}
+    assert shown == {("26.0", "later"), (NOTHING, "fewer hits")}
+    assert list(watched_charts(seen))
 
 
 def test_who_cannot_be_told_breaks_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
