@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from time import perf_counter
 from typing import Final, NamedTuple
 
 from dashboards.cells import planner_title
 from planners.memory.memory import Memory
+from planners.optimisation.polish import polish
 from planners.search.anytime import improve
 from planners.search.registry import PLANNERS
 from planners.solve import solve
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -18,7 +21,7 @@ ALONE: Final = "alone"
 FRESH: Final = "fresh guide"
 ANYTIME: Final = "anytime"
 FRESH_ANYTIME: Final = "fresh guide, anytime"
-OPTIMISED: Final = "fresh guide, optimised"
+OPTIMISED: Final = "optimised"
 PEER: Final = "OMPL"
 MEMORY: Final = "memory"
 MEMORY_ANYTIME: Final = "memory, anytime"
@@ -100,12 +103,29 @@ def methods(memory: Memory | None, vehicle: Vehicle, seed: int) -> Iterator[Meth
 
         return attempt
 
+    def polished(first: Callable[[Problem, float], Found]) -> Callable[[Problem, float], Found]:
+        def attempt(problem: Problem, seconds: float) -> Found:
+            begun = first(problem, seconds)
+            if begun.plan is None:
+                return begun
+            began = perf_counter()
+            better = polish(problem, begun.plan, vehicle, scene_of(problem), workspace).plan
+            spent = begun.spent + perf_counter() - began
+            if better is None or better.duration_s >= begun.plan.duration_s:
+                return begun._replace(spent=spent)
+            return Found((*begun.seconds, spent), (*begun.durations, better.duration_s), spent, better)
+
+        return attempt
+
     for planner in PLANNERS:
         yield Method(ALONE, planner, one_shot(planner, "none"))
         yield Method(FRESH, planner, one_shot(planner, "fresh"))
         yield Method(ANYTIME, planner, going_on(planner))
     yield Method(FRESH_ANYTIME, BEST_PLANNER, going_on(BEST_PLANNER, one_shot(BEST_PLANNER, "fresh")))
+    for planner in PLANNERS:
+        yield Method(OPTIMISED, planner, polished(one_shot(planner, "fresh")))
     if memory is not None:
         recalling = one_shot(BEST_PLANNER, "repair", TOP_K)
         yield Method(MEMORY, BEST_PLANNER, recalling)
         yield Method(MEMORY_ANYTIME, BEST_PLANNER, going_on(BEST_PLANNER, recalling))
+        yield Method(MEMORY_POLISHED, BEST_PLANNER, polished(recalling))
