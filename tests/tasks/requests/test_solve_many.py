@@ -198,7 +198,8 @@ def test_a_killed_command_goes_on_with_two_workers_to_the_same_rows(
         "problem_parts.PART_PROBLEMS = 1; main()"
     )
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    command = [sys.executable, "-c", script, "solve", str(problems), "--out", str(out), "--workers", "2"]
+    options = ["--out", str(out), "--workers", "2", "--planner", ASSISTANT.planner]
+    command = [sys.executable, "-c", script, "solve", str(problems), *options]
     begun = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.DEVNULL)
     folder = tmp_path / "rows.parquet.parts"
     while begun.poll() is None and len(list(folder.glob("[0-9]*.parquet"))) < 2:
