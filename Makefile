@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TORCH := torch==2.13.0
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
 
-.PHONY: run smoke test test-slow test-cluster check speed format clean
+.PHONY: run smoke prepared test test-slow test-cluster check speed format clean
 
 run: $(READY)  ## the main job: every stage on the three classes, under 10 minutes on 2 cores
 	$(BIN)/motion-memory run --preset laptop
@@ -14,13 +14,16 @@ run: $(READY)  ## the main job: every stage on the three classes, under 10 minut
 smoke: $(READY)  ## the same, tiny: about a minute
 	$(BIN)/motion-memory run --preset smoke
 
-test: $(READY)  ## the test suite, in parallel: three processes for two cores, as many tests wait
+prepared: $(READY)  ## what the tests share: compiled kernels, an empty Prefect database
+	$(BIN)/python -m tests.prepared
+
+test: prepared  ## the test suite, in parallel: three processes for two cores, as many tests wait
 	$(BIN)/pytest -n 3 --dist worksteal -q
 
-test-slow: $(READY)  ## the tests that take minutes
+test-slow: prepared  ## the tests that take minutes
 	$(BIN)/pytest -m slow -q --timeout 3600
 
-test-cluster: $(READY)  ## more than one machine, all of them here: needs the PostgreSQL server
+test-cluster: prepared  ## more than one machine, all of them here: needs the PostgreSQL server
 	$(BIN)/pytest -m cluster -q
 
 check: $(READY)  ## lint, types, import contracts
@@ -39,11 +42,12 @@ format: $(READY)
 clean:
 	rm -rf $(VENV) build *.egg-info
 
-# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA
+# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA. Compiling 24,000
+# files would take a minute; Python compiles those that are imported.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
-	$(PIP) install -c constraints.txt $(TORCH)
-	$(PIP) install -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
+	$(PIP) install --no-compile -c constraints.txt $(TORCH)
+	$(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
 	touch $(READY)

@@ -14,14 +14,14 @@ settings.register_profile("strict", deadline=None, derandomize=True, max_example
 settings.load_profile("strict")
 
 TESTS: Final = Path(__file__).parent
-LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/testing.md)
+LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/studies/code.md)
     "flows/test_run.py",
     "docs/test_tutorial.py",
+    "tasks/servers/test_prefect_server.py",
     "flows/cli/test_closed_commands.py",
     "tasks/requests/test_solve_many.py",
     "tasks/champions/test_conclude.py",
     "tasks/fan_out/test_fan_out.py",
-    "tasks/servers/test_prefect_server.py",
     "tasks/serving/test_serve_memory.py",
     "dashboards/web/test_browser.py",
     "tasks/tracking/test_memory_model.py",

@@ -1,52 +1,44 @@
-"""A run of two classes, small enough for a test: with two workers, again, and with one worker elsewhere.
+"""A run of two classes, small enough for a test: its command with two workers, then its stages with one.
 
-Only the first time there is a report, which takes half of the time.
+The stages run again in the command's data folder, where nothing is left to do, and in a folder of their own.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
+from storage.places.data_folder import DataFolder, open_data_folder
 from tasks.servers.prefect_server import local_server
-from tasks.settings.presets import for_preset
+from tasks.settings.recorded_settings import recorded_settings
 
-SETTINGS = replace(
-    for_preset("smoke", classes=["random", "trap"], seed=3, learning={"seeds": 2}),
-    experiences=4,
-    problems_per_experience=10,
-    test_problems=6,
-    combined=True,
-)
+OPTIONS: Final = [
+    "--preset", "paper", "--classes", "random", "trap", "--seed", "3", "--experiences", "4",
+    "--candidates", "20", "--problems-per-experience", "10", "--test-problems", "6", "--epochs", "2",
+    "--training-seeds", "2", "--continual", "none",
+]  # fmt: skip
 
 
 def main(first: Path, second: Path) -> None:
-    """Run in two folders; the first twice."""
+    """Do the stages in two folders, as the command did in the first."""
+    (run,) = DataFolder(first).runs()
+    settings = recorded_settings(run)
     with local_server(first) as server:
         from flows.benchmark import benchmark
         from flows.build_memory import build_memory
         from flows.collect import collect
         from flows.hallucinate import hallucinate
-        from flows.run import run
         from flows.train import train
         from tasks.fan_out.fan_out import cluster
 
-        def rows(data: Path) -> None:
-            for stage in (collect, hallucinate, train, build_memory, benchmark):
-                stage(SETTINGS, str(data))
-
-        with cluster(2):
+        with cluster(1):
             if server is not None:
                 server.wait()
-            run(SETTINGS, str(first))
-            (first / "first").touch()
-            rows(first)
-        with cluster(1):
-            rows(second)
+            for data in (first, second):
+                for stage in (collect, hallucinate, train, build_memory, benchmark):
+                    stage(settings, str(data))
 
 
 if __name__ == "__main__":
-    from storage.places.data_folder import open_data_folder
-
     main(*(open_data_folder(place).path for place in sys.argv[1:3]))

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import shutil
 import sqlite3
-import subprocess
-import sys
 from collections import Counter
 from contextlib import closing
 from pathlib import Path
@@ -16,6 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from flows.cli.main import call
+from planners.search.registry import PLANNERS
 from storage.archives.memories import load_memory
 from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder
@@ -23,32 +21,16 @@ from storage.tables.recalls import read_recalls
 from tasks.reports.stage_times import stages_of
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import ASSISTS
+from tests.flows.conftest import SmallRuns
 from tests.flows.same_rows import assert_same_rows, rows_of
 
-ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.timeout(600)  # three runs, on a machine that may be busy
+pytestmark = pytest.mark.timeout(600)  # whoever comes first makes the runs, on a machine that may be busy
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> tuple[RunFolder, RunFolder]:
-    """Folders of the same run with two workers and with one; made once for all processes of the tests."""
-    shared = tmp_path_factory.getbasetemp()
-    shared = shared if worker_id == "master" else shared.parent
-    places = [shared / "two-workers", shared / "one-worker"]
-    with (shared / "small-run.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (shared / "small-run.done").exists():
-            environment = {
-                name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")
-            }
-            environment["PYTHONPATH"] = str(ROOT)
-            script = [sys.executable, str(Path(__file__).with_name("small_run.py")), *map(str, places)]
-            done = subprocess.run(script, env=environment, capture_output=True, text=True, timeout=500)
-            assert done.returncode == 0, done.stderr[-2000:]
-            (shared / "small-run.done").touch()
-    two, one = (DataFolder(place).runs() for place in places)
-    assert len(two) == len(one) == 1
-    return two[0], one[0]
+def runs(small_runs: SmallRuns) -> tuple[RunFolder, RunFolder]:
+    """Folders of the same run with two workers and with one."""
+    return small_runs.two, small_runs.one
 
 
 def test_one_worker_and_two_give_identical_rows_but_for_times(runs: tuple[RunFolder, RunFolder]) -> None:
@@ -69,9 +51,12 @@ def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolde
         "problem_id"
     ].nunique()
     assert (asked == 6).all()
-    assert len(asked) == 2 * (3 * (1 + len(ASSISTS)) + len(for_preset("smoke").ablation))
+    planners, assists, picked = len(PLANNERS), len(ASSISTS), len(for_preset("smoke").ablation)
+    assert len(asked) == 2 * (planners * (1 + assists) + picked)
     counts = Counter(rows["memory"].fillna("none"))
-    assert counts == {"none": 72, "random": 144, "trap": 144, "combined": 252}
+    guided = planners * (assists - 1)  # one assist needs no memory
+    of_class = 6 * (guided + picked)
+    assert counts == {"none": 24 * planners, "random": of_class, "trap": of_class, "combined": 12 * guided}
     assert rows.loc[rows["solved"], "verified"].all()
 
 
@@ -191,19 +176,18 @@ def test_every_figure_is_an_artifact_in_mlflow_and_prefect(runs: tuple[RunFolder
 
 
 def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
-    runs: tuple[RunFolder, RunFolder], tmp_path: Path
+    runs: tuple[RunFolder, RunFolder], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(runs[1].path.parents[1], folder)
     (run,) = DataFolder(folder).runs()
-    asked = [sys.executable, "-m", "flows.cli.main", "verify", str(folder), "--sample", "1", "--workers", "1"]
-    done = subprocess.run(asked, capture_output=True, text=True, cwd=ROOT, timeout=200)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "612 attempts made again" in done.stdout
+    asked = ["verify", str(folder), "--workers", "1", "--sample"]
+    assert call([*asked, "1"]) == 0
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    attempts = sum(len(rows_of(path)) for path in run.results.rglob("*.parquet"))
+    assert f"{attempts} attempts made again" in printed.out
     damaged = run.memory("trap") / "encoder.safetensors"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
-    done = subprocess.run(
-        [*asked[:-3], "0", *asked[-2:]], capture_output=True, text=True, cwd=ROOT, timeout=200
-    )
-    assert done.returncode == 1
-    assert "encoder.safetensors is damaged" in done.stderr
+    assert call([*asked, "0"]) == 1
+    assert "encoder.safetensors is damaged" in capsys.readouterr().err

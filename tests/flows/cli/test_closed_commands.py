@@ -5,6 +5,7 @@ from __future__ import annotations
 import ipaddress
 import json
 import re
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -14,23 +15,17 @@ import pyarrow.parquet as pq
 import pytest
 
 from storage.exchange.problems import fields_of
+from storage.places.data_folder import DataFolder
+from tests.flows import small_run
+from tests.flows.conftest import SmallRuns
+from tests.flows.planted import PLANTED, SECRET
 from tests.flows.watched import ROOT, Watched, watch
+from tests.prepared.prefect_database import with_prefect_database
 from tests.tasks.served import JSON, good_request, problem, write_memory
 from tests.tasks.servers.attacks import EVIL
 
-SECRET = "s3cret-of-the-fleet"
-PLANTED = {
-    "MOTION_MEMORY_AUTH": f"robot:{SECRET}",
-    "AWS_SECRET_ACCESS_KEY": f"aws-{SECRET}",
-    "SOME_API_KEY": f"key-{SECRET}",
-    "OF_AN_ADDRESS": f"postgresql://robot:{SECRET}@10.0.0.5/db",
-}
 ELSEWHERE = f"http://robot:{SECRET}@127.0.0.1:9"  # where nobody answers
 IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}
-TINY = [
-    "--preset", "smoke", "--classes", "random", "--experiences", "3", "--candidates", "3", "--workers", "2",
-    "--problems-per-experience", "6", "--test-problems", "4", "--epochs", "1",
-]  # fmt: skip
 PARTS_OF_ONE = """
 from flows.cli.main import main
 from tasks.requests import problem_parts
@@ -79,20 +74,28 @@ def assert_closed(command: str, watched: Watched) -> None:
         assert LISTENERS[command][port.process] in documented(command), (command, port)
 
 
-@pytest.mark.timeout(600)  # three commands
-def test_a_run_and_what_it_leaves(place: Path) -> None:
+@pytest.mark.timeout(600)  # whoever comes first makes the run
+def test_a_run_and_what_it_leaves(small_runs: SmallRuns) -> None:
+    assert {port.process for port in small_runs.watched.ports} == {"server", "command", "child"}
+    assert_closed("run", small_runs.watched)
+    assert_nowhere_in(small_runs.two.path.parents[1])
+
+
+@pytest.mark.timeout(600)
+def test_failing_stages_tell_no_secret(small_runs: SmallRuns, place: Path) -> None:
     data = place / "data"
-    watched = watch(["run", *TINY, "--data", str(data)], place / "run.log", PLANTED)
-    assert watched.code == 0, watched.output[-2000:]
-    assert {port.process for port in watched.ports} == {"server", "command", "child"}
-    assert_closed("run", watched)
-    assert_nowhere_in(data)
-    (memory,) = data.glob("runs/*/memories/random/masks.npy")
-    memory.write_bytes(memory.read_bytes()[:-1] + b"x")  # now a worker's chunk fails
-    failing = watch(["benchmark", *TINY, "--seed", "1", "--data", str(data)], place / "failed.log", PLANTED)
-    assert SECRET not in failing.output
+    shutil.copytree(small_runs.two.path.parents[1], data)
+    options = [*small_run.OPTIONS, "--data", str(data), "--workers", "1"]
+    (run,) = DataFolder(data).runs()
+    masks = run.memory("random") / "masks.npy"
+    masks.write_bytes(masks.read_bytes()[:-1] + b"x")
+    run.shard("results", "random", 0).unlink()  # so that a worker reads the memory
+    failed = watch(["benchmark", *options], place / "failed.log", PLANTED)
+    assert failed.code == 1
+    assert "masks.npy is damaged" in failed.output
+    assert SECRET not in failed.output
     unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
-    failed = watch(["report", *TINY, "--data", str(data)], place / "mlflow.log", unreached)
+    failed = watch(["report", *options], place / "mlflow.log", unreached)
     assert failed.code == 1
     assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
     assert SECRET not in failed.output
@@ -100,6 +103,7 @@ def test_a_run_and_what_it_leaves(place: Path) -> None:
 
 
 def test_solving_with_workers(place: Path) -> None:
+    with_prefect_database(place / "rows.parquet.parts")
     arguments = ["solve", str(place / "many.jsonl"), "--out", str(place / "rows.parquet"), "--workers", "2"]
     watched = watch(arguments, place / "solve.log", PLANTED, script=PARTS_OF_ONE)
     assert watched.code == 0, watched.output[-2000:]
@@ -145,6 +149,7 @@ def test_servers_for_all(place: Path) -> None:
         return True
 
     ports = ["--prefect-port", "0", "--mlflow-port", "0"]
+    with_prefect_database(place / "shared")
     command = ["servers", "--data", str(place / "shared"), *ports]
     watched = watch(command, place / "all.log", PLANTED | {"MOTION_MEMORY_HOSTS": "hub"}, asked)
     assert watched.code == 0, watched.output[-2000:]
