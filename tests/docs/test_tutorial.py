@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs.tutorial import as_anywhere, begin, do, is_shown, picture_in, pictures, smaller, steps
+from tests.prepared.prefect_database import with_prefect_database
 from tests.worlds import SHARED
 
 needs_worlds = pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
@@ -17,6 +18,7 @@ needs_worlds = pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds a
 def test_the_commands_work_in_their_order_and_leave_the_pictures(tmp_path: Path) -> None:
     """With fewer problems than the tutorial's."""
     begin(tmp_path)
+    with_prefect_database(tmp_path / "data")
     for step in steps():
         printed = do(smaller(step), tmp_path)
         assert bool(printed) == bool(step.shown), f"{step.commands}\n{printed}"

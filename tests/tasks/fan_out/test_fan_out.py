@@ -16,6 +16,7 @@ import pytest
 
 from tasks.fan_out import fan_out
 from tasks.settings.errors import RunError, UsageError
+from tests.prepared.prefect_database import with_prefect_database
 
 ROOT = Path(__file__).parents[3]
 
@@ -34,7 +35,7 @@ def found(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> dict[str,
         text = printed.read()
         if not text:
             data = shared / "odd-chunks"
-            data.mkdir()
+            with_prefect_database(data)
             environment = {
                 name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")
             }

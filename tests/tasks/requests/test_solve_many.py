@@ -26,6 +26,7 @@ from tasks.requests import problem_parts as parts
 from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows.same_rows import equal_but_for_seconds
+from tests.prepared.prefect_database import with_prefect_database
 
 ROOT = Path(__file__).parents[3]
 ASSISTANT = AssistantSettings("gust", "none", 5, None, 1)
@@ -193,6 +194,7 @@ def test_a_killed_command_goes_on_with_two_workers_to_the_same_rows(
     undisturbed: pd.DataFrame, problems: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "rows.parquet"
+    with_prefect_database(tmp_path / "rows.parquet.parts")
     script = (
         "from flows.cli.main import main; from tasks.requests import problem_parts; "
         "problem_parts.PART_PROBLEMS = 1; main()"

@@ -33,6 +33,7 @@ from tasks.servers.prefect_server import (
 )
 from tasks.servers.users import is_held, locked
 from tests.dashboards.web.browser import CHROMIUM, DRIVER, browser
+from tests.prepared.prefect_database import with_prefect_database
 from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, open_websocket, websocket_status
 
 HOLD = """
@@ -87,7 +88,7 @@ class Shared:
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Shared]:
-    shared = Shared(tmp_path_factory.mktemp("data"))
+    shared = Shared(with_prefect_database(tmp_path_factory.mktemp("data")))
     try:
         yield shared
     finally:
@@ -224,7 +225,7 @@ def test_neither_silent_connections_nor_few_files_keep_a_server_from_answering_a
     tmp_path: Path,
 ) -> None:
     limited = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, (1024, 1024))\n{HOLD}"
-    command = [sys.executable, "-c", limited, str(tmp_path)]
+    command = [sys.executable, "-c", limited, str(with_prefect_database(tmp_path))]
     allow_files()
     with ExitStack() as stack, subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE) as user:
         try:
