@@ -61,7 +61,7 @@ DEFAULT_MIXTURE: Final[Mixture] = (("rearrange", 1.0),)
 
 _LATER: Final[dict[str, Any]] = {  # fields that were added
     "vehicle": DEFAULT_VEHICLE,
-    "learning": asdict(Learning()),
+    "learning": asdict(Learning(origin_weight=40.0)),  # as it was when the field was added
     "hallucination": DEFAULT_MIXTURE,
     "candidates": 0,
     "continual": "none",

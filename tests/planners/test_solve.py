@@ -219,7 +219,8 @@ def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory):
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):
     problem = problem_of([box(*memory.plans[4].states[40, :2], 0.0, 0.2, 0.2)])
-    attempt = solve(problem, "rrt", "closed", 5, memory, strategy="encoder")
-    assert attempt.recalled[0] == 4
-    assert attempt.plan is not memory.plans[4]
+    attempt = solve(problem, "rrt", "closed", len(memory.plans), memory, strategy="encoder")
+    assert 4 in attempt.recalled
+    assert attempt.source == "recalled"
+    assert not np.array_equal(attempt.plan.states, memory.plans[4].states)
     assert faults(problem, memory.plans[4]) != []

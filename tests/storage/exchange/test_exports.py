@@ -117,7 +117,7 @@ def test_every_attempt_is_a_run_of_its_class_and_planner(tmp_path: Path, classes
         runs = pd.read_sql(asked, database).sort_values(["problem_id", "planner"], ignore_index=True)
     rows = read_attempts(tmp_path / "results")
     memory = rows["memory"].map(lambda name: f", memory {name}", na_action="ignore").fillna("")
-    label = rows["assist"] + rows["top_k"].map(lambda k: f" {k} centroid" if k else "")
+    label = rows["assist"] + rows["top_k"].map(lambda k: f" {k} encoder" if k else "")
     rows = rows.assign(planner=rows["planner"] + " " + label + memory)
     rows = rows.sort_values(["problem_id", "planner"], ignore_index=True)
     assert runs["experiment"].tolist() == [f"laptop-labels-1/{name}" for name in rows["problem_class"]]
