@@ -9,9 +9,9 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
-from planners.memory.plans.free import ends_of, least_blocked, turned
+from planners.memory.plans.free import turned
 from planners.search.repair import blocked_states
-from planners.solve import Attempt
+from planners.solve import Attempt, least_blocked
 from planners.world.arrays import Flags
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
@@ -85,6 +85,5 @@ def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dic
     use = attempt.assist.removeprefix("random-")
     if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
         return {}
-    order = np.array(attempt.recalled, np.int32)
-    best, _ = least_blocked(order, memory.sweeps, ends_of(problem), view.scene)
-    return {int(best): "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}
+    best, _ = least_blocked(memory, attempt.recalled, view)
+    return {best: "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}

@@ -1,4 +1,4 @@
-"""Solves a problem: recall, check, guide, repair, search. Only here memory and planners meet (paper, III-D).
+"""Solves a problem: recall, check, help, search. Only here memory and planners meet (paper, III-D).
 
 Planning time is measured once, around everything between receiving a problem and returning a plan.
 """
@@ -7,21 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
 
 from planners.memory.memory import Memory, scale_fault
-from planners.memory.plans.free import ends_of, least_blocked, turned
+from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
+from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
-from planners.search.guides.grid_path import grid_path
-from planners.search.guides.guidance import guidance, published_guidance
-from planners.search.outcome import Outcome, Status
-from planners.search.query import Guide, Limits, Query
-from planners.search.registry import PLANNERS
-from planners.search.repair import blocked_states, free_prefix, repair
-from planners.world.arrays import Flags
+from planners.search.guides.guidance import published_guidance
+from planners.search.help import Help, fresh_guide
+from planners.search.outcome import Status
+from planners.search.query import Limits, Query
+from planners.search.registry import HEAD_STARTS, PLANNERS
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
@@ -74,32 +74,17 @@ _PARTS = tuple(
 )
 
 
-def nearly_free(
-    memory: Memory, recalled: Sequence[int], view: View, vehicle: Vehicle
-) -> tuple[tuple[Plan, Flags] | None, int]:
-    """Find the least blocked of the recalled plans, and count the collision checks.
+def least_blocked(memory: Memory, recalled: Sequence[int], view: View) -> tuple[int, int]:
+    """Find the recalled plan that shares the fewest cells with obstacles, and how many these are.
 
-    Returns the plan and which of its states are blocked, or None if no plan begins at the start.
+    It is -1 if no plan begins at the start. Where a problem begins with another heading than the plans, cells
+    say nothing: then it is the plan that was recalled first, as if no cell were shared.
     """
-    order = np.array(recalled, np.int32)
-    best, checks = least_blocked(order, memory.sweeps, ends_of(view.problem), view.scene)
-    nearly: tuple[Plan, Flags] | None = None
-    if best >= 0:
-        stored = turned(memory.plans[int(best)], view.problem.start[2])
-        blocked, more = blocked_states(stored, view.scene, vehicle)
-        nearly, checks = (stored, blocked), checks + more
-    view.lap("check")
-    return nearly, int(checks)
-
-
-def guide_along(nearly: tuple[Plan, Flags] | None, view: View) -> Guide | None:
-    """Make a guide along a recalled plan and a path over the grid, as far as there are such."""
-    problem = view.problem
-    around = grid_path(view.bits, problem.start[:2], problem.goal, problem.goal_radius, view.workspace)
-    paths = [each for each in (nearly and nearly[0].states, around) if each is not None]
-    guide = guidance(paths) if paths else None
-    view.lap("guide")
-    return guide
+    x, y, heading = view.problem.start
+    order = np.array(recalled if memory.begins_with(heading) else recalled[:1], np.int32)
+    poses = memory.sweeps.first_poses
+    best, cells = find_least_blocked(order, memory.masks, view.bits, poses, x, y, START_TOLERANCE)
+    return int(best), int(cells) if memory.begins_with(heading) else 0
 
 
 def solve(
@@ -118,10 +103,10 @@ def solve(
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
     drives shortest, else search.
-    ``open``: the same, but the search goes on from the free beginning of the least blocked of the recalled
-    plans, guided by that plan and by a path over the grid. ``repair``: the same, but the blocked segments of
-    that plan are planned anew; if this fails as ``open``. ``published-open``: the paper's open box, where the
-    search samples near the states of all recalled plans. ``fresh``: search guided by a path over the grid.
+    ``open``: the same, and where none is free, a search along the least blocked of the recalled plans helps
+    the planner. ``repair``: the same, and the blocked segments of that plan may be planned anew before.
+    ``published-open``: the paper's open box, where the search samples near the states of all recalled plans.
+    ``fresh``: search guided by a path over the grid.
     ``random-`` before an assist picks the plans blindly.
 
     Args:
@@ -165,33 +150,51 @@ def solve(
 
     answer: Plan | None = None
     source = ""
-    outcomes: list[Outcome] = []
-    checks = recalled.checks
+    status = Status.SOLVED
+    work = np.array([recalled.checks, 0, 0])  # collision checks, expansions, nodes
     if memory is not None and recalled.free >= 0:
         answer, source = turned(memory.plans[recalled.free], problem.start[2]), "recalled"
     else:
-        rng = generator(seed, "search", problem.id, planner)
-        query = Query(problem, rng, view.scene, view.workspace, limits=limits or Limits(), vehicle=vehicle)
-        nearly = None
+        query = Query(
+            *(problem, generator(seed, "search", problem.id, planner), view.scene, view.workspace),
+            limits=limits or Limits(),
+            vehicle=vehicle,
+        )
+        helper = None
         if memory is not None and use == "published-open" and recalled.plans:
             plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
             query = replace(query, guide=published_guidance(plans))
             view.lap("guide")
-        if memory is not None and use in ("open", "repair"):
-            nearly, more = nearly_free(memory, recalled.plans, view, vehicle)
-            checks += more
-        if use == "repair" and nearly is not None:
-            outcomes.append(repair(planner, query, *nearly, view.bits))
-            answer, source = outcomes[0].plan, "repaired"
-            view.lap("repair")
+        elif memory is not None and use in ("open", "repair"):
+            stored, cells = least_blocked(memory, recalled.plans, view)
+            if stored >= 0:
+                plan = turned(memory.plans[stored], problem.start[2])
+                rng = partial(generator, seed, "help", problem.id, planner)
+                helper = Help(query, plan, cells, view.bits, rng, repairs=use == "repair")
+                query = replace(query, beside=helper.beside)
+                view.lap("check")
+                head_start = HEAD_STARTS[planner]
+                if helper.promises_repair and cells <= head_start.cells:
+                    answer, source = helper.repaired(), "repaired"
+                    view.lap("repair")
+                if answer is None:
+                    answer, source = helper.guided(head_start.work), "searched"
+        elif use == "fresh":
+            query = replace(query, guide=fresh_guide(query, view.bits))
+            view.lap("guide")
         if answer is None:
-            if use == "fresh" or nearly is not None:
-                prefix = free_prefix(*nearly) if nearly is not None else None
-                query = replace(query, guide=guide_along(nearly, view), prefix=prefix)
             searched = PLANNERS[planner](query)
-            outcomes.append(searched)
-            answer, source = searched.plan, "searched"
-            view.seconds |= {"roadmap": searched.roadmap_seconds, "search": searched.search_seconds}
+            answer, status, source = searched.plan, searched.status, "searched"
+            if helper is not None and answer is not None and helper.is_repair(answer):
+                source = "repaired"
+            work += searched.collision_checks, searched.expansions, searched.nodes
+            view.seconds["roadmap"] = searched.roadmap_seconds
+            view.lap("search")
+            view.seconds["search"] -= searched.roadmap_seconds
+        elif source == "searched":
+            view.lap("search")
+        if helper is not None:
+            work += helper.cost()
     planning_seconds = perf_counter() - view.began
 
     return Attempt(
@@ -201,15 +204,15 @@ def solve(
         assist=assist,
         recall=None if memory is None else strategy,
         top_k=0 if memory is None else top_k,
-        status=str(Status.SOLVED if answer is not None else outcomes[-1].status),
+        status=str(status),
         solved=answer is not None,
         source=source if answer is not None else None,
         planning_seconds=planning_seconds,
         **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in _PARTS},
         recalled=recalled.plans,
-        collision_checks=checks + sum(each.collision_checks for each in outcomes),
-        expansions=sum(each.expansions for each in outcomes),
-        nodes=sum(each.nodes for each in outcomes),
+        collision_checks=int(work[0]),
+        expansions=int(work[1]),
+        nodes=int(work[2]),
         length_m=None if answer is None else answer.length_m,
         duration_s=None if answer is None else answer.duration_s,
         seed=seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -54,3 +55,5 @@ class Query:
     limits: Limits = field(default_factory=Limits)
     vehicle: Vehicle = CAR
     prefix: Plan | None = None  # a free drive from the problem's start, from which the search goes on
+    # what else is tried while the search goes on: told of its work so far, it may return a plan that ends it
+    beside: Callable[[int], Plan | None] | None = None

@@ -1,8 +1,11 @@
 """Repairs a plan that is blocked in places: only these places are planned anew (paper, III-D).
 
-What is free before the first collision stays as it is and becomes the first branch of a tree. The planner
-searches from there to a point where the plan is free again. A tracking controller follows the plan from that
-point on, with every state simulated and checked. At the next collision the same begins again.
+What is free before the first collision stays as it is and becomes the first branch of a tree, which grows
+from there to a point where the plan is free again. A tracking controller follows the plan from that point on,
+with every state simulated and checked. At the next collision the same begins again.
+
+A repair that succeeds mostly costs less than a search, one that fails is lost. So it gives up where the way
+around is long, and when it has cost its budget.
 """
 
 from __future__ import annotations
@@ -12,16 +15,16 @@ from time import perf_counter
 
 import numpy as np
 
+from planners.search.guided import GuidedSearch
 from planners.search.guides.grid_path import grid_path
 from planners.search.guides.guidance import guidance
-from planners.search.outcome import Outcome, Status
-from planners.search.query import Limits, Query
-from planners.search.registry import PLANNERS
+from planners.search.outcome import Outcome, Status, work_of
+from planners.search.query import Query
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.arrays import Flags, Floats
-from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
 from planners.world.geometry.occupancy import Bits
-from planners.world.jit import lean
+from planners.world.jit import jit, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load
@@ -35,8 +38,13 @@ LONGEST = 4096  # states of a repaired plan; a stored plan has some 250
 class RepairSettings:
     """How much a repair may cost before it is given up, and where it joins the plan again."""
 
-    expansions: int = 150  # of each local search; from scratch a planner needs several hundred
+    work: int = (
+        1_000  # of all local searches and of tracking; GUST's and Follow's own search takes twice as much
+    )
     rounds: int = 4  # local searches
+    detour_m: float = (
+        6.0  # a way around over the grid that is longer than straight on by more than this is too long
+    )
     rejoin_radius_m: float = 2.0
     rejoin_beyond_m: float = 5.0  # from the end of the free part; twice as far after each failure
     free_steps: int = 5  # steps for which the plan must be free where it is joined
@@ -59,10 +67,13 @@ def blocked_states(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[
     return blocked, len(blocked)
 
 
-def free_prefix(stored: Plan, blocked: Flags) -> Plan | None:
-    """Return the plan until shortly before its first blocked state; None if that is the very first."""
-    free = int(blocked.argmax()) if blocked.any() else len(blocked)
-    return shortened(stored, free) if free else None
+def free_prefix(stored: Plan, scene: Scene, vehicle: Vehicle = CAR) -> tuple[Plan | None, int]:
+    """Return the plan until shortly before its first blocked state, and how many states were checked.
+
+    There is no such plan if the very first state is blocked.
+    """
+    free = int(count_free_prefix(np.ascontiguousarray(stored.states), vehicle, scene))
+    return shortened(stored, free) if free else None, min(free + 1, len(stored.states))
 
 
 def shortened(drive: Plan, free: int) -> Plan:
@@ -73,20 +84,43 @@ def shortened(drive: Plan, free: int) -> Plan:
 
 @lean
 def rejoin_at(
-    states: Floats, blocked: Flags, after: int, x: float, y: float, beyond_m: float, steps: int
-) -> int:
+    states: Floats,
+    after: int,
+    x: float,
+    y: float,
+    beyond_m: float,
+    steps: int,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> tuple[int, int]:
     """The first of ``states [T, S]`` from ``after`` on that begins ``steps`` free ones far from (x, y).
 
-    It is at least ``beyond_m`` metres away, or the last state if there is none.
+    It is at least ``beyond_m`` metres away, or the last state if there is none. Returned with how many states
+    were checked.
     """
     last = states.shape[0] - 1
     free = 0
+    checks = 0
     for i in range(after, last):
-        free = 0 if blocked[i] else free + 1
-        begin = i - steps + 1
-        if free >= steps and length(states[begin, 0] - x, states[begin, 1] - y) >= beyond_m:
-            return begin
-    return last
+        if length(states[i, 0] - x, states[i, 1] - y) < beyond_m:
+            free = 0
+            continue
+        checks += 1
+        free = free + 1 if state_is_free(load(states, i, vehicle), vehicle, scene) else 0
+        if free >= steps:
+            return i - steps + 1, checks
+    return last, checks
+
+
+@jit
+def metres_along(path: Floats, x: float, y: float) -> float:
+    """The length of the way from (x, y) along the points of a path ``[n, 2]``."""
+    metres = 0.0
+    for i in range(path.shape[0]):
+        metres += length(path[i, 0] - x, path[i, 1] - y)
+        x = path[i, 0]
+        y = path[i, 1]
+    return metres
 
 
 def allocate_drive(size: int) -> tuple[Floats, Floats]:
@@ -95,16 +129,15 @@ def allocate_drive(size: int) -> tuple[Floats, Floats]:
 
 
 def repair(
-    name: str, query: Query, stored: Plan, blocked: Flags, occupied: Bits, settings: RepairSettings = REPAIR
+    query: Query, stored: Plan, drive: Plan, occupied: Bits, settings: RepairSettings = REPAIR
 ) -> Outcome:
     """Turn a stored plan that is blocked in places into a plan for the query's problem.
 
     Args:
-        name: of the planner that searches around the blocked places.
         query: the problem; the plan begins at its start. Guide, limits and prefix are not looked at.
-        stored: the plan, with T states.
-        blocked: ``[T]`` which of its states are in collision.
-        occupied: ``[64]`` the problem's occupied cells, which show the planner a way around.
+        stored: the plan.
+        drive: what is free of it before it is first blocked, the ``free_prefix``.
+        occupied: ``[64]`` the problem's occupied cells, which show a way around.
         settings: what the repair may cost.
 
     Returns:
@@ -115,47 +148,51 @@ def repair(
     reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
     goal = np.array([*problem.goal, problem.goal_radius])
-    drive = free_prefix(stored, blocked)
-    at = 0 if drive is None else len(drive.states)  # the reference state from which to look for a free part
+    at = len(drive.states)  # the reference state from which to look for a free part
     beyond_m = settings.rejoin_beyond_m
-    searches: list[Outcome] = []
-    tracked = 0
+    checks = expansions = nodes = 0
     solved = False
-    while drive is not None and not solved and len(searches) < settings.rounds:
+    for _ in range(settings.rounds):
         x, y = drive.states[-1, :2].tolist()
         after = min(at, len(reference) - 1)
-        at = int(rejoin_at(reference, blocked, after, x, y, beyond_m, settings.free_steps))
+        at, checked = rejoin_at(reference, after, x, y, beyond_m, settings.free_steps, vehicle, scene)
+        checks += checked
         to_goal = at == len(reference) - 1
         disc = goal if to_goal else np.array([*reference[at, :2], settings.rejoin_radius_m])
-        target = (float(disc[0]), float(disc[1]))
-        around = grid_path(occupied, (x, y), target, float(disc[2]), workspace)
-        guide = guidance([drive.states] if around is None else [around, drive.states])
-        local = replace(problem, goal=target, goal_radius=float(disc[2]))
-        limits = Limits(expansions=settings.expansions)
-        outcome = PLANNERS[name](replace(query, problem=local, guide=guide, limits=limits, prefix=drive))
-        searches.append(outcome)
-        if outcome.plan is None:
+        target, radius = (float(disc[0]), float(disc[1])), float(disc[2])
+        around = grid_path(occupied, (x, y), target, radius, workspace)
+        straight = float(np.hypot(target[0] - x, target[1] - y)) - radius
+        if around is None or metres_along(around, x, y) > straight + settings.detour_m:
+            break
+        local = replace(query, problem=replace(problem, goal=target, goal_radius=radius))
+        search = GuidedSearch(local, guidance([around, drive.states]), drive)
+        beyond = search.advance(settings.work - work_of(checks, expansions))
+        checks += search.collision_checks
+        expansions += search.expansions
+        nodes += search.nodes
+        if beyond is not None:
+            drive, solved = beyond, to_goal
+        else:
             beyond_m *= 2.0
-            continue
-        drive, solved = outcome.plan, to_goal
-        if not solved:
+        if beyond is not None and not solved:
             last = len(drive.states) - 1
             states[: last + 1], controls[:last] = drive.states, drive.controls
             ended, end, at = track(
                 *(states, controls, last, reference, at, goal, settings.tracking, vehicle, scene)
             )
-            tracked += end - last
+            checks += end - last
             solved = ended == ARRIVED
             drive = Plan(states[: end + 1].copy(), controls[:end].copy(), vehicle.dt)
             if not solved:
                 drive = shortened(drive, end + 1)
-    roadmap_seconds = sum(each.roadmap_seconds for each in searches)
+        if solved or work_of(checks, expansions) >= settings.work:
+            break
     return Outcome(
         status=Status.SOLVED if solved else Status.BUDGET_SPENT,
         plan=drive if solved else None,
-        collision_checks=tracked + sum(each.collision_checks for each in searches),
-        expansions=sum(each.expansions for each in searches),
-        nodes=sum(each.nodes for each in searches),
-        roadmap_seconds=roadmap_seconds,
-        search_seconds=perf_counter() - began - roadmap_seconds,
+        collision_checks=int(checks),
+        expansions=expansions,
+        nodes=nodes,
+        roadmap_seconds=0.0,
+        search_seconds=perf_counter() - began,
     )

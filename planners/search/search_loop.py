@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from planners.search.outcome import Outcome, Status
+from planners.search.outcome import Outcome, Status, work_of
 from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
@@ -46,7 +46,7 @@ def attempt(
     within ``restart_after`` expansions, is given up for a new one, the next trial, which may grow twice as
     long: that cuts the tails of a search with random choices (Luby, Sinclair and Zuckerman 1993). Every
     second trial explores, if that is given: where the one planner fails for long the other need not (a
-    portfolio, Gomes and Selman 2001).
+    portfolio, Gomes and Selman 2001). What the query tries beside the search may end it with a plan.
 
     Args:
         query: the problem and its limits.
@@ -69,6 +69,7 @@ def attempt(
     counts = tree.counts
     blocked = _is_blocked(first, goal, vehicle, scene)
     roadmap_seconds = 0.0
+    found: Plan | None = None
     if blocked:
         status = Status.START_BLOCKED if blocked == 1 else Status.GOAL_BLOCKED
     elif math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
@@ -99,14 +100,17 @@ def attempt(
             if counts[trees.EXPANSIONS] < until:
                 restart_at = int(counts[trees.EXPANSIONS])  # nothing is left to extend
             running_since = min(running_since, perf_counter())
-            if counts[trees.GOAL_VERTEX] >= 0:
+            if counts[trees.GOAL_VERTEX] < 0 and query.beside is not None:
+                found = query.beside(work_of(int(counts[trees.CHECKS]), int(counts[trees.EXPANSIONS])))
+            if counts[trees.GOAL_VERTEX] >= 0 or found is not None:
                 status = Status.SOLVED
             elif perf_counter() - running_since > limits.seconds:
                 status = Status.TIME_SPENT
-    plan = trees.plan_to_goal(tree, vehicle.dt) if status is Status.SOLVED else None
+    if status is Status.SOLVED and found is None:
+        found = trees.plan_to_goal(tree, vehicle.dt)
     return Outcome(
         status=status,
-        plan=plan,
+        plan=found,
         collision_checks=int(counts[trees.CHECKS]),
         expansions=int(counts[trees.EXPANSIONS]),
         nodes=int(counts[trees.SIZE]),

@@ -13,7 +13,7 @@ import numpy as np
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.world.arrays import Floats, Floats32, Integers
 from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, draw_piece
-from planners.world.jit import inlined, lean
+from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS
 from planners.world.workspace import Workspace
 
@@ -133,3 +133,28 @@ def _cell_scores() -> Floats32:
 
 
 CELL_SCORES = _cell_scores()
+
+
+@jit
+def least_blocked(
+    order: Integers, masks: Bits, occupied: Bits, first_poses: Floats, x: float, y: float, tolerance: float
+) -> tuple[int, int]:
+    """Find the plan of ``order [k]`` that shares the fewest cells with obstacles, and how many these are.
+
+    Only plans that begin at (x, y) count, to a ``tolerance`` in metres; it is -1 if there is none, and the
+    first of equals. ``masks [N, 64]``: the cells that each plan sweeps; ``occupied [64]``: those that are not
+    free; ``first_poses [N, 3]``: where the plans begin.
+    """
+    best = -1
+    fewest = 0
+    for i in order:
+        if abs(first_poses[i, 0] - x) > tolerance or abs(first_poses[i, 1] - y) > tolerance:
+            continue
+        count = np.uint64(0)
+        for row in range(GRID):
+            count += count_bits(masks[i, row] & occupied[row])
+        cells = int(np.int64(count)) if masks[i, 0] != ALL_CELLS else MOST_CELLS
+        if best < 0 or cells < fewest:
+            best = i
+            fewest = cells
+    return best, fewest

@@ -27,7 +27,6 @@ from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Plan, Problem
 
 START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
-SHARE = 4  # ``least_blocked`` tries one box in so many; coarse steps come first, so these lie evenly
 
 
 class Ends(NamedTuple):
@@ -139,32 +138,6 @@ def first_fitting(order: Integers, sweeps: PlanSweeps, ends: Ends, scene: Scene)
         if fits:
             return i, checks
     return -1, checks
-
-
-@lean
-def least_blocked(order: Integers, sweeps: PlanSweeps, ends: Ends, scene: Scene) -> tuple[int, int]:
-    """The plan of ``order [k]`` with the fewest blocked boxes of those tried, and how many were checked.
-
-    It is the first of equals, and -1 if no plan begins at the start. Where plans end does not matter.
-    """
-    best = -1
-    fewest = 0
-    checks = 0
-    for i in order:
-        begins, cos, sin = turn_to_start(sweeps, i, ends)
-        if not begins:
-            continue
-        first = sweeps.starts[i]
-        blocked = 0
-        for j in range(first, first + (sweeps.starts[i + 1] - first + SHARE - 1) // SHARE):
-            if best >= 0 and blocked >= fewest:
-                break
-            checks += 1
-            blocked += not _turned_box_is_free(sweeps, i, j, cos, sin, scene)
-        if best < 0 or blocked < fewest:
-            best = i
-            fewest = blocked
-    return best, checks
 
 
 @inlined
