@@ -89,7 +89,9 @@ def rich_table(title: str, headings: Sequence[str], groups: Sequence[Rows]) -> T
         padding=(0, 1, 0, 0),
     )
     for heading in headings:
-        table.add_column(heading, justify="left" if heading in NAMES else "right", no_wrap=True)
+        table.add_column(
+            heading, justify="left" if heading in NAMES else "right", no_wrap=heading != "verdict"
+        )
     for group in groups:
         for i, cells in enumerate(group):
             table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1 > 0)

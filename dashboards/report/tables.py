@@ -33,11 +33,13 @@ _HEADINGS: Final = (
     "planner", "configuration", "solved", "mean", "reduction % [95 %]", "slower", "hits", "drives",
     "sooner [95 %]",
 )  # fmt: skip
-_UNITS: Final = "planning in ms; solved, slower, hits in %; drives, sooner there in s"
+SOURCES: Final = ("recalled", "repaired", "searched")
+_UNITS: Final = "planning in ms; solved, slower, hits (+ repaired) in %; drives, sooner there in s"
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
-    "interquartile mean ms [95 %]", "driving s", "sooner s [95 %]", "recalled %", "collision checks",
+    "interquartile mean ms [95 %]", "driving s", "sooner s [95 %]", "recalled %", "repaired %", "searched %",
+    "collision checks",
 )  # fmt: skip
 _SWEEP_HEADINGS: Final = (
     "class", "rate", "channels", "hidden", "parameters", "hit@1", "hit@5", "seconds"
@@ -176,7 +178,7 @@ def full_cells(row: Row, decimals: int) -> list[str]:
         p_value(row["p_value"]),
         *[time(name) for name in ("median", "p90", "interquartile_mean")],
         *driving_cells(row, 2),
-        NOTHING if row["assist"] == "none" else percent(row["recalled"]),
+        *[NOTHING if row["assist"] == "none" else percent(row[name]) for name in SOURCES],
         count(row["collision_checks"]),
     ]
 
@@ -208,9 +210,16 @@ def _cells(row: Row, decimals: int) -> list[str]:
         f"{row['mean_ms']:,.{decimals}f}",
         reduction_cell(row, 0),
         percent(row["slower"]),
-        NOTHING if row["assist"] == "none" else percent(row["recalled"]),
+        NOTHING if row["assist"] == "none" else _hits(row),
         *driving_cells(row),
     ]
+
+
+def _hits(row: Row) -> str:
+    """The share of problems whose plan was recalled, and after a plus those whose plan was repaired."""
+    repairs = str(row["assist"]).endswith("repair")
+    recalled, repaired = 100.0 * row["recalled"], 100.0 * row["repaired"]
+    return f"{recalled:.0f}+{repaired:.0f}" if repairs else percent(row["recalled"])
 
 
 def retrieval_groups(retrieval: pd.DataFrame) -> list[Rows]:

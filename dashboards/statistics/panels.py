@@ -181,7 +181,8 @@ COLUMNS: Final = (
     "interquartile_mean_ms", "interquartile_mean_low_ms", "interquartile_mean_high_ms",
     "median_ms", "median_low_ms", "median_high_ms", "p90_ms", "p90_low_ms", "p90_high_ms",
     "reduction", "reduction_low", "reduction_high", "slower", "slowdown", "p_value",
-    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "recalled", "collision_checks",
+    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "recalled", "repaired", "searched",
+    "collision_checks",
 )  # fmt: skip
 
 
@@ -209,8 +210,9 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     table = panel.labels().join(pd.DataFrame([each._asdict() for _, each in panel.columns]))
     table["problems"] = (~np.isnan(times)).sum(axis=0)
     table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
-    recalled = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
-    table["recalled"] = np.nanmean(panel._replace(rows=recalled).matrix("recalled"), axis=0)
+    for source in ("recalled", "repaired", "searched"):  # what the plans of the problems are
+        of_source = panel.rows.assign(is_so=panel.rows["source"] == source)
+        table[source] = np.nanmean(panel._replace(rows=of_source).matrix("is_so"), axis=0)
     table["collision_checks"] = np.nanmean(panel.matrix("collision_checks"), axis=0)
     table["mean_ms"] = np.nanmean(times, axis=0)
     table["mean_low_ms"], table["mean_high_ms"] = interval(resampled.means)

@@ -11,6 +11,7 @@ from dashboards.verdicts.claim_rules import Claim, Statement, decided
 from dashboards.verdicts.evidence import (
     CLOSED_1,
     CLOSED_5,
+    NO_LESS_MARGIN,
     OPEN_1,
     OPEN_5,
     RANDOM_1,
@@ -24,8 +25,10 @@ from storage.tables.configurations import BASELINE
 CLASSES: Final = ("curves", "random", "trap")
 PLANNERS: Final = ("rrt", "gust", "follow")
 MOST_REDUCTION: Final = 0.89
+RECALL_MARGIN: Final = 0.01  # of all problems: a share so much less is still the published one
 FEW_EXPERIENCES: Final = (20, 40)
 ALL_EXPERIENCES: Final = 100
+PUBLISHED: Final = "computed from what the authors published: Why-coding/MotionMemory2DCar, 391699cc, 2023"
 RECALL: Final = (  # published: class, memory, share in which the plan is first, and among the first five
     ("curves", "curves", 0.950, 0.999),
     ("random", "random", 0.250, 0.614),
@@ -54,11 +57,14 @@ def _recall_claim(evidence: Evidence, name: str, memory: str, first: float, five
         f"{100 * first:.1f} %, among the first five in {100 * five:.1f} %."
     )
     statements = [
-        Statement(evidence.origin_hits(name, memory, k), partial(Estimate.reaches, line=share))
+        Statement(
+            evidence.origin_hits(name, memory, k),
+            partial(Estimate.is_no_less, than=share, margin=RECALL_MARGIN),
+        )
         for k, share in ((1, first), (5, five))
     ]
-    rule = "The interval of each share lies above the published share or reaches it."
-    return decided(text, "published figures", rule, statements)
+    rule = f"The interval of each share lies above the published share less {RECALL_MARGIN:.0%}."
+    return decided(text, PUBLISHED, rule, statements)
 
 
 def _most(evidence: Evidence) -> list[Statement]:
@@ -88,7 +94,7 @@ def _left_to_right(evidence: Evidence) -> list[Statement]:
 
 def _open_not_worse(evidence: Evidence) -> list[Statement]:
     return [
-        Statement(evidence.reduction(name, planner, after, before), Estimate.reaches)
+        Statement(evidence.reduction(name, planner, after, before), Estimate.is_no_less)
         for (name, planner), (before, after) in product(_PANELS, ((CLOSED_1, OPEN_1), (CLOSED_5, OPEN_5)))
     ]
 
@@ -183,7 +189,7 @@ _CLAIMS: Final = (  # section of the paper, the statements that decide, the clai
      _EACH + "above 0, each bar against the one before."),
     ("IV-B", _open_not_worse,
      "Open box is as fast as closed box or faster.",
-     _EACH + "above 0 or reaches it, open against closed with as many plans."),
+     _EACH + f"above −{NO_LESS_MARGIN:.0%}, open against closed with as many plans."),
     ("IV-B", _five_mostly_better,
      "In most cases five recalled plans are better than one.",
      "Five are faster than one, with the whole interval, in more than half of the panels."),

@@ -1,173 +1,221 @@
-"""Two runs side by side, paired by problem: what the second does faster or slower than the first."""
+"""Two runs side by side, paired by problem: what the second does better or worse than the first.
+
+A time says something of a run only if both were measured in turn on one machine; else the machine differs
+too. So rows of two runs are judged by what no machine changes: problems solved, seconds of driving, checks,
+expansions, plans recalled. Where all attempts were made in turn, the whole time until the robot is there and
+planning are judged. What uses no memory cannot differ: it raises an alarm instead of a verdict.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Final, NamedTuple
 
 import numpy as np
 import pandas as pd
-from rich.console import Group
 
-from dashboards.cells import (
-    NOTHING,
-    Rows,
-    decimals_of,
-    percent,
-    titled_markdown,
-    titled_tables,
-    with_interval,
-)
-from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval, ratio
+from dashboards.statistics.intervals import ratio
 from dashboards.statistics.panels import Panel, panels
-from dashboards.statistics.sign_tests import holm, signs
+from dashboards.statistics.swaps import DRAWN, Difference, differences
 from planners.world.arrays import Floats
-from storage.tables.configurations import BASELINE, Configuration
+from storage.tables.configurations import WITHOUT_MEMORY, Configuration
 
-FASTER: Final = "faster"
-SLOWER: Final = "slower"
-OPEN: Final = "open"  # the interval reaches over 0
-HEADINGS: Final = (
-    "planner", "configuration", "first ms", "ms", "less time %", "fewer checks %", "slower %", "solved %",
-    "verdict",
-)  # fmt: skip
+BETTER: Final = "better"
+WORSE: Final = "worse"
+SAME: Final = "no difference"
+CONTROL: Final = "control"  # it uses no memory, and does not differ
+ALARM: Final = "alarm"  # it uses no memory, but differs
+LATER_MARGIN: Final = 0.01  # of the time until the robot is there: so much later is no later
+MACHINE_MARGIN: Final = 0.05  # by which times without memory may differ before the machine is said to differ
 COLUMNS: Final = (
     "panel", "planner", "configuration", "problems", "first_ms", "ms", "reduction", "reduction_low",
-    "reduction_high", "checks_reduction", "checks_reduction_low", "checks_reduction_high", "first_solved",
-    "solved", "slower", "p_value", "verdict",
+    "reduction_high", "mostly", "mostly_low", "mostly_high", "checks_reduction", "checks_reduction_low",
+    "checks_reduction_high", "first_driving_s", "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s",
+    "first_solved", "solved", "first_recalled", "recalled", "verdict", "why",
 )  # fmt: skip
+
+
+class _Measure(NamedTuple):
+    """What is measured of each attempt, such that less is better."""
+
+    of: Callable[[Panel], Floats]  # [problems, columns]
+    less: str  # in words, if the other run has less
+    more: str
+
+
+def _arrival(panel: Panel) -> Floats:
+    return panel.matrix("duration_s") + panel.matrix("planning_seconds")
+
+
+def _logarithm(values: Floats) -> Floats:
+    return np.log(np.maximum(values, 1e-6))
+
+
+def _not_recalled(panel: Panel) -> Floats:
+    rows = panel.rows.assign(missed=(panel.rows["source"] != "recalled").astype(float))
+    return panel._replace(rows=rows).matrix("missed")
+
+
+_UNSOLVED: Final = _Measure(lambda panel: 1.0 - panel.matrix("solved"), "solves more", "solves fewer")
+_ARRIVAL: Final = _Measure(_arrival, "there sooner", "there later")
+_DRIVING: Final = _Measure(lambda panel: panel.matrix("duration_s"), "drives shorter", "drives longer")
+_PLANNING: Final = _Measure(lambda panel: panel.milliseconds(), "plans faster", "plans slower")
+_MOSTLY: Final = _Measure(lambda panel: _logarithm(panel.milliseconds()), "mostly faster", "mostly slower")
+_CHECKS: Final = _Measure(lambda panel: panel.matrix("collision_checks"), "fewer checks", "more checks")
+_EXPANSIONS: Final = _Measure(lambda panel: panel.matrix("expansions"), "expands less", "expands more")
+_MISSED: Final = _Measure(_not_recalled, "recalls more", "recalls less")
+_COUNTS: Final = (_CHECKS, _EXPANSIONS, _MISSED)
+
+
+class _Sides(NamedTuple):
+    """A panel of both runs, and the columns that both have."""
+
+    first: Panel
+    other: Panel
+    columns: list[tuple[str, Configuration]]
+
+    def values(self, measure: _Measure) -> tuple[Floats, Floats]:
+        """What was measured of both, ``[problems, columns]`` each; NaN where one has none."""
+        first, other = (
+            measure.of(panel)[:, [panel.columns.index(column) for column in self.columns]]
+            for panel in (self.first, self.other)
+        )
+        missing = np.isnan(first) | np.isnan(other)
+        return np.where(missing, np.nan, first), np.where(missing, np.nan, other)
+
+    def means(self, measure: _Measure) -> tuple[Floats, Floats]:
+        """The means ``[columns]`` of both over the same problems; NaN if there are none."""
+        first, other = self.values(measure)
+        count = (~np.isnan(first)).sum(axis=0)
+        means = (
+            np.divide(np.nansum(each, axis=0), count, out=np.full(len(count), np.nan), where=count > 0)
+            for each in (first, other)
+        )
+        return next(means), next(means)
 
 
 def compare_runs(
-    first: pd.DataFrame, other: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES
+    first: pd.DataFrame, other: pd.DataFrame, in_turn: bool = False, seed: int = 0, drawn: int = DRAWN
 ) -> pd.DataFrame:
     """Compare two runs by the problems that both attempted.
 
-    A machine may be faster on another day, so a planner's times are taken relative to what it needed without
-    memory in the same run. Attempts without memory, and those of a planner that has none of these, are
-    compared as they are: the former show how much the machines differ.
+    Args:
+        first: attempt rows of a run.
+        other: attempt rows of the run that is compared with it.
+        in_turn: whether the attempts of both were made in turn on one machine, in an order that was drawn.
+        seed: of the swaps by which differences are judged.
+        drawn: how many swaps.
 
-    ``first``, ``other``: attempt rows of the runs. ``seed``, ``resamples``: of the bootstrap.
+    Returns:
+        a row a panel, planner and configuration that both attempted, with the columns of ``COLUMNS``.
+        ``reduction`` is 1 less the ratio of mean planning times, ``mostly`` 1 less the geometric mean of
+        the problems' ratios. ``sooner_s`` says how much sooner the robot is there, where both solved the
+        problem; unless ``in_turn`` only driving counts. ``_low`` and ``_high`` are the ends of intervals that
+        hold for all rows at once; planning has them only ``in_turn``. ``verdict`` is BETTER, WORSE or SAME,
+        without memory CONTROL or ALARM, and ``why`` says by what.
 
-    Returns a row a panel, planner and configuration that both attempted, with the columns of ``COLUMNS``:
-    ``reduction`` is 1 less the ratio of the relative means, ``slower`` the share of problems in which the
-    other run took relatively longer, ``p_value`` that of a sign test, corrected (Holm), ``verdict`` FASTER or
-    SLOWER if the 95 % interval of the reduction says so, else OPEN.
     """
-    shared = np.intersect1d(first["problem_id"], other["problem_id"])
-    before = {panel.name: panel for panel in panels(first[first["problem_id"].isin(shared)])}
-    after = {panel.name: panel for panel in panels(other[other["problem_id"].isin(shared)])}
-    tables = [
-        _compare(before[name], after[name], seed, resamples)
-        for name in after
-        if name in before and before[name].problems == after[name].problems
-    ]
-    tables = [table for table in tables if len(table)]
-    if not tables:
+    pairs = _paired(first, other)
+    if not pairs:
         return pd.DataFrame(columns=list(COLUMNS))
-    rows = pd.concat(tables, ignore_index=True)
-    return rows.assign(p_value=holm(rows["p_value"].to_numpy(float)))[list(COLUMNS)]
+    reach = _ARRIVAL if in_turn else _DRIVING
+    measures = (_UNSOLVED, reach, *([_PLANNING, _MOSTLY] if in_turn else []), *_COUNTS)
+    families = [np.hstack([np.subtract(*sides.values(each)) for each in measures]) for sides in pairs]
+    tables = []
+    for sides, found in zip(pairs, differences(families, seed, drawn), strict=True):
+        split = zip(*(np.split(each, len(measures)) for each in found), strict=True)
+        by_measure = {each: Difference(*ends) for each, ends in zip(measures, split, strict=True)}
+        tables.append(_table(sides, by_measure, reach))
+    return pd.concat(tables, ignore_index=True)[list(COLUMNS)]
 
 
-class _Side(NamedTuple):
-    """What one run measured in the columns that both have; ``[problems, columns]`` each."""
-
-    times: Floats  # ms
-    alone: Floats  # ms of the same planner without memory; 1 for columns that are compared as they are
-    censored: Floats  # times, infinite where an attempt failed
-    checks: Floats
-    solved: Floats
-
-
-def _side(panel: Panel, columns: list[tuple[str, Configuration]]) -> _Side:
-    indices = [panel.columns.index(column) for column in columns]
-    times = panel.milliseconds()
-    alone = panel.baseline(times)[:, indices]
-    is_baseline = np.array([configuration == BASELINE for _, configuration in columns])
-    as_it_is = np.isnan(alone).all(axis=0) | is_baseline
-    matrices = (panel.censored(), panel.matrix("collision_checks"), panel.matrix("solved"))
-    return _Side(times[:, indices], np.where(as_it_is, 1.0, alone), *(each[:, indices] for each in matrices))
-
-
-def _compare(first: Panel, other: Panel, seed: int, resamples: int) -> pd.DataFrame:
-    columns = [column for column in other.columns if column in first.columns]
-    if not columns:
-        return pd.DataFrame()
-    sides = _side(first, columns), _side(other, columns)
-    before, after = (np.nanmean(side.times, axis=0) for side in sides)
-    drift = ratio(*(np.nanmean(side.alone, axis=0) for side in sides))  # of machines, from other to first
-    resampled = [1.0 - bootstrap(side.times, side.alone, seed, resamples).reductions for side in sides]
-    low, high = interval(1.0 - ratio(resampled[1], resampled[0]))  # the same problems are drawn for both
-    checks = sides[1].checks, sides[0].checks
-    checks_low, checks_high = interval(bootstrap(*checks, seed, resamples).reductions)
-    compared = [
-        signs(mine, base)
-        for mine, base in zip((drift * sides[1].censored).T, sides[0].censored.T, strict=True)
+def alarms(rows: pd.DataFrame) -> list[str]:
+    """A line for each of the ``rows`` of ``compare_runs`` that uses no memory and differs all the same."""
+    wrong = rows[rows["verdict"] == ALARM]
+    return [
+        f"ALARM: {row['planner']} {row['configuration']} on {row['panel']} uses no memory, yet {row['why']}."
+        for row in wrong.to_dict("records")
     ]
-    rows = pd.DataFrame(
-        {
-            "panel": first.name,
-            "planner": [planner for planner, _ in columns],
-            "configuration": [configuration.label for _, configuration in columns],
-            "problems": [each.compared for each in compared],
-            "first_ms": before,
-            "ms": after,
-            "reduction": 1.0 - ratio(drift * after, before),
-            "reduction_low": low,
-            "reduction_high": high,
-            "checks_reduction": 1.0 - ratio(*(np.nanmean(each, axis=0) for each in checks)),
-            "checks_reduction_low": checks_low,
-            "checks_reduction_high": checks_high,
-            "first_solved": np.nanmean(sides[0].solved, axis=0),
-            "solved": np.nanmean(sides[1].solved, axis=0),
-            "slower": [each.slower for each in compared],
-            "p_value": [each.p_value for each in compared],
-        }
-    )
-    verdicts = np.select([rows["reduction_low"] > 0.0, rows["reduction_high"] < 0.0], [FASTER, SLOWER], OPEN)
-    without = [configuration == BASELINE for _, configuration in columns]
-    return rows.assign(verdict=np.where(without, NOTHING, verdicts))
-
-
-def comparison_table(rows: pd.DataFrame) -> Group:
-    """The ``rows`` of ``compare_runs`` for a terminal: a table a panel."""
-    return titled_tables(HEADINGS, comparison_cells(rows))
-
-
-def comparison_markdown(rows: pd.DataFrame) -> str:
-    """The ``rows`` of ``compare_runs`` as Markdown: a heading and a table a panel."""
-    return titled_markdown(HEADINGS, comparison_cells(rows))
 
 
 def verdict(rows: pd.DataFrame) -> str:
-    """In words, how many configurations in the ``rows`` of ``compare_runs`` are faster, slower and open."""
+    """How many configurations in the ``rows`` of ``compare_runs`` are better, worse or the same, in words."""
     counts = Counter(rows["verdict"])
-    named = [f"{counts[each]} {each}" for each in (FASTER, SLOWER, OPEN)]
-    return f"{', '.join(named)} of {sum(counts[each] for each in (FASTER, SLOWER, OPEN))} configurations"
+    named = ", ".join(f"{counts[each]} {each}" for each in (BETTER, WORSE, SAME))
+    return f"{named} of {sum(counts[each] for each in (BETTER, WORSE, SAME))} configurations"
 
 
-def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
-    """Of each panel in the ``rows`` of ``compare_runs`` a title, and a group of cells for each planner."""
-    for panel, of_panel in rows.groupby("panel", sort=False):
-        decimals = decimals_of(of_panel[["first_ms", "ms"]].to_numpy(dtype=float))
-        groups = [
-            [_cells(row, decimals) for row in of_planner.to_dict("records")]
-            for _, of_planner in of_panel.groupby("planner", sort=False)
-        ]
-        yield f"{panel}, {int(of_panel['problems'].max()):,} problems in both; [95 %]", groups
-
-
-def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
-    return [
-        row["planner"],
-        row["configuration"],
-        *[f"{row[name]:,.{decimals}f}" for name in ("first_ms", "ms")],
-        *[
-            with_interval(row[name], row[f"{name}_low"], row[f"{name}_high"])
-            for name in ("reduction", "checks_reduction")
-        ],
-        percent(row["slower"]),
-        percent(row["solved"]),
-        row["verdict"],
+def _paired(first: pd.DataFrame, other: pd.DataFrame) -> list[_Sides]:
+    """The panels in which both attempted the same problems in the same ways."""
+    shared = np.intersect1d(first["problem_id"], other["problem_id"])
+    before, after = (
+        {panel.name: panel for panel in panels(rows[rows["problem_id"].isin(shared)])}
+        for rows in (first, other)
+    )
+    both = [
+        _Sides(
+            before[name], after[name], [each for each in after[name].columns if each in before[name].columns]
+        )
+        for name in after
+        if name in before and before[name].problems == after[name].problems
     ]
+    return [sides for sides in both if sides.columns]
+
+
+def _table(sides: _Sides, found: dict[_Measure, Difference], reach: _Measure) -> pd.DataFrame:
+    names = [(sides.other.name, planner, each.label) for planner, each in sides.columns]
+    rows = pd.DataFrame(names, columns=["panel", "planner", "configuration"])
+    rows["problems"] = (~np.isnan(sides.values(_UNSOLVED)[0])).sum(axis=0)
+    rows["first_ms"], rows["ms"] = sides.means(_PLANNING)
+    rows["first_driving_s"], rows["driving_s"] = sides.means(_DRIVING)
+    for name, measure in (("solved", _UNSOLVED), ("recalled", _MISSED)):
+        rows[f"first_{name}"], rows[name] = (1.0 - each for each in sides.means(measure))
+    rows["reduction"] = 1.0 - ratio(rows["ms"].to_numpy(), rows["first_ms"].to_numpy())
+    rows[["reduction_low", "reduction_high", "mostly", "mostly_low", "mostly_high"]] = np.nan
+    if _MOSTLY in found:
+        for name, value in zip(("mostly", "mostly_low", "mostly_high"), found[_MOSTLY], strict=True):
+            rows[name] = 1.0 - np.exp(-value)
+    for name, measure in (("reduction", _PLANNING), ("checks_reduction", _CHECKS)):
+        if measure in found:
+            base = sides.means(measure)[0]
+            ends = [np.where(base > 0.0, ratio(each, base), np.sign(each)) for each in found[measure]]
+            rows[name], rows[f"{name}_low"], rows[f"{name}_high"] = ends
+    rows["sooner_s"], rows["sooner_low_s"], rows["sooner_high_s"] = found[reach]
+    later = LATER_MARGIN * sides.means(reach)[0]
+    judged = [_judged(found, reach, i, later[i]) for i in range(len(rows))]
+    for i, (_, configuration) in enumerate(sides.columns):
+        if configuration.assist in WITHOUT_MEMORY:
+            judged[i] = _of_control(judged[i], _PLANNING in found, float(rows["reduction"].iloc[i]))
+    return rows.assign(verdict=[each[0] for each in judged], why=[each[1] for each in judged])
+
+
+def _judged(found: dict[_Measure, Difference], reach: _Measure, i: int, margin: float) -> tuple[str, str]:
+    """Verdict and reason for a column: what counts most decides."""
+
+    def words(measures: Iterable[_Measure], less: bool) -> list[str]:
+        if less:
+            return [each.less for each in measures if found[each].low[i] > 0.0]
+        return [each.more for each in measures if found[each].high[i] < 0.0]
+
+    efforts = [_PLANNING, _MOSTLY] if _PLANNING in found else list(_COUNTS)
+    for decisive in ([_UNSOLVED], [reach], efforts):
+        good, bad = words(decisive, less=True), words(decisive, less=False)
+        if bad:
+            return (SAME if good else WORSE), ", ".join(good + bad)
+        if good and found[_UNSOLVED].mean[i] < 0.0:
+            return SAME, f"{', '.join(good)}; may solve fewer"
+        if good and decisive is efforts and not found[reach].low[i] >= -margin:
+            return SAME, f"{', '.join(good)}; may be {reach.more}"
+        if good:
+            return BETTER, ", ".join(good)
+    return SAME, ""
+
+
+def _of_control(judged: tuple[str, str], in_turn: bool, reduction: float) -> tuple[str, str]:
+    """What takes the place of a verdict where no memory is used."""
+    if judged[1]:
+        return ALARM, judged[1]
+    if not in_turn and abs(reduction) > MACHINE_MARGIN:
+        return ALARM, f"the machine took {abs(reduction):.0%} {'less' if reduction > 0.0 else 'more'} time"
+    return CONTROL, ""

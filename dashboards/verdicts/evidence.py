@@ -37,6 +37,7 @@ _PAIRS: Final[tuple[_Pair, ...]] = (
     *((BASELINE, each) for each in (*WITH_MEMORY, RANDOM_1, RANDOM_5)),
     (CLOSED_1, CLOSED_5), (CLOSED_5, OPEN_1), (OPEN_1, OPEN_5), (CLOSED_1, OPEN_1), (CLOSED_5, OPEN_5),
 )  # fmt: skip
+NO_LESS_MARGIN: Final = 0.05  # of planning time: so much more is still no slower
 _TAIL: Final = 0.5 * (1.0 - CONFIDENCE)
 _OVERHEAD: Final = ("occupancy_seconds", "encode_seconds", "recall_seconds", "check_seconds")
 
@@ -61,9 +62,9 @@ class Estimate(NamedTuple):
         """Whether it is less than ``line``; None if its interval reaches over it."""
         return None if (above := self.above(line)) is None else not above
 
-    def reaches(self, line: float = 0.0) -> bool:
-        """Whether it exceeds ``line`` or cannot be told from it."""
-        return self.high >= line
+    def is_no_less(self, than: float = 0.0, margin: float = NO_LESS_MARGIN) -> bool | None:
+        """Whether it is less than a line by ``margin`` at most; None if its interval does not decide that."""
+        return self.above(than - margin)
 
     def widened(self, together: int) -> Estimate:
         """The same with an interval for so many estimates ``together`` (Bonferroni, as of a normal law)."""

@@ -15,7 +15,8 @@ from storage.tables.configurations import BASELINE, Configuration, configured
 
 COLUMNS: Final = (
     "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "memory", "status", "solved",
-    "source", "planning_seconds", "collision_checks", "length_m", "duration_s", "seed", "vehicle",
+    "source", "planning_seconds", "collision_checks", "expansions", "length_m", "duration_s", "seed",
+    "vehicle",
 )  # fmt: skip
 SHOWS: Final = {
     "all": "all attempts",

@@ -43,8 +43,8 @@ def export(run: Path, *, format: str, out: Path) -> None:
     export_run(run, format, out)
 
 
-def compare(*runs: Path, out: Path | None = None) -> None:
-    """Compare runs with the first one, paired by problem: times, checks, solved, with intervals.
+def compare(*runs: Path, out: Path | None = None, measure: bool = False, problems: int | None = None) -> None:
+    """Compare runs with the first one, paired by problem: solved, driving, work, and times if measured.
 
     Parameters
     ----------
@@ -52,8 +52,12 @@ def compare(*runs: Path, out: Path | None = None) -> None:
         Two or more folders of runs, in the data folder's runs.
     out
         A file that the comparison is also written to: .md, .json or .csv.
+    measure
+        Measure the memories of both runs in turn, instead of going by what each has measured alone.
+    problems
+        How many test problems of a class to measure; default 300.
 
     """
     from tasks.reports.compare import compare as task
 
-    task(runs, out)
+    task(runs, out, measure, problems)

@@ -13,7 +13,7 @@ ASSISTS: Final = (
 RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "random")
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
-_WITHOUT_MEMORY: Final = ("none", "fresh")
+WITHOUT_MEMORY: Final = ("none", "fresh")
 
 
 class Configuration(NamedTuple):
@@ -64,7 +64,7 @@ def configurations_in(table: pd.DataFrame) -> list[Configuration]:
 
 def _understood(assist: str, top_k: float, recall: object) -> Configuration:
     """The configuration that a row's fields mean, whichever version wrote it."""
-    if assist in _WITHOUT_MEMORY:
+    if assist in WITHOUT_MEMORY:
         return Configuration(assist, "", 0)
     if assist == "exhaustive":
         return Configuration("closed", "exhaustive", 0)

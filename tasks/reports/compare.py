@@ -11,7 +11,8 @@ from typing import Any, Final
 import pandas as pd
 
 from dashboards.cells import markdown_table, rich_table
-from dashboards.verdicts.comparison import compare_runs, comparison_markdown, comparison_table, verdict
+from dashboards.verdicts.comparison import alarms, compare_runs, verdict
+from dashboards.verdicts.comparison_tables import BY_COUNTS, IN_TURN, comparison_markdown, comparison_table
 from storage.errors import StorageError
 from storage.places.data_folder import open_run
 from storage.places.files import whole_file
@@ -25,12 +26,16 @@ from tasks.settings.run_settings import RunSettings
 ENDINGS: Final = (".md", ".json", ".csv")
 
 
-def compare(runs: Sequence[Path], out: Path | None) -> None:
-    """Print in which settings runs differ, and how much faster each is than the first.
+def compare(
+    runs: Sequence[Path], out: Path | None, measure: bool = False, problems: int | None = None
+) -> None:
+    """Print in which settings runs differ, and what each does better or worse than the first.
 
     Args:
         runs: folders of runs.
         out: where to write the comparison too: .md, .json or .csv.
+        measure: whether to measure the memories of both runs in turn, instead of reading their rows.
+        problems: how many of a class to measure; None for the default.
 
     Raises:
         UsageError: there are fewer than two runs, or ``out`` has another ending or lies in a run's folder.
@@ -43,12 +48,15 @@ def compare(runs: Sequence[Path], out: Path | None) -> None:
     if out is not None and out.suffix not in ENDINGS:
         raise UsageError(f"{out} ends in none of {', '.join(ENDINGS)}.")
     names = _names(runs)
-    different = _different([recorded_settings(open_run(run)) for run in runs])
+    settings = [recorded_settings(open_run(run)) for run in runs]
+    different = _different(settings)
     check_outputs(runs, [out])
-    first = _attempts(runs[0])
     tables: dict[str, pd.DataFrame] = {}
-    for name, run in zip(names[1:], runs[1:], strict=True):
-        tables[name] = compare_runs(first, _attempts(run))
+    for name, run, of_run in zip(names[1:], runs[1:], settings[1:], strict=True):
+        if measure:
+            tables[name] = _measured((runs[0], settings[0]), (run, of_run), problems)
+        else:
+            tables[name] = compare_runs(_attempts(runs[0]), _attempts(run))
         if tables[name].empty:
             raise StorageError(
                 f"{name} and {names[0]} have no attempt at the same problem in common; benchmark both with "
@@ -56,17 +64,31 @@ def compare(runs: Sequence[Path], out: Path | None) -> None:
             )
     headings = ("setting", *names)
     console().print(rich_table("What differs", headings, [different]))
+    how = IN_TURN if measure else BY_COUNTS
+    console().print(how)
     for name, rows in tables.items():
         console().print(f"[bold]{name}[/bold] against {names[0]}: {verdict(rows)}")
+        for line in alarms(rows):
+            console().print(line)
         console().print(comparison_table(rows))
     if out is not None:
         with whole_file(out) as temporary:
-            temporary.write_text(_written(out.suffix, names, different, tables), encoding="utf-8")
+            temporary.write_text(_written(out.suffix, names, different, tables, how), encoding="utf-8")
         print(f"compared {out}")
 
 
+def _measured(
+    first: tuple[Path, RunSettings], other: tuple[Path, RunSettings], problems: int | None
+) -> pd.DataFrame:
+    from tasks.reports.measure_in_turn import PROBLEMS, MeasuredRun, measure_in_turn  # Numba takes long
+
+    one, two = (MeasuredRun(open_run(path), settings) for path, settings in (first, other))
+    rows = measure_in_turn(one, two, PROBLEMS if problems is None else problems)
+    return compare_runs(*rows, in_turn=True)
+
+
 def _written(
-    ending: str, names: Sequence[str], different: list[list[str]], tables: dict[str, pd.DataFrame]
+    ending: str, names: Sequence[str], different: list[list[str]], tables: dict[str, pd.DataFrame], how: str
 ) -> str:
     if ending == ".csv":
         together = pd.concat([rows.assign(run=name, first=names[0]) for name, rows in tables.items()])
@@ -74,10 +96,14 @@ def _written(
     if ending == ".json":
         settings = {row[0]: dict(zip(names, row[1:], strict=True)) for row in different}
         records = {name: json.loads(rows.to_json(orient="records")) for name, rows in tables.items()}
-        return json.dumps({"first": names[0], "settings": settings, "runs": records}, indent=2) + "\n"
-    parts = [f"# {', '.join(names[1:])} against {names[0]}\n", markdown_table(("setting", *names), different)]
+        alarmed = {name: alarms(rows) for name, rows in tables.items()}
+        said = {"first": names[0], "how": how, "settings": settings, "alarms": alarmed, "runs": records}
+        return json.dumps(said, indent=2) + "\n"
+    title = f"# {', '.join(names[1:])} against {names[0]}\n"
+    parts = [title, f"{how}\n", markdown_table(("setting", *names), different)]
     for name, rows in tables.items():
-        parts += [f"## {name}: {verdict(rows)}\n", comparison_markdown(rows)]
+        parts += [f"## {name}: {verdict(rows)}\n", *(f"{line}\n" for line in alarms(rows))]
+        parts.append(comparison_markdown(rows))
     return "\n".join(parts)
 
 
@@ -88,7 +114,7 @@ def _names(runs: Sequence[Path]) -> list[str]:
 
 
 def _attempts(run: Path) -> pd.DataFrame:
-    return read_attempts(open_run(run).results, NOT_NEEDED)
+    return read_attempts(open_run(run).results, [name for name in NOT_NEEDED if name != "expansions"])
 
 
 def _different(settings: Sequence[RunSettings]) -> list[list[str]]:

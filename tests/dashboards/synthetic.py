@@ -56,6 +56,7 @@ def attempts(
                     "planning_seconds": seconds,
                     **{f"{part}_seconds": share for part, share in zip(PARTS, parts, strict=True)},
                     "collision_checks": int(1e6 * seconds),
+                    "expansions": int(1e5 * seconds),
                     "duration_s": 20.0 + rng.random() - (0.5 if recalled else 0.0) if solved else None,
                 }
             )

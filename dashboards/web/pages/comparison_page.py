@@ -7,21 +7,22 @@ from typing import Any, Final
 
 import pandas as pd
 
-from dashboards.cells import PLANNING_TIME, panel_title, planner_title, with_interval
-from dashboards.palette import GREEN, GREY, VERMILLION
-from dashboards.verdicts.comparison import FASTER, OPEN, SLOWER, compare_runs, comparison_cells, verdict
+from dashboards.cells import panel_title, planner_title, with_interval
+from dashboards.palette import GREEN, GREY, ORANGE, VERMILLION
+from dashboards.verdicts.comparison import ALARM, BETTER, SAME, WORSE, alarms, compare_runs, verdict
+from dashboards.verdicts.comparison_tables import BY_COUNTS, HEADINGS, comparison_cells
 from dashboards.web.charts import Chart, Dot, dots
 from dashboards.web.data_reader import DataReader, stamp_of
 from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
-from dashboards.web.pages.overview_page import reduction_ends, reduction_of
+from dashboards.web.pages.overview_page import reduction_ends
 from dashboards.web.parameters import Parameters
 from storage.places.run_folder import RunFolder
 
-RESAMPLES: Final = 1000
-RESAMPLES_OF_MANY: Final = 200
+DRAWN: Final = 2000
+DRAWN_OF_MANY: Final = 500
 MANY_ROWS: Final = 100_000
-_COLOURS: Final = {FASTER: GREEN, SLOWER: VERMILLION}
+_COLOURS: Final = {BETTER: GREEN, WORSE: VERMILLION, ALARM: ORANGE}
 
 
 def comparison(data: DataReader, params: Parameters) -> Page:
@@ -31,7 +32,7 @@ def comparison(data: DataReader, params: Parameters) -> Page:
     options = {"": "choose"} | {name: name for name in names}
     values: dict[str, Any] = {
         "path": params.path, "names": names, "first": first, "other": other, "verdict": "", "settings": [],
-        "tables": [], "resamples": RESAMPLES,
+        "tables": [], "how": BY_COUNTS, "alarms": [], "headings": HEADINGS,
         "menus": [
             menu("first", "First run", options, first), menu("other", "Other run", options, other)
         ],
@@ -42,7 +43,7 @@ def comparison(data: DataReader, params: Parameters) -> Page:
         raise BadRequestError(f"{first} is both runs; choose two.")
     if first and other:
         one, two = data.run(first), data.run(other)
-        table, values["resamples"] = _compared(data, one, two)
+        table = _compared(data, one, two)
         if table.empty:
             values["verdict"] = (
                 f"{other} and {first} have no attempt at the same problem in common; benchmark both with the "
@@ -51,6 +52,7 @@ def comparison(data: DataReader, params: Parameters) -> Page:
         else:
             charts = [_chart(table, first, other)]
             values["verdict"] = f"{other} against {first}: {verdict(table)}."
+            values["alarms"] = alarms(table)
             values["settings"] = _different(data.settings(one), data.settings(two))
             values["tables"] = [
                 (title, [[planner_title(row[0]), *row[1:]] for group in groups for row in group])
@@ -60,37 +62,41 @@ def comparison(data: DataReader, params: Parameters) -> Page:
     return Page("compare.html.jinja", "Compare", "Compare", run, values, charts)
 
 
-def _compared(data: DataReader, one: RunFolder, two: RunFolder) -> tuple[pd.DataFrame, int]:
+def _compared(data: DataReader, one: RunFolder, two: RunFolder) -> pd.DataFrame:
     first, other = (
         data.attempts(run).rows.astype({"problem_id": object, "assist": object, "recall": object})
         for run in (one, two)
     )
-    resamples = RESAMPLES_OF_MANY if len(first) + len(other) > MANY_ROWS else RESAMPLES
+    drawn = DRAWN_OF_MANY if len(first) + len(other) > MANY_ROWS else DRAWN
     key = ("compare", stamp_of(one.results), stamp_of(two.results))
-    return data.kept(key, lambda: compare_runs(first, other, resamples=resamples)), resamples
+    return data.kept(key, lambda: compare_runs(first, other, drawn=drawn))
 
 
 def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
     drawings = []
-    ends = reduction_ends(table["reduction_low"])
+    ends = reduction_ends(table["checks_reduction_low"])
     for (panel, planner), rows in table.groupby(["panel", "planner"], sort=False):
         title = panel_title(str(panel), str(planner))
         rows_of_panel = []
         for row in rows.to_dict("records"):
-            less = with_interval(row["reduction"], row["reduction_low"], row["reduction_high"])
-            words = f"{title}, {row['configuration']}: {less} % less, {row['verdict']}"
+            less, low, high = (float(row[f"checks_reduction{end}"]) for end in ("", "_low", "_high"))
+            fewer = f"{with_interval(less, low, high)} % fewer checks"
+            why = f"{row['verdict']}{row['why'] and ': '}{row['why']}"
+            words = f"{title}, {row['configuration']}: {fewer}, {why}"
             colour = _COLOURS.get(row["verdict"], GREY)
-            rows_of_panel.append(Dot(row["configuration"], reduction_of(row), colour, words))
-        drawings.append(dots(title, rows_of_panel, "less planning time than the first run, %", ends))
+            rows_of_panel.append(
+                Dot(row["configuration"], (100.0 * less, 100.0 * low, 100.0 * high), colour, words)
+            )
+        drawings.append(dots(title, rows_of_panel, "fewer collision checks than the first run, %", ends))
     return Chart(
         "comparison",
-        "How much less time the other run needs",
-        f"{other} against {first}, on the problems that are in both. A planner's times are taken relative to "
-        "what it needed without memory in the same run, because a faster machine is no progress; the row "
-        f"“none” shows how much the machines differ. Bootstrap 95 % intervals. {PLANNING_TIME}",
+        "How much less work the other run needs",
+        f"{other} against {first}, on the problems that are in both: collision checks, which no machine "
+        "changes, with 95 % intervals that hold for all rows at once. Colours say what is better or worse by "
+        "problems solved, then seconds of driving, then checks, expansions and plans recalled.",
         drawings,
         table,
-        [(GREEN, FASTER), (VERMILLION, SLOWER), (GREY, f"{OPEN}: the interval reaches over 0")],
+        [(GREEN, BETTER), (VERMILLION, WORSE), (ORANGE, ALARM), (GREY, SAME)],
     )
 
 

@@ -133,7 +133,7 @@ def test_growing_experience_is_read_from_the_runs_that_have_it() -> None:
 
 
 def test_recall_is_held_against_the_plan_that_a_problem_was_made_for() -> None:
-    rows = recalls(protocols=("held-out",))
+    rows = recalls(problems=600, protocols=("held-out",))
     told = rows.assign(made_for=[int(order[0]) for order in rows["order"]])
     never = rows.assign(made_for=[int(order[-1]) for order in rows["order"]])
     for table, verdict in ((rows.assign(made_for=-1), OPEN), (told, HOLDS), (never, FAILS)):
@@ -158,5 +158,6 @@ def test_a_figure_decides_only_with_its_whole_interval(low: float, width: float,
     figure = Estimate("", low + 0.5 * width, low, low + width)
     assert (figure.above(line) is None) == (figure.low <= line <= figure.high)
     assert figure.below(line) is (None if figure.above(line) is None else not figure.above(line))
-    assert figure.reaches(line) == (figure.above(line) is not False)
+    assert figure.is_no_less(line, 0.1) == figure.above(line - 0.1)
+    assert figure.is_no_less(line, 0.1) in {True, None} or figure.high <= line - 0.1
     assert figure.exceeds(figure) is None

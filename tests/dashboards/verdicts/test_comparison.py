@@ -6,30 +6,38 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from dashboards.report.tables import NOTHING
 from dashboards.verdicts.comparison import (
+    ALARM,
+    BETTER,
     COLUMNS,
-    FASTER,
-    OPEN,
-    SLOWER,
+    CONTROL,
+    SAME,
+    WORSE,
+    alarms,
     compare_runs,
-    comparison_markdown,
-    comparison_table,
     verdict,
 )
+from dashboards.verdicts.comparison_tables import comparison_markdown, comparison_table
 from tests.dashboards.synthetic import attempts
 
-RESAMPLES = 300
+DRAWN = 1000
 
 
-def _compare(first: pd.DataFrame, other: pd.DataFrame) -> pd.DataFrame:
-    return compare_runs(first, other, resamples=RESAMPLES)
+def _compare(first: pd.DataFrame, other: pd.DataFrame, in_turn: bool = False) -> pd.DataFrame:
+    return compare_runs(first, other, in_turn, drawn=DRAWN)
 
 
-def _faster(rows: pd.DataFrame, factor: float, which: pd.Series) -> pd.DataFrame:
-    return rows.assign(
-        planning_seconds=np.where(which, rows["planning_seconds"] / factor, rows["planning_seconds"])
-    )
+def _times(rows: pd.DataFrame, factor: float, which: pd.Series, column: str) -> pd.DataFrame:
+    return rows.assign(**{column: np.where(which, factor * rows[column], rows[column])})
+
+
+def _noisy(rows: pd.DataFrame, seed: int) -> pd.DataFrame:
+    noise = np.random.default_rng(seed).lognormal(0.0, 0.3, len(rows))
+    return rows.assign(planning_seconds=noise * rows["planning_seconds"])
+
+
+def _of_gust(table: pd.DataFrame) -> pd.Series:
+    return table["configuration"].str.startswith("closed") & (table["planner"] == "gust")
 
 
 @pytest.fixture(scope="module")
@@ -37,35 +45,104 @@ def run() -> pd.DataFrame:
     return attempts()
 
 
-def test_a_run_is_no_faster_than_itself(run: pd.DataFrame) -> None:
-    rows = _compare(run, run.sample(frac=1.0, random_state=1))
+@pytest.fixture(scope="module")
+def closed_of_gust(run: pd.DataFrame) -> pd.Series:
+    return (run["assist"] == "closed") & (run["planner"] == "gust")
+
+
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_a_run_does_not_differ_from_itself(run: pd.DataFrame, in_turn: bool) -> None:
+    rows = _compare(run, run.sample(frac=1.0, random_state=1), in_turn)
     assert list(rows.columns) == list(COLUMNS)
     keys = ["problem_class", "planner", "assist", "top_k", "recall"]
     assert len(rows) == len(run[keys].drop_duplicates())
-    assert np.allclose(
-        rows[["reduction", "reduction_low", "reduction_high", "checks_reduction", "slower"]], 0.0
+    assert np.allclose(rows[["reduction", "checks_reduction", "sooner_s"]], 0.0)
+    controls = rows["configuration"].isin(["none", "fresh"])
+    assert set(rows.loc[controls, "verdict"]) == {CONTROL}
+    assert set(rows.loc[~controls, "verdict"]) == {SAME}
+    assert alarms(rows) == []
+
+
+def test_a_slower_machine_is_an_alarm_and_no_difference(run: pd.DataFrame) -> None:
+    rows = _compare(run, _noisy(run.assign(planning_seconds=3.0 * run["planning_seconds"]), 1))
+    controls = rows["configuration"].isin(["none", "fresh"])
+    assert set(rows.loc[controls, "verdict"]) == {ALARM}
+    assert set(rows.loc[~controls, "verdict"]) == {SAME}
+    assert rows.loc[~controls, ["reduction_low", "reduction_high"]].isna().all(axis=None)
+    assert "more time" in alarms(rows)[0]
+
+
+def test_load_on_attempts_without_memory_makes_no_memory_better(run: pd.DataFrame) -> None:
+    loaded = _times(run, 2.0, run["assist"] == "none", "planning_seconds")
+    assert set(_compare(run, loaded)["verdict"]) <= {SAME, CONTROL, ALARM}
+    assert BETTER not in set(_compare(run, loaded, in_turn=True)["verdict"])
+
+
+def test_noise_of_attempts_in_turn_is_no_difference(run: pd.DataFrame) -> None:
+    found = [_compare(_noisy(run, i), _noisy(run, 100 + i), in_turn=True)["verdict"] for i in range(6)]
+    assert sum(bool({BETTER, WORSE, ALARM} & set(each)) for each in found) <= 2
+
+
+def test_what_became_faster_in_turn_is_found_and_nothing_else(
+    run: pd.DataFrame, closed_of_gust: pd.Series
+) -> None:
+    one = run.assign(duration_s=20.0).where(run["solved"], run)
+    faster = _times(one, 0.5, closed_of_gust, "planning_seconds")
+    rows = _compare(one, faster, in_turn=True)
+    changed = _of_gust(rows)
+    assert np.allclose(rows.loc[changed, "reduction"], 0.5)
+    assert (rows.loc[changed, "reduction_low"] > 0.0).all()
+    assert set(rows.loc[changed, "verdict"]) == {BETTER}
+    assert set(rows.loc[~changed, "verdict"]) == {SAME, CONTROL}
+    assert (
+        verdict(rows)
+        == f"{changed.sum()} better, 0 worse, {9 * 7 - changed.sum()} no difference of 63 configurations"
     )
-    assert set(rows.loc[rows["configuration"] != "none", "verdict"]) == {OPEN}
-    assert set(rows.loc[rows["configuration"] == "none", "verdict"]) == {NOTHING}
+    back = _compare(faster, one, in_turn=True)
+    assert set(back.loc[changed, "verdict"]) == {WORSE}
 
 
-def test_a_slower_machine_is_no_difference(run: pd.DataFrame) -> None:
-    rows = _compare(run, _faster(run, 1 / 3, run["planning_seconds"] > 0.0))
-    alone = rows["configuration"] == "none"
-    assert np.allclose(rows.loc[alone, "reduction"], -2.0)  # which is shown
-    assert np.allclose(rows.loc[~alone, ["reduction", "reduction_low", "reduction_high"]], 0.0)
-    assert set(rows.loc[~alone, "verdict"]) == {OPEN}
+def test_less_work_is_found_without_a_clock(run: pd.DataFrame, closed_of_gust: pd.Series) -> None:
+    less = _times(run, 0.5, closed_of_gust, "collision_checks")
+    rows = _compare(run, less)
+    assert set(rows.loc[_of_gust(rows), "why"]) == {"fewer checks"}
+    assert set(rows.loc[_of_gust(rows), "verdict"]) == {BETTER}
+    assert set(rows.loc[~_of_gust(rows), "verdict"]) == {SAME, CONTROL}
 
 
-def test_what_became_faster_is_found_and_nothing_else(run: pd.DataFrame) -> None:
-    rows = _compare(run, _faster(run, 2.0, (run["assist"] == "closed") & (run["planner"] == "gust")))
-    changed = rows["configuration"].str.startswith("closed") & (rows["planner"] == "gust")
-    assert np.allclose(rows.loc[changed, ["reduction", "reduction_low", "reduction_high"]], 0.5)
-    assert set(rows.loc[changed, "verdict"]) == {FASTER}
-    assert FASTER not in set(rows.loc[~changed, "verdict"])
-    back = _compare(_faster(run, 2.0, run["assist"] == "closed"), run)
-    assert set(back.loc[back["configuration"].str.startswith("closed"), "verdict"]) == {SLOWER}
-    assert verdict(rows).startswith(f"{changed.sum()} faster, 0 slower, ")
+@pytest.mark.parametrize("in_turn", [True, False])
+def test_quicker_to_plan_and_longer_to_drive_is_worse(
+    run: pd.DataFrame, closed_of_gust: pd.Series, in_turn: bool
+) -> None:
+    quicker = _times(run, 0.1, closed_of_gust, "planning_seconds")
+    quicker = _times(quicker, 0.1, closed_of_gust, "collision_checks")
+    rows = _compare(run, _times(quicker, 1.1, closed_of_gust, "duration_s"), in_turn)
+    assert set(rows.loc[_of_gust(rows), "verdict"]) == {WORSE}
+    assert set(rows.loc[_of_gust(rows), "why"]) == {"there later" if in_turn else "drives longer"}
+
+
+def test_whoever_may_drive_longer_by_more_than_the_margin_is_not_better(
+    run: pd.DataFrame, closed_of_gust: pd.Series
+) -> None:
+    quicker = _times(run, 0.1, closed_of_gust, "planning_seconds")
+    rng = np.random.default_rng(3)
+    other = quicker.assign(duration_s=quicker["duration_s"] * rng.lognormal(0.0, 0.3, len(run)))
+    rows = _compare(run, other, in_turn=True)
+    unclear = _of_gust(rows) & (rows["sooner_low_s"] < -0.3) & (rows["sooner_high_s"] > 0.0)
+    assert unclear.any()
+    assert BETTER not in set(rows.loc[unclear, "verdict"])
+    assert rows.loc[unclear, "why"].str.endswith("faster; may be there later").all()
+
+
+def test_solving_fewer_problems_is_worse_however_quickly(
+    run: pd.DataFrame, closed_of_gust: pd.Series
+) -> None:
+    gives_up = run.assign(
+        solved=run["solved"] & ~(closed_of_gust & run["problem_id"].str.endswith(tuple("13579")))
+    )
+    gives_up = _times(gives_up, 0.1, closed_of_gust, "planning_seconds")
+    rows = _compare(run, gives_up, in_turn=True)
+    assert set(rows.loc[_of_gust(rows), "why"]) == {"solves fewer"}
 
 
 def test_only_problems_that_are_in_both_count(run: pd.DataFrame) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dashboards.verdicts.comparison import CONTROL, SAME, compare_runs
 from planners.world.classes.problem_classes import problem_class
 from planners.world.vehicles.vehicle import CAR_1_TRAILER
 from storage.archives.memories import load_memory
@@ -17,6 +18,7 @@ from storage.exchange.problems import write_problems
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import read_attempts
 from tasks.fan_out.chunk import run_folder
+from tasks.reports.measure_in_turn import MeasuredRun, measure_in_turn
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
@@ -80,6 +82,15 @@ def test_verify_makes_the_same_attempts_again(run: RunFolder, capsys: pytest.Cap
     told = capsys.readouterr().out
     assert "No fault found." in told
     assert f"{3 * (1 + len(ASSISTS))} attempts made again" in told
+
+
+def test_its_memories_measured_in_turn_do_not_differ_from_themselves(run: RunFolder) -> None:
+    side = MeasuredRun(run, SETTINGS)
+    first, other = measure_in_turn(side, side, problems=2)
+    assert len(first) == len(other) == 2 * (1 + len(ASSISTS))
+    rows = compare_runs(first, other, in_turn=True)
+    assert len(rows) == 1 + len(ASSISTS)
+    assert set(rows["verdict"]) == {SAME, CONTROL}
 
 
 def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, tmp_path: Path) -> None:

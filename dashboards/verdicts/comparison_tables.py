@@ -1,0 +1,84 @@
+"""The comparison of two runs as tables, for a terminal and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pandas as pd
+from rich.console import Group
+
+from dashboards.cells import (
+    NOTHING,
+    Rows,
+    decimals_of,
+    percent,
+    titled_markdown,
+    titled_tables,
+    with_interval,
+)
+
+_SHARED: Final = ("planner", "configuration", "ms", "sooner s", "solved %")
+HEADINGS: Final = (*_SHARED, "fewer checks %", "recalled %", "verdict")
+HEADINGS_IN_TURN: Final = (*_SHARED, "less time %", "mostly %", "verdict")
+BY_COUNTS: Final = (
+    "These runs were not measured in turn, so their times say as much of the machine as of the runs: they "
+    "are shown, but not judged. What is judged is problems solved, then seconds of driving, then checks, "
+    "expansions and plans recalled. `compare --measure` measures the memories of both in turn."
+)
+IN_TURN: Final = (
+    "The memories of both were measured in turn, in an order that was drawn. What is judged is problems "
+    "solved, then the time until the robot is there, then planning."
+)
+
+
+def headings_of(rows: pd.DataFrame) -> tuple[str, ...]:
+    """The headings over the ``rows`` of ``compare_runs``."""
+    return HEADINGS_IN_TURN if rows["reduction_low"].notna().any() else HEADINGS
+
+
+def comparison_table(rows: pd.DataFrame) -> Group:
+    """The ``rows`` of ``compare_runs`` for a terminal: a table a panel."""
+    return titled_tables(headings_of(rows), comparison_cells(rows))
+
+
+def comparison_markdown(rows: pd.DataFrame) -> str:
+    """The ``rows`` of ``compare_runs`` as Markdown: a heading and a table a panel."""
+    return titled_markdown(headings_of(rows), comparison_cells(rows))
+
+
+def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
+    """Of each panel in the ``rows`` of ``compare_runs`` a title, and a group of cells for each planner."""
+    in_turn = headings_of(rows) == HEADINGS_IN_TURN
+    for panel, of_panel in rows.groupby("panel", sort=False):
+        decimals = decimals_of(of_panel[["first_ms", "ms"]].to_numpy(dtype=float))
+        groups = [
+            [_cells(row, decimals, in_turn) for row in of_planner.to_dict("records")]
+            for _, of_planner in of_panel.groupby("planner", sort=False)
+        ]
+        yield (
+            f"{panel}, {int(of_panel['problems'].max()):,} problems in both; [95 %, all rows at once]",
+            groups,
+        )
+
+
+def _cells(row: dict[Any, Any], decimals: int, in_turn: bool) -> list[str]:
+    low, high = row["sooner_low_s"], row["sooner_high_s"]
+    counted = [_interval(row, "checks_reduction"), _both(row["first_recalled"], row["recalled"])]
+    return [
+        row["planner"],
+        row["configuration"],
+        f"{row['first_ms']:,.{decimals}f}→{row['ms']:,.{decimals}f}",
+        NOTHING if low != low else f"{row['sooner_s']:+.1f} [{low:+.1f}, {high:+.1f}]",
+        _both(row["first_solved"], row["solved"]),
+        *([_interval(row, "reduction"), _interval(row, "mostly")] if in_turn else counted),
+        f"{row['verdict']}: {row['why']}" if row["why"] else row["verdict"],
+    ]
+
+
+def _interval(row: dict[Any, Any], name: str) -> str:
+    return with_interval(*(row[f"{name}{end}"] for end in ("", "_low", "_high")))
+
+
+def _both(first: float, other: float) -> str:
+    return percent(other) if first == other else f"{percent(first)}→{percent(other)}"
