@@ -48,6 +48,6 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
-	$(PIP) install --no-compile -c constraints.txt $(TORCH)
-	$(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
+	$(PIP) install -c constraints.txt $(TORCH)
+	$(PIP) install -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
 	touch $(READY)

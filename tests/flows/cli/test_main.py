@@ -25,7 +25,7 @@ COMMANDS = (
     ("arguments", "code", "told"),
     [
         (["fly"], 2, 'Unknown command "fly"'),
-        (["run", "--preset", "huge"], 2, "Unknown preset 'huge'. Known: smoke, laptop, paper."),
+        (["run", "--preset", "huge"], 2, "Unknown preset 'huge'. Known: smoke, laptop, paper"),
         (["run", "--classes", "maze"], 2, "Unknown class 'maze'"),
         (["run", "--seed", "x"], 2, "--seed"),
         (["run", "--seed", "-3"], 2, "Seed -3 is negative"),
