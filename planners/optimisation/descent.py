@@ -18,7 +18,7 @@ from planners.optimisation.local_model import (
     nearness_cost,
 )
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.jit import lean
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
@@ -104,15 +104,6 @@ def steps_to_goal(states: Floats, steps: int, goal: Floats) -> int:
         if length(states[k, 0] - goal[0], states[k, 1] - goal[1]) <= goal[2]:
             return k
     return -1
-
-
-@lean
-def drive_is_free(states: Floats, steps: int, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether the first ``steps + 1`` states are free, with the margins of the planners' own check."""
-    for k in range(steps + 1):  # noqa: SIM110 Numba has no generators for all()
-        if not state_is_free(load(states, k, vehicle), vehicle, scene):
-            return False
-    return True
 
 
 @lean
@@ -218,7 +209,8 @@ def descend(
         arrived = steps_to_goal(model.states, steps, goal)
         if arrived > 0:
             steps = arrived
-            if steps < best and drive_is_free(model.states, steps, vehicle, scene):
+            driven = model.states[: steps + 1]
+            if steps < best and count_free_prefix(driven, vehicle, scene) == steps + 1:
                 best = steps
                 copy_drive(model.states, model.controls, steps, model.best_states, model.best_controls)
     return steps, used, best, ended

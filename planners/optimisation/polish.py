@@ -11,11 +11,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.optimisation.descent import Stage, descend, drive_along, drive_is_free, steps_to_goal
+from planners.optimisation.descent import Stage, descend, drive_along, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.local_model import Model, allocate_model
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle, state_size
@@ -117,7 +117,7 @@ def _polished(
     best = NEVER
     if arrived > 0:
         steps = arrived
-        if drive_is_free(model.states, steps, vehicle, scene):
+        if count_free_prefix(model.states[: steps + 1], vehicle, scene) == steps + 1:
             best = steps
             model.best_states[: steps + 1] = model.states[: steps + 1]
             model.best_controls[:steps] = model.controls[:steps]

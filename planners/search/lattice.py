@@ -39,7 +39,7 @@ from planners.world.geometry.occupancy import drawing_of
 from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
 from planners.world.trigonometry import length, sincos, wrapped
-from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, store, turn_limit
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
@@ -57,7 +57,7 @@ class Lattice(NamedTuple):
     headings: int = 24  # cells of headings
     paces: int = 4  # cells of speeds
     greed: float = 2.0  # weight of the time to go; with 1 driving times are shorter and searches longer
-    heading_s: float = 0.4  # time to go for each radian of turning
+    heading_s: float = 0.4  # time to go for each unit of 1 - cos of the angle to turn by
 
 
 class LatticeSettings(NamedTuple):
@@ -155,16 +155,9 @@ def drive_primitive(
         counts[trees.CHECKS] += 1
         if not state_is_free(state, vehicle, scene):
             return -1
-        new = counts[trees.SIZE]
-        counts[trees.SIZE] += 1
-        store(tree.states, new, state)
-        tree.controls[new, 0] = control_1
-        tree.controls[new, 1] = control_2
-        tree.parents[new] = parent
-        tree.depths[new] = depth
-        parent = new
+        parent = trees.append(tree, parent, 0, state, control_1, control_2, depth)
         if to_goal <= 0.0:
-            counts[trees.GOAL_VERTEX] = new
+            counts[trees.GOAL_VERTEX] = parent
             break
     return parent
 

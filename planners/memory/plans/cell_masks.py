@@ -85,18 +85,24 @@ def allocate_ranking(count: int) -> Ranking:
     return Ranking(np.empty(count, np.int32), np.empty(count, np.int32), np.empty(MOST_CELLS + 2, np.int32))
 
 
+@inlined
+def blocked_cells(masks: Bits, i: int, occupied: Bits) -> int:
+    """Count the cells of plan ``i`` that are not free, at most MOST_CELLS: also if it leaves the window."""
+    if masks[i, 0] == ALL_CELLS:
+        return MOST_CELLS
+    count = np.uint64(0)
+    for row in range(GRID):
+        count += count_bits(masks[i, row] & occupied[row])
+    return min(int(np.int64(count)), MOST_CELLS)  # with an unsigned number Numba would make floats
+
+
 @lean
 def _rank(masks: Bits, occupied: Bits, ranking: Ranking) -> None:
     cells = ranking.cells
     ends = ranking.ends
     ends.fill(0)
     for i in range(masks.shape[0]):
-        count = np.uint64(0)
-        for row in range(GRID):
-            count += count_bits(masks[i, row] & occupied[row])
-        blocked = min(int(np.int64(count)), MOST_CELLS)  # with an unsigned number Numba would make floats
-        if masks[i, 0] == ALL_CELLS:  # the plan leaves the window
-            blocked = MOST_CELLS
+        blocked = blocked_cells(masks, i, occupied)
         cells[i] = blocked
         ends[blocked + 1] += 1
     for blocked in range(MOST_CELLS + 1):
@@ -150,10 +156,7 @@ def least_blocked(
     for i in order:
         if abs(first_poses[i, 0] - x) > tolerance or abs(first_poses[i, 1] - y) > tolerance:
             continue
-        count = np.uint64(0)
-        for row in range(GRID):
-            count += count_bits(masks[i, row] & occupied[row])
-        cells = int(np.int64(count)) if masks[i, 0] != ALL_CELLS else MOST_CELLS
+        cells = blocked_cells(masks, i, occupied)
         if best < 0 or cells < fewest:
             best = i
             fewest = cells

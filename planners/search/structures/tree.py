@@ -12,10 +12,10 @@ from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.jit import lean
+from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import gap_to_segment, length
-from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 # indices into Tree.counts
@@ -97,6 +97,24 @@ def prune(tree: Tree, size: int, bounds: Floats) -> None:
     tree.counts[GOAL_VERTEX] = -1
 
 
+@inlined
+def append(
+    tree: Tree, parent: int, waypoint: int, state: State, control_1: float, control_2: float, depth: int
+) -> int:
+    """Add the state to which controls led from ``parent``, and return its vertex. The tree must have room."""
+    new = tree.counts[SIZE]
+    tree.counts[SIZE] += 1
+    store(tree.states, new, state)
+    tree.controls[new, 0] = control_1
+    tree.controls[new, 1] = control_2
+    tree.parents[new] = parent
+    tree.depths[new] = depth
+    tree.waypoints[new] = waypoint
+    tree.spent[new] = 0
+    put(tree.buckets, new, state[0], state[1])
+    return int(new)
+
+
 @lean
 def extend(
     tree: Tree,
@@ -166,19 +184,9 @@ def extend(
             )
             if length(gap_x, gap_y) > tube_m:
                 break
-        new = counts[SIZE]
-        counts[SIZE] += 1
-        store(states, new, state)
-        tree.controls[new, 0] = driven_1
-        tree.controls[new, 1] = driven_2
-        tree.parents[new] = parent
-        tree.depths[new] = depth
-        tree.waypoints[new] = waypoint
-        tree.spent[new] = 0
-        put(tree.buckets, new, x, y)
-        parent = new
+        parent = append(tree, parent, waypoint, state, driven_1, driven_2, depth)
         if to_goal <= 0.0:
-            counts[GOAL_VERTEX] = new
+            counts[GOAL_VERTEX] = parent
             break
         arrived = length(x - target_x, y - target_y) < settings.arrival_m
         if arrived:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Bounds, Box, Floats, Integers
-from planners.world.jit import inlined, jit
+from planners.world.jit import inlined, jit, lean
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import State, is_folded, load, swept_bodies
@@ -222,7 +222,7 @@ def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
     return True
 
 
-@jit
+@lean
 def count_free_prefix(states: Floats, vehicle: Vehicle, scene: Scene) -> int:
     """Count the free states before the first blocked one of ``states [T, S]``: T if all are free."""
     for i in range(states.shape[0]):
