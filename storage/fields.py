@@ -59,7 +59,7 @@ def _plain_object(text: str | bytes) -> dict[str, Any] | None:
     if type(value) is not dict or escape in text:  # type: ignore[operator]  # both are of the same kind
         return None
     texts = len(value) + sum(type(each) is str for each in value.values())
-    return value if text.count(quote) == 2 * texts else None  # type: ignore[arg-type]
+    return value if text.count(quote) == 2 * texts else None  # type: ignore[arg-type]  # as above
 
 
 def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:

@@ -3,8 +3,9 @@
 Under the hypothesis that two sides do not differ, each problem's two values might as well be swapped. So the
 law of a sum of differences is that of the same differences with signs drawn at random, whatever their law:
 rare long times, or a machine that becomes slower meanwhile, change nothing as long as it was drawn which side
-came first. All that is compared is judged by the largest of its statistics (Westfall and Young 1993), so that
-among any number of comparisons one in twenty families finds a difference where there is none.
+came first. All that is compared at once is judged by the largest of its statistics (Westfall and Young 1993).
+So however many things are compared, only in one such comparison of twenty is anything called different when
+nothing differs.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def measure_in_turn(
 
     The order at each problem is drawn, every run attempts a problem ``ROUNDS`` times, and the median time
     counts. Controls without memory are attempted for each run as if they were two, so that one sees whether
-    the measurement finds differences where there are none.
+    the measurement calls equal things different.
 
     Args:
         first: the run whose problems are attempted.

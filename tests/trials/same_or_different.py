@@ -1,4 +1,4 @@
-"""Does ``compare`` find differences where there are none, and those that are there?
+"""Does ``compare`` call equal runs equal, and does it find a difference that was planted?
 
 ``python -m tests.trials.same_or_different FOLDER [COPY]`` takes the folder of a run, and that of a run
 with the same settings (default: the same again), and measures pairs of them in turn, each pair on problems of
