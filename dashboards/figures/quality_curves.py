@@ -10,11 +10,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from scipy.optimize import isotonic_regression
 
 from dashboards.figures.style import logarithmic, message_figure, new_figure, tidy
 
 LEAST: Final = 1e-3  # share over the best known at which the axis ends
 _GAP: Final = 0.045  # between two labels, of the axis
+_LEADER: Final = {"arrowstyle": "-", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0, "relpos": (0.0, 0.5)}
 _TICKS: Final = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3, 1.0)
 
 
@@ -57,22 +59,20 @@ def _label(axes: Axes, ends: Mapping[str, tuple[float, str]]) -> None:
     """Name each line at its end on the right, with room between names."""
     names = sorted(ends, key=lambda name: ends[name][0])
     span = np.log(axes.get_ylim()[1] / axes.get_ylim()[0])
-    heights = [float(np.log(ends[name][0] / axes.get_ylim()[0]) / span) for name in names]
-    lowest = 0.0
-    for i, height in enumerate(heights):
-        heights[i] = lowest = max(height, lowest)
-        lowest += _GAP
-    for name, height in zip(names, heights, strict=True):
-        over, colour = ends[name]
+    heights = np.array([np.log(ends[name][0] / axes.get_ylim()[0]) / span for name in names])
+    room = _GAP * np.arange(len(heights))
+    apart = isotonic_regression(heights - room).x + room  # as near to the ends of the lines as room allows
+    for name, end, height in zip(names, heights, apart, strict=True):
+        colour = ends[name][1]
         axes.annotate(
             name,
-            (1.0, float(np.log(over / axes.get_ylim()[0]) / span)),
-            (1.03, height),
+            (1.0, float(end)),
+            (1.05, float(height)),
             xycoords="axes fraction",
             textcoords="axes fraction",
             va="center",
             fontsize=8.5,
             color=colour,
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0},
+            arrowprops=_LEADER | {"color": colour},
         )

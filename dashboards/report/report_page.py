@@ -47,8 +47,8 @@ _METHODS_NOTE: Final = (
     "The paper's method: plans as they come, an encoder with pooling that learns by triplets from problems "
     "around them, the plans of the nearest centroids tried in order, targets and roadmap nodes drawn near "
     "them. The product's defaults: plans chosen for their use, an encoder that learns which plans are free, "
-    "of the free ones the one that drives shortest, a search that goes on along the least blocked plan. The "
-    "planners, the vehicle and the problems are the same."
+    "of the free ones the one that drives shortest, a search along the least blocked plan beside the "
+    "planner's own. The planners, the vehicle and the problems are the same."
 )
 
 
