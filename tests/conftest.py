@@ -6,11 +6,17 @@ from typing import Final
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 np.seterr(all="raise", under="ignore")
-# compiling a kernel takes seconds, so a deadline would only measure the first call
-settings.register_profile("strict", deadline=None, derandomize=True, max_examples=50)
+# no times: compiling a kernel takes seconds, and the machine may be busy
+settings.register_profile(
+    "strict",
+    deadline=None,
+    derandomize=True,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("strict")
 
 TESTS: Final = Path(__file__).parent

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -122,9 +121,11 @@ def test_the_commands_are_those_of_the_contract() -> None:
     assert set(COMMANDS) <= {name for name in app if not name.startswith("-")}
 
 
-def test_help_is_quick() -> None:
-    began = time.monotonic()
-    script = "import sys; from flows.cli.main import call; call(['--help']); print('prefect' in sys.modules)"
+def test_help_loads_nothing_that_takes_long() -> None:
+    slow = ("prefect", "mlflow", "torch", "numba", "dask", "matplotlib", "pandas")
+    script = (
+        f"import sys; from flows.cli.main import call; call(['--help']); print({slow} & sys.modules.keys())"
+    )
     done = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,
@@ -132,8 +133,7 @@ def test_help_is_quick() -> None:
         check=True,
         cwd=Path(__file__).parents[3],
     )
-    assert done.stdout.strip().endswith("False")
-    assert time.monotonic() - began < 3.0  # a third of a second on an idle machine
+    assert done.stdout.strip().endswith("set()")
 
 
 def test_without_a_number_there_are_as_many_workers_as_this_process_may_use_cores() -> None:

@@ -28,7 +28,11 @@ from storage.errors import StorageError
 from tests.storage.archives.signing import sign
 from tests.storage.samples import ARCHITECTURE, WEIGHTS, a_memory
 
-many = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+many = settings(
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+    max_examples=60,
+)
 ROWS = (4, ARCHITECTURE.dimensions)
 TRAINED = TrainedEncoder(
     settings=TrainingSettings(architecture=ARCHITECTURE),

@@ -27,6 +27,7 @@ SECRET = "robot:s3cret-of-the-fleet"
 PROOF = json.dumps({"type": "auth", "token": SECRET})
 SLOTS = 3  # requests and websockets that the application works for at once
 SHORT = 0.3  # seconds
+PATIENCE = 60.0  # seconds, of a busy machine
 
 
 async def echo(socket: WebSocket) -> None:
@@ -76,7 +77,7 @@ def opened(address: str) -> connect:
 
 async def is_answered(address: str) -> bool:
     """Whether a request and a websocket with the password are answered."""
-    async with httpx.AsyncClient(trust_env=False, timeout=5.0) as client:
+    async with httpx.AsyncClient(trust_env=False, timeout=PATIENCE) as client:
         answer = await client.get(f"http://{address}/health")
     async with opened(address) as socket:
         await socket.send(PROOF)
@@ -88,7 +89,7 @@ async def is_answered(address: str) -> bool:
 
 async def closing_code(socket: ClientConnection) -> int | None:
     with pytest.raises(ConnectionClosed):
-        await asyncio.wait_for(socket.recv(), 20 * SHORT)
+        await asyncio.wait_for(socket.recv(), PATIENCE)
     return socket.close_code
 
 

@@ -62,7 +62,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
         yield Running(command, data, output)
     finally:
         command.send_signal(signal.SIGTERM)
-        command.communicate(timeout=30)
+        command.communicate(timeout=120)
 
 
 def test_they_start_without_warnings(running: Running) -> None:
@@ -73,7 +73,7 @@ def test_a_second_command_on_the_folder_is_refused_and_changes_nothing(running: 
     password = (running.data / "servers.auth").read_text()
     with started(running.data) as second:
         try:
-            told = second.communicate(timeout=60)[0]
+            told = second.communicate(timeout=120)[0]
         finally:
             second.kill()
     assert second.returncode == 1
@@ -95,5 +95,5 @@ def test_without_the_password_prefect_shows_its_page_and_describes_nothing(runni
 
 def test_ended_they_leave_no_password(running: Running) -> None:
     running.command.send_signal(signal.SIGTERM)
-    assert running.command.wait(30) == 0
+    assert running.command.wait(120) == 0
     assert not (running.data / "servers.auth").exists()
