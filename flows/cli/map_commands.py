@@ -8,6 +8,7 @@ from typing import Annotated, Final
 
 from cyclopts import Parameter
 
+from flows.cli.choices import AssistName
 from flows.cli.solve_options import MapOptions, SolveOptions
 
 _AS_IT_IS: Final = MapOptions()
@@ -65,7 +66,7 @@ def route(
     begin: Annotated[str, Parameter(name="--from", allow_leading_hyphen=True)],
     end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True, negative=())],
     format: str | None = None,
-    assist: str | None = None,
+    assist: AssistName | None = None,
     out: Path | None = None,
     picture: Path | None = None,
     options: SolveOptions = _USUAL,
@@ -84,8 +85,7 @@ def route(
     format
         moving-ai, ros or numpy; by default recognised by the file's ending.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
-        with a memory, fresh without.
+        How the memory helps; fresh is a guide without memory. Default: repair with a memory, fresh without.
     out
         Where to write the plan, .json.
     picture

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
+from flows.cli.choices import AssistName, PlannerName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
 
@@ -19,7 +20,7 @@ _USUAL: Final = SolveOptions()
 def plan(
     problem: Path,
     *,
-    assist: str | None = None,
+    assist: AssistName | None = None,
     improve_seconds: float = 0.0,
     explain: Annotated[bool, Parameter(negative=())] = False,
     out: Path | None = None,
@@ -34,8 +35,7 @@ def plan(
     problem
         A .json, .jsonl or .parquet file with one problem.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
-        with a memory, none without.
+        How the memory helps; fresh is a guide without memory. Default: repair with a memory, none without.
     improve_seconds
         Seconds to improve the plan; 0 keeps the first plan.
     explain
@@ -59,7 +59,7 @@ def optimise(
     problem: Path,
     *,
     plan: Path | None = None,
-    planner: str | None = None,
+    planner: PlannerName | None = None,
     straight: Annotated[bool, Parameter(negative=())] = False,
     clearance_weight: float = 0.0,
     vehicle: str = "car",
@@ -76,7 +76,7 @@ def optimise(
     plan
         Begin with the plan of this .json file, made for this problem or another.
     planner
-        Begin with the plan of rrt, gust, follow or lattice; default follow.
+        Begin with the plan of this planner; default follow.
     straight
         Begin with a straight line from start to goal.
     clearance_weight
@@ -100,7 +100,7 @@ def optimise(
 def solve(
     problems: Path,
     *,
-    assist: str | None = None,
+    assist: AssistName | None = None,
     improve_seconds: float = 0.0,
     out: Path,
     plans: Path | None = None,
@@ -115,8 +115,7 @@ def solve(
     problems
         A .json, .jsonl or .parquet file.
     assist
-        How the memory helps: none, closed, open, repair; or fresh, a guide without memory. Default: repair
-        with a memory, none without.
+        How the memory helps; fresh is a guide without memory. Default: repair with a memory, none without.
     improve_seconds
         Seconds to improve the plan; 0 keeps the first plan.
     out

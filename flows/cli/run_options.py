@@ -6,7 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+from annotated_types import Ge
 from cyclopts import Parameter
+
+from flows.cli.choices import (
+    ClassName,
+    ContinualName,
+    Difficulty,
+    NetworkName,
+    ObjectiveName,
+    PresetName,
+)
+
+Count = Annotated[int, Ge(1)]
 
 _LEARNING: Final = (
     "patience", "learning_rate", "origin_weight", "margin", "semi_hard", "channels", "hidden", "dimensions",
@@ -29,13 +41,13 @@ class Options:
     worlds
         A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
     difficulty
-        Difficulty of the generated classes: easy, standard or hard.
+        Difficulty of the generated classes.
     vehicle
         car, differential-drive, car-1-trailer or car-2-trailers.
     seed
         Everything random follows from it.
     objective
-        What the encoder is trained for: labels or triplet; default labels, triplet by the paper's method.
+        What the encoder is trained for; default labels, triplet by the paper's method.
     data
         Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
     workers
@@ -45,7 +57,7 @@ class Options:
     strict
         Stop at a bad world instead of skipping it.
     continual
-        Also measure with 20, 40 ... % of the experiences: none, paper (GUST on curves) or all.
+        Also measure with 20, 40 ... % of the experiences; paper: GUST on curves only.
     experiences
         Solved problems to keep of each class; the preset gives the default, as for the next four.
     candidates
@@ -76,7 +88,7 @@ class Options:
     dimensions
         Dimensions of the embedding.
     network
-        patches, or pooled: the paper's, which has a max-pool after each convolution.
+        The encoder's; pooled is the paper's, which has a max-pool after each convolution.
     learned
         Also use the experiences that --learn has added to the data folder. The name freezes those that exist
         when it is first used; later the same name means the same experiences.
@@ -86,33 +98,33 @@ class Options:
 
     """
 
-    preset: str = "laptop"
-    classes: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
+    preset: PresetName = "laptop"
+    classes: Annotated[list[ClassName] | None, Parameter(consume_multiple=True, negative=())] = None
     worlds: Annotated[list[Path] | None, Parameter(negative=())] = None
-    difficulty: str = "standard"
+    difficulty: Difficulty = "standard"
     vehicle: str = "car"
-    seed: int = 1
-    objective: str | None = None
+    seed: Annotated[int, Ge(0)] = 1
+    objective: ObjectiveName | None = None
     data: Path | None = None
-    workers: int | None = None
+    workers: Count | None = None
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
-    continual: str | None = None
-    experiences: int | None = None
-    candidates: int | None = None
-    problems_per_experience: int | None = None
-    test_problems: int | None = None
-    epochs: int | None = None
-    training_seeds: int | None = None
-    patience: int | None = None
+    continual: ContinualName | None = None
+    experiences: Count | None = None
+    candidates: Count | None = None
+    problems_per_experience: Count | None = None
+    test_problems: Count | None = None
+    epochs: Count | None = None
+    training_seeds: Count | None = None
+    patience: Count | None = None
     learning_rate: float | None = None
     origin_weight: float | None = None
     margin: float | None = None
     semi_hard: Annotated[bool | None, Parameter(negative=())] = None
-    channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
-    hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
-    dimensions: int | None = None
-    network: str | None = None
+    channels: Annotated[list[Count] | None, Parameter(consume_multiple=True, negative=())] = None
+    hidden: Annotated[list[Count] | None, Parameter(consume_multiple=True, negative=())] = None
+    dimensions: Count | None = None
+    network: NetworkName | None = None
     learned: str | None = None
     hallucination: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
 

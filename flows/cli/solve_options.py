@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from cyclopts import Parameter
 
+from flows.cli.choices import PlannerName, RecallName, UnknownCells
+
 if TYPE_CHECKING:
     from tasks.requests.assistant import AssistantSettings
 
@@ -19,11 +21,11 @@ class SolveOptions:
     Parameters
     ----------
     planner
-        rrt, gust, follow or lattice.
+        What searches where no recalled plan will do.
     top_k
         How many plans to recall.
     recall
-        How to recall them: exhaustive, mask, hybrid, encoder, centroid, random; default: by its size.
+        How to recall them; default: by the size of the memory.
     memory
         Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
     vehicle
@@ -33,9 +35,9 @@ class SolveOptions:
 
     """
 
-    planner: str = "lattice"
+    planner: PlannerName = "lattice"
     top_k: int = 5
-    recall: str | None = None
+    recall: RecallName | None = None
     memory: str | None = None
     vehicle: str = "car"
     seed: int = 1
@@ -75,7 +77,7 @@ class MapOptions:
     resolution
         Metres in a cell of a .map or NumPy map; default 1.
     unknown
-        What unknown cells of the map count as: occupied or free.
+        What unknown cells of the map count as.
     tolerance
         Metres that outlines of obstacles may move to have fewer pieces; 0 keeps them exact.
 
@@ -83,5 +85,5 @@ class MapOptions:
 
     scale: float = 1.0
     resolution: float | None = None
-    unknown: str = "occupied"
+    unknown: UnknownCells = "occupied"
     tolerance: float = 0.0

@@ -87,10 +87,10 @@ def report(options: Options = NO_OPTIONS) -> None:
 
 
 def settings_of(options: Options) -> RunSettings:
-    """The settings of the options, without ``learned``. Raises UsageError if they are not possible."""
+    """The settings of the options. Raises UsageError if they are not possible."""
     from tasks.settings.presets import for_preset
 
-    return for_preset(
+    settings = for_preset(
         options.preset,
         classes=options.classes,
         worlds=[str(folder) for folder in options.worlds or []],
@@ -108,6 +108,11 @@ def settings_of(options: Options) -> RunSettings:
         learning=options.learning,
         hallucination=options.hallucination,
     )
+    if options.learned is None:
+        return settings
+    from tasks.inputs.gained_on_the_job import with_gained
+
+    return with_gained(settings, options.folder, options.learned)
 
 
 @contextmanager
@@ -116,10 +121,6 @@ def _session(name: str, options: Options) -> Iterator[tuple[RunSettings, str]]:
     from tasks.session.command_session import command_session
 
     settings = settings_of(options)
-    if options.learned is not None:
-        from tasks.inputs.gained_on_the_job import with_gained
-
-        settings = with_gained(settings, options.folder, options.learned)
     workers = worker_count(options.workers)
     with command_session(name, settings, options.folder, workers, options.scheduler) as data:
         yield settings, data

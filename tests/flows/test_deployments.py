@@ -1,21 +1,28 @@
-"""What ``prefect.yaml`` deploys: every flow, with the presets' settings, and retraining one at a time."""
+"""What ``prefect.yaml`` deploys: every flow with the options of its command; retraining is alone."""
 
 from __future__ import annotations
 
-import json
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import yaml
+from prefect.exceptions import ParameterTypeError, SignatureMismatchError
 
+from flows import deployments
+from flows.cli import choices
+from planners.memory.encoder.encoder import NETWORKS
+from planners.memory.recall import RECALLS
+from planners.search.registry import PLANNERS
+from planners.solve import ASSISTS
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from tasks.champions.drift_watch import DRIFT
-from tasks.settings.presets import for_preset
-from tasks.settings.run_settings import RunSettings
+from tasks.settings.presets import PRESETS, for_preset
+from tasks.settings.run_settings import CONTINUAL, Objective, RunSettings
 
 ROOT = Path(__file__).parents[2]
-NOT_DEPLOYED = {"solve"}  # takes what the command has made of a file
+NOT_FLOWS = {"__init__", "deployments"}
 
 
 @pytest.fixture(scope="module")
@@ -30,18 +37,65 @@ def _flow(deployment: dict[str, Any]) -> Any:
 
 
 def test_every_flow_is_deployed_and_every_deployment_is_a_flow(deployed: list[dict[str, Any]]) -> None:
-    flows = {path.stem for path in (ROOT / "flows").glob("*.py")} - {"__init__"} - NOT_DEPLOYED
-    assert {deployment["entrypoint"].split(".")[1] for deployment in deployed} == flows
+    flows = {path.stem for path in (ROOT / "flows").glob("*.py")} - NOT_FLOWS
+    assert flows <= {deployment["entrypoint"].split(".")[-1] for deployment in deployed}
     names = [(_flow(deployment).name, deployment["name"]) for deployment in deployed]
     assert len(set(names)) == len(names)
 
 
-def test_parameters_are_the_presets_and_those_of_the_flow(deployed: list[dict[str, Any]]) -> None:
+def test_its_parameters_are_accepted_by_the_flow(deployed: list[dict[str, Any]]) -> None:
     for deployment in deployed:
-        settings = RunSettings.from_json(json.dumps(deployment["parameters"]["settings"]))
-        assert settings == for_preset(deployment["name"])
-        known = _flow(deployment).parameters.properties
-        assert set(deployment["parameters"]) <= set(known)
+        flow, given = _flow(deployment), deployment.get("parameters", {})
+        required: dict[str, Any] = dict.fromkeys(flow.parameters.required or [], "x")
+        required |= {"end": ["1,2"]} if "end" in required else {}
+        assert flow.validate_parameters({**required, **given}).items() >= given.items()
+
+
+@pytest.mark.parametrize(
+    ("given", "refused"),
+    [
+        ({"preset": "tank"}, "preset"),
+        ({"experiences": -3}, "experiences"),
+        ({"classes": ["curves", "maze"]}, "classes"),
+        ({"experience": 3}, "experience"),
+    ],
+)
+def test_what_the_command_refuses_is_refused_before_a_run_begins(given: dict[str, Any], refused: str) -> None:
+    with pytest.raises((ParameterTypeError, SignatureMismatchError), match=refused):
+        deployments.run.validate_parameters(given)
+
+
+def test_flat_parameters_are_the_settings_that_the_command_makes(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made: list[tuple[RunSettings, str]] = []
+    monkeypatch.setattr(deployments.collect_flow, "fn", lambda settings, data: made.append((settings, data)))
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(tmp_path / "data"))
+    options: dict[str, Any] = {"preset": "smoke", "experiences": 10, "classes": ["trap"], "epochs": 3}
+    deployments.collect.fn(**deployments.collect.validate_parameters(options))
+    assert made == [(for_preset(**options), str(tmp_path / "data"))]
+
+
+def test_every_parameter_is_described_in_the_form(deployed: list[dict[str, Any]]) -> None:
+    for deployment in deployed:
+        properties = _flow(deployment).parameters.properties
+        silent = [name for name, value in properties.items() if not value.get("description")]
+        assert set(silent) <= {"approve"}
+
+
+def test_choices_are_those_that_there_are() -> None:
+    for offered, there_are in (
+        (choices.PresetName, PRESETS),
+        (choices.ClassName, CLASSES),
+        (choices.Difficulty, DIFFICULTIES),
+        (choices.ObjectiveName, get_args(Objective)),
+        (choices.ContinualName, CONTINUAL),
+        (choices.PlannerName, PLANNERS),
+        (choices.AssistName, ASSISTS),
+        (choices.RecallName, RECALLS),
+        (choices.NetworkName, NETWORKS),
+    ):
+        assert sorted(get_args(offered)) == sorted(there_are)
 
 
 def test_no_schedule_runs_before_somebody_switches_it_on(deployed: list[dict[str, Any]]) -> None:
@@ -51,7 +105,7 @@ def test_no_schedule_runs_before_somebody_switches_it_on(deployed: list[dict[str
 
 
 def test_retraining_is_alone_and_follows_a_drift(deployed: list[dict[str, Any]]) -> None:
-    (retraining,) = [each for each in deployed if each["entrypoint"] == "flows.retrain.retrain"]
+    (retraining,) = [each for each in deployed if each["entrypoint"] == "flows.deployments.retrain"]
     assert retraining["concurrency_limit"]["limit"] == 1
     assert [each["expect"] for each in retraining["triggers"]] == [[DRIFT]]
     assert all("motion-memory" in each["tags"] for each in deployed)

@@ -1,0 +1,142 @@
+"""The flows as Prefect deploys them: each takes the options of its command, checked by the same rules.
+
+``prefect deployment run run/laptop -p experiences=10`` does what ``motion-memory run --experiences 10`` does,
+and Prefect's form shows the options with their choices. Workers and servers are those of the deployment.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final, get_type_hints
+
+from prefect import Flow
+
+from flows.benchmark import benchmark as benchmark_flow
+from flows.build_memory import build_memory as build_memory_flow
+from flows.cli import map_commands, problem_commands
+from flows.cli.run_options import Options
+from flows.cli.stage_commands import settings_of
+from flows.collect import collect as collect_flow
+from flows.continual import continual as continual_flow
+from flows.experience_curve import experience_curve as experience_curve_flow
+from flows.hallucinate import hallucinate as hallucinate_flow
+from flows.judge import judge as judge_flow
+from flows.report import report as report_flow
+from flows.retrain import retrain as retrain_flow
+from flows.run import run as run_flow
+from flows.sweep import sweep as sweep_flow
+from flows.train import train as train_flow
+from tasks.session.folder_lock import locked_folder
+
+_KEYWORD: Final = inspect.Parameter.KEYWORD_ONLY
+_ELSEWHERE: Final = ("workers", "scheduler")  # options of a command that a deployment has otherwise
+_ABOUT: Final = ("preset", "classes", "worlds", "problem", "path", "planner")  # parameters that name a run
+
+
+def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, _KEYWORD, annotation=annotation, default=default)
+
+
+def _options_of(kind: type) -> list[inspect.Parameter]:
+    """The fields of a class of options as parameters."""
+    types = get_type_hints(kind, include_extras=True)
+    return [_parameter(each.name, types[each.name], each.default) for each in fields(kind)]
+
+
+def _flow_of(
+    name: str, task_runner: Any, body: Callable[..., None], parameters: list[inspect.Parameter], told: str
+) -> Flow[..., None]:
+    """A flow whose ``body`` is called with these parameters; ``told`` is its docstring."""
+
+    def deployed(**given: Any) -> None:
+        body(**given)
+
+    deployed.__name__ = name.replace("-", "_")
+    deployed.__doc__ = told
+    deployed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # read by Prefect
+    return Flow(deployed, name=name, task_runner=task_runner, flow_run_name=_run_name)
+
+
+def _run_name() -> str:
+    """What Prefect calls a run: its flow, what it is about, and its seed."""
+    from prefect.runtime import flow_run
+
+    given = flow_run.parameters
+    about = [_short(given[name]) for name in _ABOUT if given.get(name)]
+    return " ".join([str(flow_run.flow_name), *about, f"seed {given.get('seed')}"])
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return " ".join(_short(each) for each in value)
+    return Path(value).name if isinstance(value, Path) else str(value)
+
+
+def _stage(flow: Flow[..., None]) -> Flow[..., None]:
+    """A flow that takes settings and a data folder, with the options of a run instead of these."""
+    own = [
+        _parameter(each.name, each.annotation, each.default)
+        for each in inspect.signature(flow.fn, eval_str=True).parameters.values()
+        if each.name not in ("settings", "data", *_ELSEWHERE)
+    ]
+    options = [each for each in _options_of(Options) if each.name not in _ELSEWHERE]
+
+    def body(**given: Any) -> None:
+        further = {each.name: given.pop(each.name) for each in own}
+        chosen = Options(**given)
+        with locked_folder(chosen.folder) as folder:
+            flow.fn(settings_of(chosen), folder.place, **further)
+
+    return _flow_of(flow.name, flow.task_runner, body, [*options, *own], _told(flow.fn, Options))
+
+
+def _command(command: Callable[..., None]) -> Flow[..., None]:
+    """A command for one's own problems or maps as a flow; its options are parameters one by one."""
+    types = get_type_hints(command, include_extras=True)
+    own: list[inspect.Parameter] = []
+    groups: dict[str, list[inspect.Parameter]] = {}  # options that the command takes as one value
+    for each in inspect.signature(command).parameters.values():
+        if hasattr(types[each.name], "__dataclass_fields__"):
+            groups[each.name] = _options_of(types[each.name])
+        else:
+            own.append(_parameter(each.name, types[each.name], each.default))
+
+    def body(**given: Any) -> None:
+        values = {
+            name: types[name](**{each.name: given.pop(each.name) for each in options})
+            for name, options in groups.items()
+        }
+        command(**given, **values)
+
+    flat = [*own, *(each for options in groups.values() for each in options)]
+    told = _told(command, *(types[name] for name in groups))
+    return _flow_of(command.__name__.replace("_", "-"), None, body, flat, told)
+
+
+def _told(function: Callable[..., Any], *options: type) -> str:
+    """The docstring of a flow in the form that Prefect reads the descriptions of parameters from."""
+    sections = [inspect.getdoc(each) or "" for each in (function, *options)]
+    lines = [line for each in sections for line in each.partition("----------\n")[2].splitlines() if line]
+    args = "".join(f" {line.strip()}" if line.startswith(" ") else f"\n    {line}:" for line in lines)
+    return "\n".join([sections[0].partition("\nParameters\n")[0].strip(), "", f"Args:{args}"])
+
+
+run = _stage(run_flow)
+collect = _stage(collect_flow)
+hallucinate = _stage(hallucinate_flow)
+train = _stage(train_flow)
+build_memory = _stage(build_memory_flow)
+benchmark = _stage(benchmark_flow)
+report = _stage(report_flow)
+judge = _stage(judge_flow)
+continual = _stage(continual_flow)
+experience_curve = _stage(experience_curve_flow)
+sweep = _stage(sweep_flow)
+retrain = _stage(retrain_flow)
+plan = _command(problem_commands.plan)
+solve = _command(problem_commands.solve)
+import_worlds = _command(map_commands.import_worlds)
+route = _command(map_commands.route)
