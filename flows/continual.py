@@ -15,7 +15,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="continual")
+@flow(name="continual", flow_run_name="continual {settings.title}")
 @locks_data_folder
 def continual(settings: RunSettings, data: str) -> None:
     """Collect, hallucinate, train, build and benchmark with a fifth, two fifths ... of the experiences."""

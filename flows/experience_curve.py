@@ -15,7 +15,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="experience-curve")
+@flow(name="experience-curve", flow_run_name="experience-curve {settings.title}")
 @locks_data_folder
 def experience_curve(settings: RunSettings, data: str) -> None:
     """Make memories of more and more experiences, each from the first stage on, and compare their recall."""

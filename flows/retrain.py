@@ -19,7 +19,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="retrain", on_failure=[print_failure])  # type: ignore[list-item]  # meant for methods
+@flow(name="retrain", flow_run_name="retrain {settings.title}", on_failure=[print_failure])  # type: ignore[list-item]  # meant for methods
 def retrain(
     settings: RunSettings,
     data: str,

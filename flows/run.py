@@ -17,7 +17,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.tracking.logbook import run_logged
 
 
-@flow(name="run")
+@flow(name="run", flow_run_name="run {settings.title}")
 @locks_data_folder
 def run(settings: RunSettings, data: str) -> None:
     """Do every stage, then the same with fewer experiences if the settings ask for it, and report."""

@@ -12,7 +12,7 @@ from tasks.stages.sweep import SWEEP
 from tasks.tracking.logbook import log_sweep
 
 
-@flow(name="sweep", task_runner=task_runner())
+@flow(name="sweep", flow_run_name="sweep {settings.title}", task_runner=task_runner())
 @locks_data_folder
 def sweep(settings: RunSettings, data: str) -> None:
     """Train each variant on the hallucinated problems, log them as children of one run, and print a table."""

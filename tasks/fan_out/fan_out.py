@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -119,6 +120,7 @@ def _check_encryption(address: str) -> None:
 
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # Prefect would show all that Dask does
     with scratch_folder() as scratch, dask.config.set({**_settings(), "temporary-directory": str(scratch)}):
         try:
             local = LocalCluster(

@@ -84,11 +84,13 @@ class RobotPlanner:
 
         """
         began = perf_counter()
-        if isinstance(problem, str):
-            problem = _parsed(problem)
-        if not isinstance(problem, Problem):
-            problem = problem_of(problem, "problem", self.memory.vehicle)
-        return self._planned(problem, began)
+        return self._planned(self.problem(problem), began)
+
+    def problem(self, given: Problem | Mapping[str, Any] | str) -> Problem:
+        """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
+        if isinstance(given, str):
+            given = _parsed(given)
+        return given if isinstance(given, Problem) else problem_of(given, "problem", self.memory.vehicle)
 
     def plan_arrays(
         self,

@@ -14,6 +14,6 @@ from tasks.settings.run_settings import RunSettings
 
 def stage_flow(stage: Callable[[RunSettings, str], None]) -> Flow[[RunSettings, str], None]:
     """Make a flow that locks its data folder, uses the shared cluster, and records how long it took."""
-    return flow(name=stage.__name__.replace("_", "-"), task_runner=task_runner())(
-        locks_data_folder(timed(stage))
-    )
+    name = stage.__name__.replace("_", "-")
+    named = flow(name=name, flow_run_name=f"{name} {{settings.title}}", task_runner=task_runner())
+    return named(locks_data_folder(timed(stage)))

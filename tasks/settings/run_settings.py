@@ -117,6 +117,11 @@ class RunSettings:
         return self.classes + tuple(world_class(folder) for folder in self.worlds)
 
     @property
+    def title(self) -> str:
+        """What people call the run: its preset, classes and seed, like ``laptop trap seed 1``."""
+        return " ".join([self.preset, *self.class_names, f"seed {self.seed}"])
+
+    @property
     def memory_names(self) -> tuple[str, ...]:
         """Names of the memories of the run: its classes, then the combined one if it has one."""
         return self.class_names + ((COMBINED,) if self.combined else ())

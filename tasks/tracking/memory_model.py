@@ -22,13 +22,9 @@ from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
 from planners.memory.memory import Memory, scale_fault
-from planners.memory.plans.free import ends_of, plan_fits, turned
-from planners.memory.ranking.scores import best_plans
-from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.memory.ranked_plans import ranked_plans
 from planners.world.classes.problem_classes import problem_class
-from planners.world.geometry.collision import scene_of
-from planners.world.geometry.occupancy import drawing_of
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
@@ -111,19 +107,14 @@ class MemoryModel(PythonModel):
         return problem
 
     def _ranked(self, problem: Problem, top_k: int) -> list[list[Any]]:
-        canonical, alignment = to_canonical(problem)
-        memory, scene = self.memory, scene_of(canonical)
-        bits = drawing_of(canonical).occupied
-        scores = memory.scores(memory.forward(bits), bits)
-        rows = []
-        best = best_plans(scores, top_k).tolist()
-        for rank, i in enumerate(best, start=1):
-            free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
-            aligned = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
-            plan = scaled(aligned, problem.scale)
-            row = (problem.id, rank, i, bool(free), float(scores[1 + i]), plan.dt)
-            rows.append([*row, plan.states.tolist(), plan.controls.tolist()])
-        return rows
+        return [
+            [problem.id, rank, each.number, each.free, each.score, each.plan.dt, *_lists(each.plan)]
+            for rank, each in enumerate(ranked_plans(self.memory, problem, top_k), start=1)
+        ]
+
+
+def _lists(plan: Plan) -> tuple[list[Any], list[Any]]:
+    return plan.states.tolist(), plan.controls.tolist()
 
 
 def pyfunc_of(model: MemoryModel) -> PyFuncModel:

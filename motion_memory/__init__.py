@@ -1,0 +1,32 @@
+"""Plan robot motions from experience: the public interface of Motion Memory (docs/python.md).
+
+    memory = motion_memory.load("data/runs/…/memories/random")
+    answer = memory.plan({"start": [0.0, 0.0, 0.785], "goal": [50.0, 50.0], …})
+
+What is named here stays as it is within a major version; modules of other packages may change.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from motion_memory.files import read_problems, read_worlds, solve_many
+from motion_memory.memory import Memory, load
+from planners.memory.ranked_plans import RankedPlan
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import Vehicle
+from tasks.requests.robot import Answer
+
+__version__ = version("motion-memory")
+__all__ = [
+    "Answer",
+    "Memory",
+    "Plan",
+    "Problem",
+    "RankedPlan",
+    "Vehicle",
+    "load",
+    "read_problems",
+    "read_worlds",
+    "solve_many",
+]

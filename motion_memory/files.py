@@ -1,0 +1,99 @@
+"""Files of problems and worlds: read them, and solve many."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import vehicle_named
+from storage.exchange import problems as problem_files
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import source_at
+from tasks.requests.assistant import AssistantSettings
+from tasks.requests.solve_many import solve_many as solve_file
+
+
+def read_problems(path: str | Path, *, vehicle: str = "car") -> list[Problem]:
+    """Read a file of problems (docs/problem-files.md).
+
+    Args:
+        path: a .json, .jsonl or .parquet file.
+        vehicle: the name of the vehicle that must have room at each start.
+
+    Raises:
+        StorageError: The file is missing, or a problem is malformed or impossible; names line and id.
+    """
+    return problem_files.read_problems(Path(path), vehicle_named(vehicle))
+
+
+def read_worlds(
+    path: str | Path,
+    *,
+    part: Literal["train", "test"] = "train",
+    count: int | None = None,
+    vehicle: str = "car",
+    scale: float = 1.0,
+    resolution: float | None = None,
+    seed: int = 1,
+) -> list[Problem]:
+    """Make problems of worlds, or cut them from a map (docs/worlds.md).
+
+    Args:
+        path: a folder of worlds, or a map: .map, .yaml (ROS), .npy or .npz.
+        part: of a map, some blocks are for training and the others for testing; of worlds, every second.
+        count: how many problems to make at most; by default 1,000 of a map and all of worlds.
+        vehicle: the name of the vehicle that must have room at each start.
+        scale: metres of the map in a metre of the memory's problems.
+        resolution: metres of a cell, for a map that does not say.
+        seed: decides where problems are cut from a map.
+
+    Raises:
+        StorageError: Nothing can be read.
+    """
+    settings = ImportSettings(
+        vehicle=vehicle_named(vehicle), count=count, seed=seed, scale=scale, resolution=resolution
+    )
+    return import_part(source_at(Path(path)), part, settings).problems
+
+
+def solve_many(
+    problems: str | Path,
+    out: str | Path,
+    *,
+    memory: str | Path | None = None,
+    planner: str = "lattice",
+    assist: str | None = None,
+    top_k: int = 5,
+    vehicle: str = "car",
+    seed: int = 1,
+    plans: str | Path | None = None,
+) -> None:
+    """Solve each problem of a file in this process, and write one row each (docs/problem-files.md).
+
+    A call that was interrupted goes on where it stopped when it is made again.
+
+    Args:
+        problems: a .json, .jsonl or .parquet file.
+        out: where to write the rows, .parquet.
+        memory: the folder of a memory or a run, or the address of a model in MLflow.
+        planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
+        assist: how the memory helps; by default repair with a memory, none without.
+        top_k: how many plans to recall, at least 1.
+        vehicle: its name.
+        seed: everything random follows from it.
+        plans: a folder for the plans, one file each; by default none are written.
+
+    Raises:
+        UsageError: A name is unknown, or a file would be written over another one.
+        StorageError: A problem is malformed; the others are solved and kept.
+    """
+    settings = AssistantSettings(
+        planner=planner,
+        assist=assist or ("none" if memory is None else "repair"),
+        top_k=top_k,
+        memory=None if memory is None else str(memory),
+        seed=seed,
+        vehicle=vehicle,
+    )
+    solve_file(settings, Path(problems), Path(out), None if plans is None else Path(plans))

@@ -1,0 +1,34 @@
+"""Planning as a Prefect task, for flows of one's own (docs/python.md); needs Prefect."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+from prefect import task
+
+from motion_memory.memory import Memory, load
+from planners.world.problem import Problem
+from tasks.requests.robot import Answer
+
+
+@functools.cache
+def _loaded(memory: str, options: tuple[tuple[str, Any], ...]) -> Memory:
+    return load(memory, **dict(options))
+
+
+@task(name="plan", persist_result=False)
+def plan_task(problem: Problem | Mapping[str, Any] | str, memory: str, **options: Any) -> Answer:
+    """Plan for one problem; each worker process loads a memory once.
+
+    Args:
+        problem: as for ``Memory.plan``.
+        memory: the folder of a memory or a run, or the address of a model in MLflow.
+        options: of ``load``, such as ``planner="gust"``.
+
+    Raises:
+        ValueError: The problem is malformed or impossible.
+        PlanFaultError: The independent judge refuses the plan.
+    """
+    return _loaded(memory, tuple(sorted(options.items()))).plan(problem)

@@ -1,0 +1,47 @@
+"""The plans of a memory ranked for a problem in any frame: what is served over HTTP and to Python."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planners.memory.memory import Memory
+from planners.memory.plans.free import ends_of, plan_fits, turned
+from planners.memory.ranking.scores import best_plans
+from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.problem import Plan, Problem
+
+
+class RankedPlan(NamedTuple):
+    """A stored plan as an answer to a problem."""
+
+    number: int  # of the plan in the memory
+    free: bool  # it answers the problem: it begins and ends as asked, and its whole sweep is free
+    score: float  # the encoder's, higher is better
+    plan: Plan  # in the frame and the lengths of the problem
+
+
+def ranked_plans(memory: Memory, problem: Problem, k: int) -> list[RankedPlan]:
+    """Rank the plans of a memory for a problem, best first.
+
+    Args:
+        memory: to recall from.
+        problem: in any frame.
+        k: how many plans to return at most.
+
+    Returns:
+        At most k plans; none if the encoder says that no plan fits.
+
+    Raises:
+        ValueError: The memory has no plans for problems of this kind.
+    """
+    canonical, alignment = to_canonical(problem)
+    scene, bits = scene_of(canonical), drawing_of(canonical).occupied
+    scores = memory.scores(memory.forward(bits), bits)
+    ranked = []
+    for i in best_plans(scores, k).tolist():
+        free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
+        plan = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
+        ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), scaled(plan, problem.scale)))
+    return ranked

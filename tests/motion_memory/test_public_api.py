@@ -1,0 +1,99 @@
+"""The public interface: what it names, what it answers, and what it needs to be installed."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import typing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import motion_memory
+from planners.world.problem import Plan
+from storage.exchange.problems import fields_of, write_problems
+from storage.tables.attempts import read_attempts
+from tests.prepared.prefect_database import with_prefect_database
+from tests.tasks.served import problem, write_memory
+
+ROOT = Path(__file__).parents[2]
+NOT_FOR_ROBOTS = ("prefect", "mlflow", "pandas", "torch", "casadi", "matplotlib")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_memory(tmp_path_factory.mktemp("public") / "memory")
+
+
+@pytest.fixture(scope="module")
+def memory(folder: Path) -> motion_memory.Memory:
+    return motion_memory.load(folder)
+
+
+def test_a_plan_is_accepted_by_the_judge_and_a_changed_one_is_not(memory: motion_memory.Memory) -> None:
+    plan = memory.plan(fields_of(problem(1))).plan
+    assert plan is not None
+    assert memory.check(problem(1), plan) == []
+    off = plan.states.copy()
+    off[3:, 0] += 0.1
+    assert memory.check(problem(1), Plan(off, plan.controls, plan.dt))
+
+
+def test_what_is_recalled_is_ranked_and_free_plans_are_accepted(memory: motion_memory.Memory) -> None:
+    ranked = memory.recall(problem(0), k=len(memory))
+    assert 0 < len(ranked) <= len(memory)
+    scores = [each.score for each in ranked]
+    assert scores == sorted(scores, reverse=True)
+    free = [each for each in ranked if each.free]
+    assert 0 < len(free) < len(ranked)
+    for each in free:
+        assert memory.check(problem(0), each.plan) == []
+    with pytest.raises(ValueError, match="k is 0"):
+        memory.recall(problem(0), k=0)
+
+
+def test_every_public_name_is_typed_and_explained() -> None:
+    assert all((ROOT / package / "py.typed").is_file() for package in ("motion_memory", "planners", "tasks"))
+    for name in motion_memory.__all__:
+        value = getattr(motion_memory, name)
+        assert name in (ROOT / "docs" / "python.md").read_text()
+        if callable(value) and not typing.get_origin(value):
+            assert value.__doc__
+
+
+def test_many_are_solved_as_by_the_command(folder: Path, tmp_path: Path) -> None:
+    write_problems(tmp_path / "problems.jsonl", [problem(i) for i in range(3)])
+    assert len(motion_memory.read_problems(tmp_path / "problems.jsonl")) == 3
+    motion_memory.solve_many(tmp_path / "problems.jsonl", tmp_path / "rows.parquet", memory=folder)
+    assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
+
+
+def test_problems_are_cut_from_a_map(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.zeros((220, 220), bool))
+    cut = motion_memory.read_worlds(tmp_path / "map.npy", count=2, resolution=1.0)
+    assert len(cut) == 2
+
+
+def test_importing_it_needs_nothing_that_a_robot_has_not() -> None:
+    code = f"import motion_memory, sys; print([m for m in {NOT_FOR_ROBOTS} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.slow  # a server of Prefect is started for it
+def test_the_flow_in_the_documentation_runs(folder: Path, tmp_path: Path) -> None:
+    examples = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(), re.DOTALL)
+    (example,) = [each for each in examples if "@flow" in each]
+    (tmp_path / "example.py").write_text(example)
+    write_problems(tmp_path / "problems.jsonl", [problem(i) for i in range(3)])
+    home = with_prefect_database(tmp_path / "data") / "prefect"
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.motion_memory.run_example",
+         *map(str, (tmp_path / "example.py", tmp_path / "problems.jsonl", folder))],
+        cwd=ROOT, env={**os.environ, "PREFECT_HOME": str(home), "DO_NOT_TRACK": "true"},
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["3"], done.stderr[-2000:]
