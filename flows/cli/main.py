@@ -27,10 +27,20 @@ WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
 GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and to end the workers
 
+
+def package_version() -> str:
+    """The version of Motion Memory and of what it stands on, for who reports a fault."""
+    import platform
+    from importlib.metadata import version
+
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("prefect", "mlflow", "numba"))
+    return f"motion-memory {version('motion-memory')} (Python {platform.python_version()}, {libraries})"
+
+
 app = App(
     name="motion-memory",
     help="Plan robot motions from experience: collect, learn, recall, measure.",
-    version_flags=[],
+    version=package_version,
     suppress_keyboard_interrupt=False,
 )
 for command in (
@@ -43,6 +53,7 @@ for command in (
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):
     app.command(command)
+app.register_install_completion_command(add_to_startup=False)
 
 
 def call(arguments: Sequence[str] | None = None) -> int:

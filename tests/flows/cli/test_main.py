@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -24,18 +25,18 @@ COMMANDS = (
     ("arguments", "code", "told"),
     [
         (["fly"], 2, 'Unknown command "fly"'),
-        (["run", "--preset", "huge"], 2, "Unknown preset 'huge'. Known: smoke, laptop, paper"),
-        (["run", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["run", "--preset", "huge"], 2, '"huge" for --preset. Choose from: "smoke", "laptop"'),
+        (["run", "--classes", "maze"], 2, '"maze" for --classes. Choose from'),
         (["run", "--seed", "x"], 2, "--seed"),
         (["run", "--seed", "-3"], 2, "Seed -3 is negative"),
         (["run", "--speed", "3"], 2, "--speed"),
         (["run", "--data"], 2, "--data"),
         (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
         (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
-        (["train", "--objective", "luck"], 2, "Unknown objective 'luck'"),
+        (["train", "--objective", "luck"], 2, '"luck" for --objective. Choose from'),
         (["train", "--epochs", "0"], 2, "0 epochs: give 1 or more."),
         (["train", "--hidden", "64", "0"], 2, "give 1 or more."),
-        (["collect", "--difficulty", "odd"], 2, "Unknown difficulty 'odd'"),
+        (["collect", "--difficulty", "odd"], 2, '"odd" for --difficulty. Choose from'),
         (["collect", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'. Known: car, differential-drive"),
         (["plan", "p.json", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),
         (
@@ -45,12 +46,8 @@ COMMANDS = (
         ),
         (["hallucinate", "--hallucination", "minimal=0"], 2, "'minimal=0': give a weight above 0"),
         (["solve"], 2, "--problems"),
-        (
-            ["plan", "p.json", "--planner", "prm"],
-            2,
-            "Unknown planner 'prm'. Known: rrt, gust, follow, lattice.",
-        ),
-        (["plan", "p.json", "--assist", "magic"], 2, "Unknown assist 'magic'"),
+        (["plan", "p.json", "--planner", "prm"], 2, '"prm" for --planner. Choose from'),
+        (["plan", "p.json", "--assist", "magic"], 2, '"magic" for --assist. Choose from'),
         (["plan", "p.json", "--assist", "open"], 2, "needs --memory"),
         (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
@@ -58,11 +55,7 @@ COMMANDS = (
         (["plan", "a\0.json"], 2, "'a\\x00.json' holds a null character"),
         (["solve", "p.json", "--out", "a\0.parquet"], 2, "'a\\x00.parquet' holds a null character"),
         (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),
-        (
-            ["optimise", "p.json", "--planner", "prm"],
-            2,
-            "Unknown planner 'prm'. Known: rrt, gust, follow, lattice.",
-        ),
+        (["optimise", "p.json", "--planner", "prm"], 2, '"prm" for --planner. Choose from'),
         (["optimise", "p.json", "--clearance-weight", "-1"], 2, "Clearance weight -1.0"),
         (["optimise", "p.json", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
         (["optimise", "p.json"], 1, "p.json does not exist"),
@@ -70,7 +63,7 @@ COMMANDS = (
         (["solve", "p.jsonl", "--out", "rows.parquet"], 1, "p.jsonl does not exist"),
         (["solve", "p.jsonl", "--out", "rows.parquet", "--workers", "0"], 2, "0 workers: give 1 or more."),
         (["retrain", "--learned", "monday"], 2, "--learned is not for retraining"),
-        (["retrain", "--classes", "maze"], 2, "Unknown class 'maze'"),
+        (["retrain", "--classes", "maze"], 2, '"maze" for --classes. Choose from'),
         (["serve", "--every", "9", "--cron", "0 3 * * *"], 2, "--every and --cron are both given"),
         (["serve", "--every", "0"], 2, "Every 0 seconds: give 1 or more."),
         (["promote"], 1, "data is no data folder"),
@@ -144,3 +137,14 @@ def test_without_a_number_there_are_as_many_workers_as_this_process_may_use_core
     assert told.stdout == "1\n"
     assert 1 <= worker_count(None) <= len(os.sched_getaffinity(0))
     assert worker_count(7) == 7
+
+
+def test_the_version_names_what_a_report_of_a_fault_needs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["--version"]) == 0
+    told = capsys.readouterr().out
+    assert all(version(name) in told for name in ("motion-memory", "prefect", "mlflow", "numba"))
+
+
+def test_completion_is_installed_where_it_is_asked_for(tmp_path: Path) -> None:
+    assert call(["--install-completion", "--shell", "bash", "--output", str(tmp_path / "completion")]) == 0
+    assert "motion-memory" in (tmp_path / "completion").read_text()

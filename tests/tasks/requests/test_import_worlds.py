@@ -83,7 +83,7 @@ def test_a_folder_is_written_for_runs_and_written_again_but_never_over_something
         (["--out", "p.parquet", "--seed", "-1"], 2, "Seed -1 is negative"),
         (["--out", "p.parquet", "--scale", "0"], 2, "Scale is 0"),
         (["--out", "p.parquet", "--tolerance", "-1"], 2, "Tolerance is -1"),
-        (["--out", "p.parquet", "--unknown", "maybe"], 2, "'maybe'"),
+        (["--out", "p.parquet", "--unknown", "maybe"], 2, '"maybe"'),
         (["--out", "p.parquet", "--vehicle", "tram"], 2, "Unknown vehicle 'tram'"),
         (["--out", "p.parquet", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
         (["--out", "p.parquet", "--part", "validation"], 1, "train and test"),
