@@ -8,10 +8,12 @@ import sys
 import threading
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from types import FrameType
 from typing import Final
 
 from cyclopts import App, CycloptsError
+from cyclopts.config import Toml
 
 from flows.cli import dashboard_command as dashboard
 from flows.cli import map_commands as maps
@@ -20,6 +22,7 @@ from flows.cli import result_commands as results
 from flows.cli import retraining_commands as operations
 from flows.cli import server_commands as serving
 from flows.cli import stage_commands as stages
+from flows.cli.configuration import check_configuration, configuration_file
 from tasks.settings.redaction import redacted
 
 FAILURE: Final = 1
@@ -62,6 +65,10 @@ def call(arguments: Sequence[str] | None = None) -> int:
     debug = os.environ.get("MOTION_MEMORY_DEBUG") == "1"
     try:
         _refuse_null_characters(arguments)
+        configured = configuration_file(Path.cwd())
+        if configured is not None:
+            check_configuration(configured, [name for name in app if not name.startswith("-")])
+        app.config = () if configured is None else (Toml(configured),)
         app(
             arguments,
             exit_on_error=False,
