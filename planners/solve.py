@@ -22,7 +22,7 @@ from planners.search.help import Help, fresh_guide
 from planners.search.outcome import Status
 from planners.search.query import Limits, Query
 from planners.search.registry import HEAD_STARTS, PLANNERS
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
@@ -99,7 +99,9 @@ def solve(
     strategy: str | None = None,
     workspace: Workspace | None = None,
 ) -> Attempt:
-    """Solve a canonical problem: try stored plans first, as the assist says, then search.
+    """Solve a problem: try stored plans first, as the assist says, then search.
+
+    Memories hold plans for canonical problems, so for others nothing is recalled.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
     drives shortest, else search.
@@ -110,7 +112,7 @@ def solve(
     ``random-`` before an assist picks the plans blindly.
 
     Args:
-        problem: in the canonical frame.
+        problem: its start at (0, 0), its goal on the diagonal (``to_canonical``).
         planner: one of ``PLANNERS``.
         assist: one of ``ASSISTS``.
         top_k: how many plans to recall.
@@ -144,7 +146,8 @@ def solve(
             raise ValueError(fault)
         strategy = "random" if use != assist else strategy or default_recall(memory)
         blindly = generator(seed, "random-plans", problem.id) if strategy == "random" else None
-        recalled = recall(memory, view, strategy, top_k, blindly)
+        if is_canonical(problem):
+            recalled = recall(memory, view, strategy, top_k, blindly)
     elif assist not in WITHOUT_MEMORY:
         raise ValueError(f"assist '{assist}' needs a memory")
 
@@ -165,7 +168,7 @@ def solve(
             plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
             query = replace(query, guide=published_guidance(plans))
             view.lap("guide")
-        elif memory is not None and use in ("open", "repair"):
+        elif memory is not None and use in ("open", "repair") and recalled.plans:
             stored, cells = least_blocked(memory, recalled.plans, view)
             if stored >= 0:
                 plan = turned(memory.plans[stored], problem.start[2])

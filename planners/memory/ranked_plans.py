@@ -10,7 +10,7 @@ from planners.memory.ranking.scores import best_plans
 from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan, Problem, is_canonical
 
 
 class RankedPlan(NamedTuple):
@@ -31,12 +31,12 @@ def ranked_plans(memory: Memory, problem: Problem, k: int) -> list[RankedPlan]:
         k: how many plans to return at most.
 
     Returns:
-        At most k plans; none if the encoder says that no plan fits.
-
-    Raises:
-        ValueError: The memory has no plans for problems of this kind.
+        At most k plans. None if the encoder says that no plan fits, or if the problem is not canonical: at
+        another distance, from a motion, or with more asked at its goal than a place.
     """
     canonical, alignment = to_canonical(problem)
+    if not is_canonical(canonical):
+        return []
     scene, bits = scene_of(canonical), drawing_of(canonical).occupied
     scores = memory.scores(memory.forward(bits), bits)
     ranked = []

@@ -19,6 +19,7 @@ from planners.optimisation.local_model import (
 )
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.goal import reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
@@ -98,10 +99,10 @@ def copy_drive(
 
 
 @lean
-def steps_to_goal(states: Floats, steps: int, goal: Floats) -> int:
-    """The first state in the disc ``goal [3]``, -1 if there is none."""
+def steps_to_goal(states: Floats, steps: int, goal: Floats, vehicle: Vehicle) -> int:
+    """The first of ``states [T, S]`` that reaches the goal, -1 if there is none."""
     for k in range(steps + 1):
-        if length(states[k, 0] - goal[0], states[k, 1] - goal[1]) <= goal[2]:
+        if reaches(load(states, k, vehicle), goal):
             return k
     return -1
 
@@ -145,7 +146,7 @@ def descend(
     Args:
         model: with the drive; the quickest free one is kept in ``model.best_states``.
         steps: of the drive.
-        goal: ``[3]`` x, y and radius in metres.
+        goal: that of ``goal_of``.
         stage: how obstacles push, and when to end.
         iterations: at most.
         best: steps of the free drive that is kept already, a large number if there is none.
@@ -176,7 +177,7 @@ def descend(
         linear, quadratic = sweep_back(model, steps, aim, damping, vehicle)
         used += 1
         if -(linear + quadratic) < stage.least_gain:
-            if steps_to_goal(model.states, steps, goal) >= 0 or steps == model.controls.shape[0]:
+            if steps_to_goal(model.states, steps, goal, vehicle) >= 0 or steps == model.controls.shape[0]:
                 ended = True
                 break
             steps = _gone_on(model, steps, goal, vehicle)
@@ -206,7 +207,7 @@ def descend(
             damping = 0.3 * damping if damping > 1e-3 else 0.0
         copy_drive(model.tried_states, model.tried_controls, steps, model.states, model.controls)
         anew = True
-        arrived = steps_to_goal(model.states, steps, goal)
+        arrived = steps_to_goal(model.states, steps, goal, vehicle)
         if arrived > 0:
             steps = arrived
             driven = model.states[: steps + 1]
@@ -235,6 +236,6 @@ def drive_along(model: Model, points: Floats, goal: Floats, ahead_m: float, vehi
         model.controls[k, 0] = first
         model.controls[k, 1] = second
         store(states, k + 1, step(here, first, second, vehicle))
-        if length(states[k + 1, 0] - goal[0], states[k + 1, 1] - goal[1]) <= goal[2]:
+        if reaches(load(states, k + 1, vehicle), goal):
             return k + 1
     return model.controls.shape[0]

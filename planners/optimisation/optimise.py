@@ -21,8 +21,9 @@ from planners.optimisation.guesses import begun_at, resampled
 from planners.optimisation.transcription import CostWeights, Solution, transcribe
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import count_free_prefix, scene_of
+from planners.world.goal import goal_of, reaches
 from planners.world.problem import Plan, Problem, start_state
-from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.dynamics import load, simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_names, state_size
 
 FEWEST_STEPS = 4
@@ -101,7 +102,7 @@ def optimise(
     alone = Plan(start[None], np.empty((0, 2)), vehicle.dt)
     if count_free_prefix(alone.states, vehicle, scene) == 0:
         return ended(Ending.START_BLOCKED)
-    if math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
+    if reaches(load(alone.states, 0, vehicle), goal_of(problem)):
         return ended(Ending.CONVERGED, alone)
     building = perf_counter()
     field = clearance_field(problem, settings.cell_m)

@@ -16,6 +16,7 @@ from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.local_model import Model, allocate_model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle, state_size
@@ -60,8 +61,11 @@ def polish(
         seconds: when to end, some iterations late; then another machine may give another result.
 
     Returns:
-        The quickest free plan that was found, never a longer one than was given; the given plan if none was.
+        The quickest free plan that was found, never a longer one than was given; the given plan if none was,
+        or if the problem asks for more at its goal than the place.
     """
+    if problem.arrival is not None:
+        iterations = 0  # a descent minds where a drive ends, not how
     model, goal = _ready(problem, len(plan.controls) + ROOM, vehicle, workspace)
     steps = len(plan.controls)
     model.controls[:steps] = plan.controls
@@ -91,11 +95,11 @@ def polish_path(
 
 
 def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:
-    """Buffers for some more than ``steps`` steps, at the problem's start, and the goal ``[3]``."""
+    """Buffers for some more than ``steps`` steps, at the problem's start, and the goal."""
     room = ROOM * (1 + steps // ROOM)
     model = workspace.buffers(allocate_model, room, state_size(vehicle))
     model.states[0] = start_state(problem, vehicle)
-    return model, np.array([*problem.goal, problem.goal_radius])
+    return model, goal_of(problem)
 
 
 def _polished(
@@ -111,7 +115,7 @@ def _polished(
 ) -> Polished:
     """Descend through all stages from the drive in ``model``."""
     began = perf_counter()
-    arrived = int(steps_to_goal(model.states, steps, goal))
+    arrived = int(steps_to_goal(model.states, steps, goal, vehicle))
     if arrived == 0:
         return Polished(given, 0)
     best = NEVER

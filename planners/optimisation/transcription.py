@@ -11,6 +11,7 @@ Optimal Control and Estimation Using Nonlinear Programming (2010); Waechter and 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -20,10 +21,11 @@ import numpy as np
 from planners.optimisation.clearance_field import ClearanceField
 from planners.optimisation.equations import discs_of, limits_of, step_of
 from planners.world.arrays import Floats
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
 GOAL_SHY_M = 1e-3  # how far inside the goal disc to end, since simulated states are some 1e-7 m off
+GOAL_SHY = 0.95  # the share of tolerated angles that is used, for the same reason
 H_UNIT_S = 0.1  # unit of the unknown step length, so that it is near 1 like the other unknowns
 
 
@@ -98,6 +100,8 @@ def transcribe(
     The discs must keep ``margin_m`` metres of clearance, which is interpolated by ``field``.
     """
     size = state_size(vehicle)
+    arrival = problem.arrival or Arrival()
+    heading = arrival.heading
     columns = size + 2
     unknowns = ca.MX.sym("x", steps * columns + size + 1)
     body = ca.reshape(unknowns[: steps * columns], columns, steps)
@@ -107,6 +111,7 @@ def transcribe(
     following = step_of(vehicle).map(steps)(states[:, :-1], controls, ca.repmat(h, 1, steps))
     gaps = _gaps(field, vehicle, discs).map(steps)(states[:, 1:])  # the start is fixed
     miss = ca.sumsqr(states[:2, -1] - ca.DM(problem.goal))
+    facing = [] if heading is None else [ca.cos(states[2, -1] - heading)]
 
     limits = limits_of(vehicle)
     effort = ca.sumsqr(controls / ca.repmat(ca.DM(limits.control_high), 1, steps))
@@ -123,16 +128,23 @@ def transcribe(
         np.concatenate((np.tile(row, steps), row[:size], [0.0])) for row in (row_low, row_high)
     )
     all_low[:size] = all_high[:size] = start
+    last_low, last_high = all_low[-size - 1 : -1], all_high[-size - 1 : -1]
+    last_low[3] = max(last_low[3], arrival.least_speed)
+    last_high[3] = min(last_high[3], arrival.most_speed)
+    for k, (hitch, tolerance) in enumerate(zip(arrival.hitches, arrival.hitch_tolerances, strict=True)):
+        last_low[5 + k] = max(last_low[5 + k], hitch - GOAL_SHY * tolerance)
+        last_high[5 + k] = min(last_high[5 + k], hitch + GOAL_SHY * tolerance)
     reach = max(problem.goal_radius - GOAL_SHY_M, 0.0)
+    aligned = [math.cos(GOAL_SHY * arrival.heading_tolerance)] * len(facing)
     dynamics, clear = np.zeros(size * steps), np.full(gaps.numel(), margin_m)
     return Programme(
         steps,
         size,
-        {"x": unknowns, "f": cost, "g": ca.veccat(following - states[:, 1:], gaps, miss)},
+        {"x": unknowns, "f": cost, "g": ca.veccat(following - states[:, 1:], gaps, miss, *facing)},
         all_low,
         all_high,
-        np.concatenate((dynamics, clear, [-np.inf])),
-        np.concatenate((dynamics, np.full_like(clear, np.inf), [reach**2])),
+        np.concatenate((dynamics, clear, [-np.inf], aligned)),
+        np.concatenate((dynamics, np.full_like(clear, np.inf), [reach**2], [np.inf] * len(facing))),
     )
 
 

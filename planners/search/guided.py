@@ -10,6 +10,7 @@ from planners.search.outcome import work_of
 from planners.search.query import Guide, Query
 from planners.search.rrt import RRT, towards_anywhere
 from planners.search.structures import tree as trees
+from planners.world.goal import goal_of
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import state_size
 
@@ -28,7 +29,7 @@ class GuidedSearch:
         problem, vehicle = query.problem, query.vehicle
         self._query, self._dt = query, vehicle.dt
         self._tree = query.workspace.buffers(trees.allocate_tree, NODES, state_size(vehicle))
-        self._goal = np.array([*problem.goal, problem.goal_radius])
+        self._goal = goal_of(problem)
         self._grow = towards_anywhere(query, guide)
         self._prefix = len(prefix.states)
         self._restart_at, self._trial = RRT.restart_after, 0

@@ -36,9 +36,10 @@ from planners.search.structures.frontier import (
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.geometry.occupancy import drawing_of
+from planners.world.goal import metres_to, reaches
 from planners.world.jit import inlined, lean
 from planners.world.problem import BOUNDS
-from planners.world.trigonometry import length, sincos, wrapped
+from planners.world.trigonometry import sincos, wrapped
 from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -148,15 +149,14 @@ def drive_primitive(
     for _ in range(lattice.steps):
         control_1, control_2 = _controls(state, motion, lattice, vehicle)
         state = step(state, control_1, control_2, vehicle)
-        to_goal = length(state[0] - goal[0], state[1] - goal[1]) - goal[2]
         depth = tree.depths[parent] + 1
-        if depth * vehicle.dt + max(to_goal, 0.0) / vehicle.max_speed >= tree.bound[0]:
+        if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:
             return -1
         counts[trees.CHECKS] += 1
         if not state_is_free(state, vehicle, scene):
             return -1
         parent = trees.append(tree, parent, 0, state, control_1, control_2, depth)
-        if to_goal <= 0.0:
+        if reaches(state, goal):
             counts[trees.GOAL_VERTEX] = parent
             break
     return parent

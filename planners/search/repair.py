@@ -24,6 +24,7 @@ from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
 from planners.world.geometry.occupancy import Bits
+from planners.world.goal import RADIUS, X, Y, goal_of, place
 from planners.world.jit import jit, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import length
@@ -147,7 +148,7 @@ def repair(
     problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
     reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
-    goal = np.array([*problem.goal, problem.goal_radius])
+    goal = goal_of(problem)
     at = len(drive.states)  # the reference state from which to look for a free part
     beyond_m = settings.rejoin_beyond_m
     checks = expansions = nodes = 0
@@ -158,13 +159,17 @@ def repair(
         at, checked = rejoin_at(reference, after, x, y, beyond_m, settings.free_steps, vehicle, scene)
         checks += checked
         to_goal = at == len(reference) - 1
-        disc = goal if to_goal else np.array([*reference[at, :2], settings.rejoin_radius_m])
-        target, radius = (float(disc[0]), float(disc[1])), float(disc[2])
+        disc = goal
+        if not to_goal:
+            disc = place(float(reference[at, 0]), float(reference[at, 1]), settings.rejoin_radius_m)
+        target, radius = (float(disc[X]), float(disc[Y])), float(disc[RADIUS])
         around = grid_path(occupied, (x, y), target, radius, workspace)
         straight = float(np.hypot(target[0] - x, target[1] - y)) - radius
         if around is None or metres_along(around, x, y) > straight + settings.detour_m:
             break
-        local = replace(query, problem=replace(problem, goal=target, goal_radius=radius))
+        arrival = problem.arrival if to_goal else None
+        asked = replace(problem, goal=target, goal_radius=radius, arrival=arrival)
+        local = replace(query, problem=asked)
         search = GuidedSearch(local, guidance([around, drive.states]), drive)
         beyond = search.advance(settings.work - work_of(checks, expansions))
         checks += search.collision_checks

@@ -13,23 +13,29 @@ from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, point_is_free, state_is_free
+from planners.world.goal import goal_of, reaches
 from planners.world.jit import lean
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
-Grow = Callable[[trees.Tree, Floats, int], None]  # tree, goal [3], number of expansions at which to return
+Grow = Callable[[trees.Tree, Floats, int], None]  # tree, goal, number of expansions at which to return
 
 NO_CONTROLS = np.empty((0, 2))
 GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
+_FIRST = (Status.BUDGET_SPENT, Status.START_BLOCKED, Status.GOAL_BLOCKED, Status.SOLVED)
 SLICE = 256  # expansions between two looks at the clock: a few milliseconds
 
 
 @lean
-def _is_blocked(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> int:
-    if not state_is_free(load(root, 0, vehicle), vehicle, scene):
+def _first_status(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> int:
+    """Which of the ``_FIRST`` holds before any search."""
+    state = load(root, 0, vehicle)
+    if not state_is_free(state, vehicle, scene):
         return 1
-    return 0 if point_is_free(goal[0], goal[1], scene) else 2
+    if not point_is_free(goal[0], goal[1], scene):
+        return 2
+    return 3 if reaches(state, goal) else 0
 
 
 def attempt(
@@ -52,7 +58,7 @@ def attempt(
         query: the problem and its limits.
         restart_after: expansions of the first trial.
         prepare: ``prepare(tree, goal, trial)`` makes what the trial's ``grow`` needs, a roadmap for example.
-            Here and below ``goal [3]`` is x, y and radius in metres.
+            Here and below ``goal`` is that of ``goal_of``.
         grow: ``grow(tree, goal, until)`` extends the tree until it is solved or has ``until`` expansions.
         explore: grows the tree of every second trial; nothing is prepared for it.
         follow_guide: grows the first tree for ``GUIDED`` expansions, after which it is mostly solved.
@@ -60,22 +66,19 @@ def attempt(
     began = perf_counter()
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
-    goal = np.array([*problem.goal, problem.goal_radius])
+    goal = goal_of(problem)
     prefix = query.prefix
     if prefix is None:
         prefix = Plan(start_state(problem, vehicle)[np.newaxis], NO_CONTROLS, vehicle.dt)
     first = np.ascontiguousarray(prefix.states)
     trees.plant(tree, first, np.ascontiguousarray(prefix.controls), scene.bounds, limits.bound_s)
     counts = tree.counts
-    blocked = _is_blocked(first, goal, vehicle, scene)
+    status = _FIRST[_first_status(first, goal, vehicle, scene)]
     roadmap_seconds = 0.0
     found: Plan | None = None
-    if blocked:
-        status = Status.START_BLOCKED if blocked == 1 else Status.GOAL_BLOCKED
-    elif math.dist(problem.start[:2], problem.goal) <= problem.goal_radius:
+    if status is Status.SOLVED:
         counts[trees.GOAL_VERTEX] = 0
-        status = Status.SOLVED
-    else:
+    elif status is Status.BUDGET_SPENT:
         if follow_guide is not None:
             follow_guide(tree, goal, min(GUIDED, limits.expansions))
         if counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < limits.expansions:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import admissible, load, step, store
@@ -43,7 +44,7 @@ def track(
     """Follow a plan's states ``reference [T, S]`` from number ``beginning`` on, from ``states[first]``.
 
     It fills in ``states [C, S]`` and ``controls [C, 2]`` (from each state to the next) behind ``first`` and
-    checks every state. ``goal [3]`` is x, y and radius in metres. Returns ``ARRIVED``, ``BLOCKED`` or
+    checks every state. ``goal`` is that of ``goal_of``. Returns ``ARRIVED``, ``BLOCKED`` or
     ``LOST``, the last state that was filled in, and the reference state that was steered to last.
     """
     state = load(states, first, vehicle)
@@ -72,6 +73,6 @@ def track(
         controls[filled, 1] = driven_2
         filled += 1
         store(states, filled, state)
-        if length(state[0] - goal[0], state[1] - goal[1]) <= goal[2]:
+        if reaches(state, goal):
             return ARRIVED, filled, at
     return LOST, filled, at

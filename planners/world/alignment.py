@@ -12,8 +12,8 @@ import numpy as np
 from planners.world.arrays import Bounds, Floats, Point
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import (
-    CANONICAL_DISTANCE,
     CANONICAL_START,
+    Arrival,
     Obstacles,
     Plan,
     Problem,
@@ -32,7 +32,7 @@ class Alignment(NamedTuple):
 
 
 def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
-    """Move a problem so that its start is at (0, 0) and its goal on the diagonal.
+    """Move a problem so that its start is at (0, 0) and its goal on the diagonal, at any distance.
 
     If the turned bounds lie askew, the new bounds are the box around them, and the rest of the box becomes
     obstacles. Obstacles are rounded to float32, as everywhere.
@@ -42,18 +42,8 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
 
     Returns:
         The problem in the canonical frame, and the motion that brought it there.
-
-    Raises:
-        ValueError: Start and goal are not 50 sqrt(2) m apart, within the goal radius.
     """
     (x, y, heading), goal = problem.start, problem.goal
-    distance = math.dist((x, y), goal)
-    if not abs(distance - CANONICAL_DISTANCE) <= problem.goal_radius:
-        raise ValueError(
-            f"Problem {problem.id}: start and goal are {distance:.2f} m apart, expected"
-            f" {CANONICAL_DISTANCE:.2f} m within the goal radius {problem.goal_radius:g} m;"
-            " cut longer ways into a chain of local goals."
-        )
     turn = math.atan2(goal[1] - y, goal[0] - x) - CANONICAL_START[2]
     turn = (turn + math.pi) % (2.0 * math.pi) - math.pi
     alignment = Alignment((x, y), 0.0 if abs(turn) < SAME_ANGLE else -turn)
@@ -62,17 +52,21 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
     cos, sin = math.cos(alignment.turn), math.sin(alignment.turn)
     obstacles, bounds = _moved(problem.obstacles, problem.bounds, alignment.origin, cos, sin)
     goal_x, goal_y = goal[0] - x, goal[1] - y
-    moved = Problem(
-        problem.id,
-        problem.class_name,
-        (0.0, 0.0, heading + alignment.turn),
-        (cos * goal_x - sin * goal_y, sin * goal_x + cos * goal_y),
-        problem.goal_radius,
-        bounds,
-        obstacles,
-        problem.scale,
+    moved = replace(
+        problem,
+        start=(0.0, 0.0, heading + alignment.turn),
+        goal=(cos * goal_x - sin * goal_y, sin * goal_x + cos * goal_y),
+        bounds=bounds,
+        obstacles=obstacles,
+        arrival=_turned_arrival(problem.arrival, alignment.turn),
     )
     return moved, alignment
+
+
+def _turned_arrival(arrival: Arrival | None, turn: float) -> Arrival | None:
+    if arrival is None or arrival.heading is None:
+        return arrival
+    return arrival._replace(heading=arrival.heading + turn)
 
 
 @jit
@@ -141,9 +135,17 @@ def mirrored(problem: Problem) -> Problem:
     """Mirror a canonical problem in its diagonal, which makes another one that is as hard."""
     (x, y, heading), goal = problem.start, problem.goal
     x_min, y_min, x_max, y_max = problem.bounds
+    arrival = problem.arrival
+    if arrival is not None:
+        arrival = arrival._replace(
+            heading=None if arrival.heading is None else 0.5 * math.pi - arrival.heading,
+            hitches=tuple(-hitch for hitch in arrival.hitches),
+        )
     return replace(
         problem,
         start=(y, x, 0.5 * math.pi - heading),
+        start_motion=problem.start_motion[:1] + tuple(-each for each in problem.start_motion[1:]),
+        arrival=arrival,
         goal=(goal[1], goal[0]),
         bounds=(y_min, x_min, y_max, x_max),
         obstacles=obstacles_of([[piece[:, ::-1] for piece in group] for group in _groups(problem)]),

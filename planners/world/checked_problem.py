@@ -6,7 +6,7 @@ import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.geometry.polygons import cut_polygons
-from planners.world.problem import Problem
+from planners.world.problem import Arrival, Problem
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
@@ -24,13 +24,15 @@ def checked_problem(
     class_name: str = "unknown",
     scale: float = 1.0,
     groups: list[int] | None = None,
+    start_motion: tuple[float, ...] = (),
+    arrival: Arrival | None = None,
 ) -> Problem:
     """Make a problem in any frame, with obstacles of polygons that lie end to end in one array.
 
     Args:
         start: x, y in metres, heading in radians.
         goal: x, y in metres.
-        goal_radius: metres.
+        goal_radius: metres: how far from the goal a drive may end.
         bounds: x_min, y_min, x_max, y_max in metres.
         points: ``[m, 2]`` metres, the corners of all polygons, each in any orientation.
         polygon_starts: ``[n + 1]`` polygon i owns ``points[polygon_starts[i] : polygon_starts[i + 1]]``.
@@ -39,6 +41,9 @@ def checked_problem(
         class_name: the class that it belongs to.
         scale: metres of the lengths here in one metre of the problem.
         groups: how many polygons belong to each obstacle; by default one.
+        start_motion: speed (m/s) at the start, then what else the vehicle's state has, such as the steering
+            angle and the hitch angles; what is missing is 0.
+        arrival: what is asked at the goal besides the place.
 
     Raises:
         ValueError: A polygon is none, or the problem makes no sense (``problem_fault``).
@@ -56,6 +61,9 @@ def checked_problem(
         (bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
         obstacles,
         scale,
+        (start_motion[0] / scale, *start_motion[1:]) if start_motion else (),
+        arrival
+        and arrival._replace(least_speed=arrival.least_speed / scale, most_speed=arrival.most_speed / scale),
     )
     fault = problem_fault(problem, vehicle)
     if fault is not None:

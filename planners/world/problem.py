@@ -19,6 +19,9 @@ GOAL_RADIUS = 2.0  # metres
 BOUNDS = (-7.0, -7.0, 57.0, 57.0)  # x_min, y_min, x_max, y_max in metres
 
 
+_ROUNDING = 1e-9  # metres
+
+
 class Obstacles(NamedTuple):
     """Obstacles as groups of convex pieces. Coordinates are exact in float32, so files keep them exactly."""
 
@@ -31,18 +34,31 @@ class Obstacles(NamedTuple):
         return np.split(self.vertices, self.piece_starts[1:-1]) if len(self.piece_starts) > 1 else []
 
 
+class Arrival(NamedTuple):
+    """What is asked at the goal besides the place. The default asks for nothing more."""
+
+    heading: float | None = None  # radians; None: any
+    heading_tolerance: float = 0.0  # radians
+    least_speed: float = -math.inf  # m/s, below 0 backwards
+    most_speed: float = math.inf  # m/s
+    hitches: tuple[float, ...] = ()  # radians, one a trailer; none: any
+    hitch_tolerances: tuple[float, ...] = ()  # radians, one a trailer
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Start pose, goal disc, bounds and obstacles (docs/method.md: ``S``)."""
+    """Start state, goal, bounds and obstacles (docs/method.md: ``S``)."""
 
     id: str
     class_name: str
     start: Pose
     goal: Point
-    goal_radius: float  # metres
+    goal_radius: float  # metres: how far from the goal a drive may end
     bounds: Bounds
     obstacles: Obstacles
     scale: float = 1.0  # real metres in one metre of this problem; files hold real metres
+    start_motion: tuple[float, ...] = ()  # the start state behind the pose, speed first; what is missing is 0
+    arrival: Arrival | None = None  # None: any heading and speed will do
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +106,22 @@ def counter_clockwise(polygon: Floats) -> Floats:
     return polygon if area >= 0.0 else polygon[::-1]
 
 
+def has_canonical_ends(problem: Problem) -> bool:
+    """Whether start and goal lie where those of canonical problems do, whatever the motion there."""
+    return (
+        math.hypot(problem.start[0], problem.start[1]) <= _ROUNDING
+        and math.dist(problem.goal, CANONICAL_GOAL) <= problem.goal_radius + _ROUNDING
+    )
+
+
+def is_canonical(problem: Problem) -> bool:
+    """Whether a problem asks what memories answer: from rest, all straight, to the canonical place."""
+    return has_canonical_ends(problem) and not any(problem.start_motion) and problem.arrival is None
+
+
 def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
-    """Return the state ``[S]`` at the start: at rest, wheels straight, trailers straight behind."""
+    """Return the state ``[S]`` at the start: unless the problem says more, at rest and all straight."""
     state = np.zeros(state_size(vehicle))
     state[:3] = problem.start
+    state[3 : 3 + len(problem.start_motion)] = problem.start_motion
     return state

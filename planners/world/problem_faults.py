@@ -18,9 +18,9 @@ from planners.world.geometry.collision import (
 )
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.jit import jit
-from planners.world.problem import CANONICAL_DISTANCE, Problem, start_state
-from planners.world.vehicles.dynamics import load, swept_bodies
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.problem import Arrival, Problem, start_state
+from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
+from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_names
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
 MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
@@ -30,10 +30,11 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     """Return what is wrong with a problem and what to do about it, or None if it makes sense.
 
     The obstacles must be well formed. Checked are, in this order: the numbers are finite and not too large,
-    the bounds, the goal radius, the distance from start to goal, and whether the footprint at the start (with
-    trailers straight behind) and the goal's centre are free.
+    the bounds, the goal radius, how the drive begins and is to end, and whether the footprint at the start
+    and the goal's centre are free.
     """
-    numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds)
+    heading = None if problem.arrival is None else problem.arrival.heading
+    numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds, heading or 0.0)
     if not all(math.isfinite(number) for number in numbers):
         return "start, goal, goal_radius and bounds must be finite numbers; correct them"
     if max(abs(number) for number in numbers) > LARGEST_COORDINATE_M:
@@ -46,13 +47,11 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if max(x_max - x_min, y_max - y_min) > WIDEST_BOUNDS_M:
         return f"bounds {list(problem.bounds)} are wider than {WIDEST_BOUNDS_M:.0f} m; are they in metres?"
     if problem.goal_radius <= 0.0:
-        return f"goal_radius is {problem.goal_radius}; expected a length above 0 m"
-    distance = math.dist(problem.start[:2], problem.goal)
-    if abs(distance - CANONICAL_DISTANCE) > problem.goal_radius:
-        return (
-            f"start and goal are {distance:.2f} m apart, expected {CANONICAL_DISTANCE:.2f} m within the "
-            f"goal radius {problem.goal_radius:g} m; cut a longer route into local goals"
-        )
+        name = "goal_radius" if heading is None else "goal_tolerance"
+        return f"{name} is {problem.goal_radius}; expected a length above 0 m"
+    fault = _start_fault(problem, vehicle) or _arrival_fault(problem.arrival, vehicle)
+    if fault is not None:
+        return fault
     entries, start_is_free, goal_is_free = _room(
         problem.obstacles.vertices,
         problem.obstacles.piece_starts,
@@ -68,6 +67,55 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if not goal_is_free:
         return f"goal centre {_point(problem.goal)} lies in an obstacle or out of bounds; move the goal"
     return None
+
+
+def _start_fault(problem: Problem, vehicle: Vehicle) -> str | None:
+    """What is wrong with the motion at the start, which the vehicle must be able to have."""
+    names = state_names(vehicle)[3:]
+    if len(problem.start_motion) > len(names):
+        return f"the start has {len(problem.start_motion)} numbers of motion, expected {', '.join(names)}"
+    for name, value in zip(names, problem.start_motion, strict=False):
+        low, high = _limits(name, vehicle)
+        if not low <= value <= high:
+            return f"start {name} is {value:g}; the vehicle allows {low:g} to {high:g}"
+    return None
+
+
+def _arrival_fault(arrival: Arrival | None, vehicle: Vehicle) -> str | None:
+    """What is wrong with what is asked at the goal."""
+    if arrival is None:
+        return None
+    if arrival.heading is not None and not arrival.heading_tolerance > 0.0:
+        return f"goal_tolerance is {arrival.heading_tolerance:g} rad; expected an angle above 0"
+    asked = f"goal_speed [{arrival.least_speed:g}, {arrival.most_speed:g}]"
+    if not arrival.least_speed <= arrival.most_speed:
+        return f"{asked} is inverted; expected the least and the most m/s"
+    low, high = _limits("speed", vehicle)
+    if arrival.least_speed > high or arrival.most_speed < low:
+        return f"{asked} is beyond the vehicle, which drives {low:g} to {high:g} m/s"
+    trailers = len(state_names(vehicle)) - 5
+    angles, tolerances = len(arrival.hitches), len(arrival.hitch_tolerances)
+    if (angles, tolerances) not in ((0, 0), (trailers, trailers)):
+        return (
+            f"goal has {angles} hitch angles and {tolerances} tolerances; expected {trailers} each, or none"
+        )
+    for hitch, allowed in zip(arrival.hitches, arrival.hitch_tolerances, strict=True):
+        most = _limits("hitch", vehicle)[1]
+        if not (abs(hitch) <= most and allowed > 0.0):
+            return (
+                f"goal hitch is {hitch:g} within {allowed:g} rad; expected up to {most:g}, within more than 0"
+            )
+    return None
+
+
+def _limits(name: str, vehicle: Vehicle) -> tuple[float, float]:
+    """The least and the greatest value of a variable of the vehicle's state."""
+    if name == "speed":
+        return vehicle.min_speed, vehicle.max_speed
+    if name.startswith("hitch") and isinstance(vehicle, CarWithTrailers):
+        return -vehicle.max_hitch, vehicle.max_hitch
+    most = turn_limit(vehicle)
+    return -most, most
 
 
 @jit

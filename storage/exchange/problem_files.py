@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
@@ -14,11 +14,14 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from storage.errors import StorageError, sentence
+from storage.exchange.question_fields import QUESTION_FIELDS
 from storage.fields import check_fields, parse_json
 from storage.places.files import read_text
 
 FORMATS: Final = (".json", ".jsonl", ".parquet")
-FIELDS: Final = ("id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale")
+FIELDS: Final = (
+    "id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale", *QUESTION_FIELDS,
+)  # fmt: skip
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
 SLICES_A_GROUP: Final = 16  # to read the last rows of a row group, those before are decoded too
 BUFFER_BYTES: Final = 1 << 20
@@ -41,6 +44,13 @@ def format_of(path: Path) -> str:
     if path.suffix not in FORMATS:
         raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
     return path.suffix
+
+
+def check_problem_fields(fields: Sequence[object]) -> None:
+    """Raise ValueError if one of ``fields`` is none of a problem's, or occurs twice."""
+    if "moving" in fields:
+        raise ValueError("has the field 'moving', but obstacles that move are not supported; leave it out")
+    check_fields(fields, FIELDS)
 
 
 def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
@@ -166,7 +176,7 @@ def _rows(
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
     try:
         with pq.ParquetFile(path, buffer_size=BUFFER_BYTES) as file:
-            check_fields(file.schema_arrow.names, FIELDS)
+            check_problem_fields(file.schema_arrow.names)
             yield file
     except FileNotFoundError:
         raise StorageError(f"{path} does not exist; check the name.") from None

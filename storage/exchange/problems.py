@@ -15,14 +15,21 @@ from planners.world.checked_problem import checked_problem
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
-from storage.exchange.problem_files import FIELDS, ProblemSlice, format_of, raw_problems, raw_slice
-from storage.fields import check_fields, number_of, scale_of, short, text_of
+from storage.exchange.problem_files import (
+    ProblemSlice,
+    check_problem_fields,
+    format_of,
+    raw_problems,
+    raw_slice,
+)
+from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
+from storage.fields import number_of, scale_of, short, text_of
 from storage.places.files import whole_file, write_json
 from storage.tables.schemas import PROBLEMS
 from storage.tables.shards import table_of, write_table
 
 UNKNOWN_CLASS: Final = "unknown"
-_REQUIRED: Final = ("start", "goal", "goal_radius", "bounds", "obstacles")
+_REQUIRED: Final = ("start", "goal", "bounds", "obstacles")
 
 
 def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
@@ -77,14 +84,14 @@ def _checked(
         yield where, problem
 
 
-def write_problems(path: Path, problems: Sequence[Problem]) -> None:
-    """Write ``problems`` to ``path``, whole or not at all, in the format of its ending.
+def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = CAR) -> None:
+    """Write ``problems`` for a ``vehicle`` to ``path``, whole or not at all, in the format of its ending.
 
     Each convex piece becomes a polygon; ``groups`` says which belong to one obstacle. Files hold the lengths
     of the world outside, a problem's own times its scale. Reading gives the same problems back, exactly, or
     to the last digit if the scale is not 1.
     """
-    rows = [fields_of(problem) for problem in problems]
+    rows = [fields_of(problem, vehicle) for problem in problems]
     match format_of(path):
         case ".json":
             if len(rows) != 1:
@@ -104,20 +111,20 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     """
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, expected an object with {', '.join(_REQUIRED)}")
-    check_fields(list(fields), FIELDS)
+    check_problem_fields(list(fields))
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")
-    start, goal = _numbers(fields, "start", 3), _numbers(fields, "goal", 2)
-    bounds = _numbers(fields, "bounds", 4)
+    start, bounds = numbers_of(fields, "start", 3), numbers_of(fields, "bounds", 4)
+    goal = goal_of(fields)
     scale = scale_of(fields.get("scale"))
     polygons = fields["obstacles"]
     if not isinstance(polygons, list):
         raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")
     return checked_problem(
         (start[0], start[1], start[2]),
-        (goal[0], goal[1]),
-        number_of(fields["goal_radius"], "goal_radius"),
+        goal.place,
+        goal.radius,
         (bounds[0], bounds[1], bounds[2], bounds[3]),
         _points(polygons),
         np.cumsum([0] + [len(polygon) for polygon in polygons], dtype=np.int64),
@@ -126,6 +133,8 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         class_name=_text(fields, "class", UNKNOWN_CLASS),
         scale=scale,
         groups=_groups(fields.get("groups"), len(polygons)),
+        start_motion=start_motion_of(fields, vehicle),
+        arrival=goal.arrival,
     )
 
 
@@ -162,20 +171,13 @@ def _points_of(points: object, number: int) -> Floats:
     return np.array([[number_of(x, "a point"), number_of(y, "a point")] for x, y in points]).reshape(-1, 2)
 
 
-def _numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
-    values = fields[name]
-    if not isinstance(values, list) or len(values) != count:
-        raise ValueError(f"{name} must be a list of {count} numbers, got {short(values)}")
-    return [number_of(value, name) for value in values]
-
-
 def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
     value = fields.get(name)
     return default if value is None or value == "" else text_of(value, name)
 
 
-def fields_of(problem: Problem) -> dict[str, Any]:
-    """The contract's object that describes a ``problem``, as ``problem_of`` takes it."""
+def fields_of(problem: Problem, vehicle: Vehicle = CAR) -> dict[str, Any]:
+    """The contract's object that describes a ``problem`` for a ``vehicle``, as ``problem_of`` takes it."""
     obstacles, scale = problem.obstacles, problem.scale
     x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()
@@ -183,8 +185,7 @@ def fields_of(problem: Problem) -> dict[str, Any]:
         "id": problem.id,
         "class": problem.class_name,
         "start": [scale * x, scale * y, heading],
-        "goal": [scale * coordinate for coordinate in problem.goal],
-        "goal_radius": scale * problem.goal_radius,
+        **question_fields(problem, vehicle),
         "bounds": [scale * bound for bound in problem.bounds],
         "obstacles": [(scale * piece).tolist() for piece in obstacles.pieces()],
     }

@@ -49,8 +49,27 @@ PROBLEMS: Final = _schema(
         *_PROBLEM,
         ("obstacles", pa.list_(pa.list_(pa.list_(pa.float64())))),  # polygons of [x, y], m
         ("groups", pa.list_(pa.int32())),  # how many consecutive polygons make one obstacle
+        ("start_speed", pa.float64()),  # m/s
+        ("start_steering", pa.float64()),  # rad
+        ("start_turn_rate", pa.float64()),  # rad/s
+        ("start_hitch", pa.list_(pa.float64())),  # rad
+        ("goal_tolerance", pa.list_(pa.float64())),  # m, rad
+        ("goal_speed", pa.list_(pa.float64())),  # least and most, m/s
+        ("goal_hitch", pa.list_(pa.float64())),  # rad
+        ("goal_hitch_tolerance", pa.list_(pa.float64())),  # rad
     ],
-    optional=("groups", "scale"),  # lengths are those of the world outside here
+    optional=(
+        *(
+            "groups",
+            "scale",
+            "goal_radius",
+            "start_speed",
+            "start_steering",
+            "start_turn_rate",
+            "start_hitch",
+        ),
+        *("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance"),
+    ),  # lengths are those of the world outside here
 )
 
 EXPERIENCES: Final = _schema(

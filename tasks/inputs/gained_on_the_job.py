@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.solve import Attempt
-from planners.world.problem import Problem
+from planners.world.problem import Problem, is_canonical
 from planners.world.vehicles.vehicle import Vehicle, name_of, vehicle_named
 from storage.places.data_folder import open_data_folder
 from storage.places.run_folder import checked_name
@@ -27,7 +27,7 @@ class Solved(NamedTuple):
 
 
 def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
-    """Add the plans that no memory had to a data folder.
+    """Add the plans of canonical problems that no memory had to a data folder.
 
     Args:
         data: the data folder.
@@ -41,7 +41,7 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     new = [
         (Experience(problem, attempt.plan, vehicle), attempt)
         for problem, attempt in attempts
-        if attempt.plan is not None and attempt.source in NEW
+        if attempt.plan is not None and attempt.source in NEW and is_canonical(problem)
     ]
     if new:
         add_gained(

@@ -74,7 +74,10 @@ class MemoryModel(PythonModel):
         model_input: pd.DataFrame,
         params: dict[str, Any] | None = None,
     ) -> pd.DataFrame:
-        """The ``top_k`` best plans for each problem, best first; none if the encoder says that none fits.
+        """The ``top_k`` best plans for each problem, best first.
+
+        There are none if the encoder says that none fits, or if the problem is not canonical: at another
+        distance, from a motion, or to a pose.
 
         Raises MlflowException, with one line, if a problem is malformed or impossible.
         """

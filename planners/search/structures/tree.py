@@ -12,6 +12,7 @@ from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import metres_to, reaches
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import gap_to_segment, length
@@ -132,7 +133,7 @@ def extend(
 ) -> int:
     """Drive from a vertex towards a target (x, y) in metres, and add the states before the first blocked one.
 
-    ``goal [3]`` is x, y and radius in metres; a state in it ends the extension. Along a ``lead [m, 2]``
+    A state that reaches the ``goal`` ends the extension. Along a ``lead [m, 2]``
     (empty for none) each state must be within ``tube_m`` of the segment to its next waypoint, which is passed
     within ``passing_m``. Returns the number of new vertices.
     """
@@ -166,9 +167,8 @@ def extend(
         state = step(state, driven_1, driven_2, vehicle)
         x = state[0]
         y = state[1]
-        to_goal = length(x - goal[0], y - goal[1]) - goal[2]
         depth = tree.depths[parent] + 1
-        if depth * vehicle.dt + max(to_goal, 0.0) / vehicle.max_speed >= tree.bound[0]:
+        if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:
             break
         counts[CHECKS] += 1
         if not state_is_free(state, vehicle, scene):
@@ -185,7 +185,7 @@ def extend(
             if length(gap_x, gap_y) > tube_m:
                 break
         parent = append(tree, parent, waypoint, state, driven_1, driven_2, depth)
-        if to_goal <= 0.0:
+        if reaches(state, goal):
             counts[GOAL_VERTEX] = parent
             break
         arrived = length(x - target_x, y - target_y) < settings.arrival_m

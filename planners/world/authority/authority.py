@@ -1,7 +1,8 @@
 """The independent judge of plans: own equations in NumPy, collision by FCL; shares no code with the planners.
 
 What it accepts is a plan: driven by its controls from the problem's start, inside the vehicle's limits, to
-the goal, the swept footprint of each of its bodies free and inside the bounds at every instant.
+the goal as it is asked for, the swept footprint of each of its bodies free and inside the bounds at every
+instant.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from planners.world.arrays import Floats, Integers
 from planners.world.authority.authority_equations import Body, bodies_of, limits_of, simulate_again
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
@@ -43,9 +44,11 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     found = []
     if plan.dt != vehicle.dt:
         found.append(f"Time step: {plan.dt} s; the vehicle's is {vehicle.dt} s.")
-    offset = np.abs(states[0] - [*problem.start, *[0.0] * (size - 3)]).max()
+    motion = [*problem.start_motion, *[0.0] * (size - 3 - len(problem.start_motion))]
+    offset = np.abs(states[0] - [*problem.start, *motion]).max()
     if offset > TOLERANCE:
-        found.append(f"Start: state 0 is {offset:.3g} off the problem's start at rest, all straight.")
+        how = f"with motion {motion}" if any(motion) else "at rest, all straight"
+        found.append(f"Start: state 0 is {offset:.3g} off the problem's start {how}.")
     beyond = _limit_faults(states, controls, vehicle)
     if beyond:  # how far a step may bend is known within the limits only
         return found + beyond
@@ -53,8 +56,31 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     miss = math.dist(states[-1, :2], problem.goal)
     if miss > problem.goal_radius + ROUNDING:
         found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
+    if problem.arrival is not None:
+        found += _arrival_faults(states[-1].tolist(), problem.arrival)
     for body in bodies_of(states, controls, vehicle):
         found += _sweep_faults(problem, body)
+    return found
+
+
+def _arrival_faults(last: list[float], arrival: Arrival) -> list[str]:
+    """What is wrong with heading, speed and hitch angles of the ``last [S]`` state."""
+    found = []
+    if arrival.heading is not None:
+        off = abs(math.remainder(last[2] - arrival.heading, math.tau))
+        if off > arrival.heading_tolerance + TOLERANCE:
+            allowed = arrival.heading_tolerance
+            found.append(f"Heading: the last is {off:.3f} rad off the goal's; allowed are {allowed} rad.")
+    low, high = arrival.least_speed, arrival.most_speed
+    if not low - TOLERANCE <= last[3] <= high + TOLERANCE:
+        found.append(f"Arrival: the last speed is {last[3]:.3g} m/s; asked are {low:g} to {high:g} m/s.")
+    asked = zip(last[5:], arrival.hitches, arrival.hitch_tolerances, strict=bool(arrival.hitches))
+    for number, (angle, wanted, allowed) in enumerate(asked, start=1):
+        off = abs(angle - wanted)
+        if off > allowed + TOLERANCE:
+            found.append(
+                f"Hitch {number}: the last is {off:.3f} rad off the goal's; allowed are {allowed} rad."
+            )
     return found
 
 

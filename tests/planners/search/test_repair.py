@@ -13,6 +13,7 @@ from planners.search.tracking import ARRIVED, BLOCKED, TRACKING, track
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
+from planners.world.goal import goal_of
 from planners.world.problem import start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, VEHICLES
@@ -118,7 +119,7 @@ def test_the_controller_follows_a_plan_from_its_start_to_its_goal(seed):
     problem = problem_of([])
     states, controls = np.empty((2000, 5)), np.empty((2000, 2))
     states[0] = start_state(problem)
-    goal = np.array([*problem.goal, problem.goal_radius])
+    goal = goal_of(problem)
     ended, last, _ = track(states, controls, 0, stored.states, 0, goal, TRACKING, CAR, scene_of(problem))
     assert ended == ARRIVED
     assert last <= 1.5 * len(stored.states)
@@ -134,7 +135,7 @@ def test_the_controller_stops_before_an_obstacle():
     states, controls = np.empty((2000, 5)), np.empty((2000, 2))
     states[0] = start_state(problem)
     scene = scene_of(problem)
-    goal = np.array([*problem.goal, problem.goal_radius])
+    goal = goal_of(problem)
     ended, last, _ = track(states, controls, 0, stored.states, 0, goal, TRACKING, CAR, scene)
     assert ended == BLOCKED
     assert count_free_prefix(states[: last + 1], CAR, scene) == last + 1

@@ -13,7 +13,14 @@ from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import box_is_free, scene_of
-from planners.world.problem import CANONICAL_DISTANCE, Plan, Problem, obstacles_of
+from planners.world.problem import (
+    Arrival,
+    Plan,
+    Problem,
+    is_canonical,
+    obstacles_of,
+    start_state,
+)
 from planners.world.vehicles.vehicle import CAR
 from tests.planners.world.authority.test_authority import good_plan
 from tests.planners.world.strategies import angles, seeds
@@ -117,17 +124,36 @@ def test_a_canonical_problem_stays_as_it_is() -> None:
     assert to_canonical(problem) == (problem, Alignment((0.0, 0.0), 0.0))
 
 
-def test_a_wrong_distance_is_refused_in_one_line() -> None:
-    problem = replace(problem_class("curves").draw(0, 0), goal=(60.0, 60.0))
-    with pytest.raises(ValueError, match=r"84\.85 m apart, expected 70\.71 m") as refusal:
-        to_canonical(problem)
-    assert "\n" not in str(refusal.value)
+@given(seed=seeds, distance=st.floats(0.0, 200.0), towards=angles, heading=angles)
+def test_a_question_of_any_distance_is_moved_and_asks_the_same(
+    seed: int, distance: float, towards: float, heading: float
+) -> None:
+    goal = (distance * math.cos(towards), distance * math.sin(towards))
+    arrival = Arrival(heading, 0.1, 0.0, 1.0)
+    asked = replace(
+        problem_class("random").draw(seed, 0),
+        start=(0.0, 0.0, heading),
+        goal=goal,
+        start_motion=(1.5, 0.2),
+        arrival=arrival,
+    )
+    moved, alignment = to_canonical(asked)
+    assert moved.goal == pytest.approx((distance / math.sqrt(2.0),) * 2, abs=1e-9)
+    assert moved.start_motion == asked.start_motion
+    assert moved.arrival is not None
+    turned = moved.arrival.heading - moved.start[2]  # type: ignore[operator]
+    assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
+    back = from_canonical(Plan(start_state(moved)[np.newaxis], np.empty((0, 2))), alignment)
+    assert math.remainder(back.states[0, 2] - heading, math.tau) == pytest.approx(0.0, abs=1e-9)
+    assert not is_canonical(moved)
 
 
-def test_the_goal_radius_is_the_distance_that_is_forgiven() -> None:
-    reach = (CANONICAL_DISTANCE + 1.9) / math.sqrt(2.0)
-    canonical, _ = to_canonical(replace(problem_class("curves").draw(0, 0), goal=(reach, reach)))
-    assert canonical.goal == pytest.approx((reach, reach))
+def test_only_the_usual_question_is_canonical() -> None:
+    problem = problem_class("curves").draw(0, 0)
+    assert is_canonical(problem)
+    assert is_canonical(replace(problem, start_motion=(0.0, 0.0), start=(0.0, 0.0, 1.0), goal=(51.0, 50.0)))
+    for change in ({"start_motion": (1.0,)}, {"arrival": Arrival(0.1, 0.1)}, {"goal": (20.0, 20.0)}):
+        assert not is_canonical(replace(problem, **change))
 
 
 @given(scale=st.floats(0.05, 20.0))

@@ -138,7 +138,11 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        *[({name: None}, f"field {name} is missing") for name in GOOD if name not in ("id", "class")],
+        *[
+            ({name: None}, f"field {name} is missing")
+            for name in GOOD
+            if name not in ("id", "class", "goal_radius")
+        ],
         ({"start": [0, 0]}, "start must be a list of 3 numbers"),
         ({"start": "origin"}, "start must be a list of 3 numbers"),
         ({"start": [0, 0, True]}, "start must hold numbers"),
@@ -148,8 +152,22 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal": [math.inf, 50]}, "finite"),
         ({"goal": [10**400, 50]}, "finite"),
         ({"start": [0, 0, 1e300]}, "farther"),
-        ({"goal": [80, 50]}, "94.34 m apart"),
-        ({"scale": 2.0}, "divided by scale 2: start and goal are 35.36 m apart"),
+        ({"goal": [80, 50]}, "goal centre (80, 50)"),
+        ({"scale": 20.0}, "divided by scale 20: start footprint"),
+        ({"goal": [50, 50, 0, 0]}, "goal must be a list of 2 numbers, or 3"),
+        ({"goal": [50, 50, math.nan]}, "has goal_radius"),
+        ({"goal_tolerance": [0.1, 0.1]}, "has goal_tolerance, but a place has goal_radius"),
+        ({"start_speed": 9}, "start speed is 9; the vehicle allows -1 to 4"),
+        ({"start_speed": math.nan}, "start speed is nan"),
+        ({"start_speed": "fast"}, "start_speed must hold numbers"),
+        ({"start_steering": -1}, "start steering is -1"),
+        ({"start_turn_rate": 0.1}, "has start_turn_rate, but the state of 'car' has speed, steering"),
+        ({"start_hitch": [0.1]}, "start_hitch must be a list of 0 numbers"),
+        ({"goal_speed": 1}, "goal_speed must be a list of 2 numbers"),
+        ({"goal_speed": [2, 1]}, "goal_speed [2, 1] is inverted"),
+        ({"goal_speed": [5, 6]}, "beyond the vehicle"),
+        ({"goal_hitch": [0.1]}, "1 hitch angles and 0 tolerances"),
+        ({"moving": []}, "obstacles that move are not supported"),
         ({"scale": 0}, "scale is 0; expected"),
         ({"scale": math.nan}, "scale is nan; expected"),
         ({"scale": "large"}, "scale must hold numbers"),

@@ -22,6 +22,7 @@ from planners.search.structures.roadmap import (
     resample_path,
 )
 from planners.world.geometry.collision import scene_of
+from planners.world.goal import goal_of
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
 from tests.worlds import strewn, walled_goal
@@ -34,7 +35,7 @@ def shape(problem):
 def build(problem, settings, seed=0, guide=ANYWHERE):
     scene = scene_of(problem)
     roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
-    goal = np.array([*problem.goal, problem.goal_radius])
+    goal = goal_of(problem)
     start = np.array([*problem.start, 0.0, 0.0])
     joined = build_roadmap(roadmap, start, goal, guide, settings, CAR, scene, generator(seed).bit_generator)
     return roadmap, joined, scene

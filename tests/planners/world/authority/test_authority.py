@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planners.search.registry import PLANNERS, plan
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
-from planners.world.problem import Plan, obstacles_of, start_state
+from planners.world.goal import goal_of, reaches
+from planners.world.problem import Arrival, Plan, obstacles_of, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, Vehicle
 from tests.planners.world.motions import exact_motion
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
 
@@ -153,3 +155,42 @@ def test_every_plan_that_a_planner_finds_is_good(planner: str, name: str) -> Non
         problem = problem_class(name).draw(3, index)
         found = plan(planner, problem, generator(0, problem.id, planner)).plan
         assert found is None or faults(problem, found) == []
+
+
+@given(speed=st.floats(-1.0, 4.0), steering=st.floats(-0.6, 0.6), off=st.floats(1e-5, 1.0))
+def test_another_start_than_the_one_asked_for_is_refused(speed: float, steering: float, off: float) -> None:
+    asked = replace(EMPTY, start_motion=(speed, steering), goal=(0.0, 0.0))
+    alone = Plan(start_state(asked)[np.newaxis], np.empty((0, 2)))
+    assert faults(asked, alone) == []
+    assert kinds(faults(replace(asked, start_motion=(speed + off, steering)), alone)) == ["Start"]
+    assert kinds(faults(replace(asked, start_motion=(speed, steering - off)), alone)) == ["Start"]
+
+
+@given(
+    heading=st.floats(-20.0, 20.0),
+    allowed=st.floats(0.01, 1.0),
+    low=st.floats(-1.0, 4.0),
+    most=st.floats(-1.0, 4.0),
+)
+def test_an_arrival_is_judged_as_the_planners_judge_it(
+    heading: float, allowed: float, low: float, most: float
+) -> None:
+    plan = good_plan()
+    arrival = Arrival(heading, allowed, min(low, most), max(low, most))
+    asked = replace(EMPTY, arrival=arrival)
+    wrong = set()
+    if math.cos(plan.states[-1, 2] - heading) < math.cos(allowed):
+        wrong.add("Heading")
+    if not arrival.least_speed <= plan.states[-1, 3] <= arrival.most_speed:
+        wrong.add("Arrival")
+    assert set(kinds(faults(asked, plan))) == wrong
+    assert reaches(tuple(plan.states[-1]), goal_of(asked)) == (not wrong)
+
+
+def test_hitch_angles_at_the_goal_are_judged() -> None:
+    start = replace(EMPTY, start=(10.0, 10.0, 0.0), goal=(10.0, 10.0), start_motion=(0.0, 0.0, 0.3, -0.2))
+    plan = Plan(np.array([[10.0, 10.0, 0.0, 0.0, 0.0, 0.3, -0.2]]), np.empty((0, 2)))
+    for asked, wrong in (((0.25, -0.2), []), ((0.1, -0.2), ["Hitch 1"]), ((0.3, 0.0), ["Hitch 2"])):
+        problem = replace(start, arrival=Arrival(hitches=asked, hitch_tolerances=(0.1, 0.1)))
+        assert kinds(faults(problem, plan, CAR_2_TRAILERS)) == wrong
+        assert reaches(tuple(plan.states[-1]), goal_of(problem)) == (not wrong)

@@ -1,0 +1,128 @@
+"""The fields of a problem that say with what motion a drive begins, and how it is to end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final, NamedTuple
+
+from planners.world.arrays import Point
+from planners.world.problem import GOAL_RADIUS, Arrival, Problem
+from planners.world.vehicles.vehicle import Vehicle, name_of, state_names
+from storage.fields import number_of, short
+
+STARTS: Final = {"start_speed": "speed", "start_steering": "steering", "start_turn_rate": "turn_rate"}
+ENDS: Final = ("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance")
+QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
+POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
+ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
+
+
+class Goal(NamedTuple):
+    """What a problem asks for at its end, in the lengths of its file."""
+
+    place: Point  # metres
+    radius: float  # metres
+    arrival: Arrival | None
+
+
+def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float, ...]:
+    """The motion that ``fields`` give at the start, in the order of the state of a ``vehicle``, speed first.
+
+    Raises ValueError if a field is malformed or the vehicle has nothing that it could mean.
+    """
+    names = state_names(vehicle)[3:]
+    motion = dict.fromkeys(names, 0.0)
+    for field, name in STARTS.items():
+        if fields.get(field) is None:
+            continue
+        if name not in motion:
+            raise ValueError(
+                f"has {field}, but the state of {short(name_of(vehicle))} has {', '.join(names)}; "
+                "leave it out"
+            )
+        motion[name] = number_of(fields[field], field)
+    hitches = [name for name in names if name.startswith("hitch")]
+    if fields.get("start_hitch") is not None:
+        motion.update(zip(hitches, numbers_of(fields, "start_hitch", len(hitches)), strict=True))
+    values = list(motion.values())
+    while values and values[-1] == 0.0:
+        values.pop()
+    return tuple(values)
+
+
+def goal_of(fields: Mapping[str, Any]) -> Goal:
+    """The goal that ``fields`` describe. Raises ValueError, which says what is wrong with it."""
+    goal = fields["goal"]
+    if not isinstance(goal, list) or len(goal) not in (2, 3):
+        raise ValueError(f"goal must be a list of 2 numbers, or 3 for a pose, got {short(goal)}")
+    x, y, *heading = numbers_of(fields, "goal", len(goal))
+    if heading:
+        _refuse(fields, "goal_radius", "a pose has goal_tolerance, [metres, radians]")
+        radius, tolerance = numbers_of(fields, "goal_tolerance", 2, POSE_TOLERANCE)
+        pose: dict[str, Any] = {"heading": heading[0], "heading_tolerance": tolerance}
+        speeds = numbers_of(fields, "goal_speed", 2, [0.0, 0.0])
+    else:
+        _refuse(fields, "goal_tolerance", "a place has goal_radius; a pose is a goal of 3 numbers")
+        given = fields.get("goal_radius")
+        radius = GOAL_RADIUS if given is None else number_of(given, "goal_radius")
+        pose = {}
+        speeds = numbers_of(fields, "goal_speed", 2, [-math.inf, math.inf])
+    hitches, tolerances = (tuple(_any_numbers(fields, name)) for name in ENDS[2:])
+    arrival = Arrival(
+        **pose, least_speed=speeds[0], most_speed=speeds[1], hitches=hitches, hitch_tolerances=tolerances
+    )
+    return Goal((x, y), radius, None if arrival == Arrival() else arrival)
+
+
+def question_fields(problem: Problem, vehicle: Vehicle) -> dict[str, Any]:
+    """The fields of a ``problem`` for a ``vehicle`` that ``start_motion_of`` and ``goal_of`` read."""
+    scale, arrival = problem.scale, problem.arrival or Arrival()
+    named = dict(zip(state_names(vehicle)[3:], problem.start_motion, strict=False))
+    if "speed" in named:
+        named["speed"] *= scale
+    start: dict[str, Any] = {field: named[name] for field, name in STARTS.items() if name in named}
+    hitches = [value for name, value in named.items() if name.startswith("hitch")]
+    if hitches:
+        start["start_hitch"] = hitches + [0.0] * (len(state_names(vehicle)) - 5 - len(hitches))
+    place = [scale * coordinate for coordinate in problem.goal]
+    speeds = [
+        min(max(scale * speed, -ANY_SPEED), ANY_SPEED) for speed in (arrival.least_speed, arrival.most_speed)
+    ]
+    if arrival.heading is None:
+        goal = {"goal": place, "goal_radius": scale * problem.goal_radius}
+        usual = [-ANY_SPEED, ANY_SPEED]
+    else:
+        tolerance = [scale * problem.goal_radius, arrival.heading_tolerance]
+        goal = {"goal": [*place, arrival.heading], "goal_tolerance": tolerance}
+        usual = [0.0, 0.0]
+    if speeds != usual:
+        goal["goal_speed"] = speeds
+    if arrival.hitches:
+        goal |= {"goal_hitch": list(arrival.hitches), "goal_hitch_tolerance": list(arrival.hitch_tolerances)}
+    return start | goal
+
+
+def numbers_of(
+    fields: Mapping[str, Any], name: str, count: int, default: list[float] | None = None
+) -> list[float]:
+    """The ``count`` numbers that the field ``name`` lists, or the ``default`` if it is left out.
+
+    Raises ValueError if they are others.
+    """
+    values = fields.get(name)
+    if values is None and default is not None:
+        return default
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError(f"{name} must be a list of {count} numbers, got {short(values)}")
+    return [number_of(value, name) for value in values]
+
+
+def _any_numbers(fields: Mapping[str, Any], name: str) -> list[float]:
+    values = fields.get(name)
+    return numbers_of(fields, name, len(values) if isinstance(values, list) else 1, [])
+
+
+def _refuse(fields: Mapping[str, Any], name: str, why: str) -> None:
+    if fields.get(name) is not None:
+        raise ValueError(f"has {name}, but {why}; leave it out")
