@@ -8,10 +8,6 @@ from typing import Literal
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.exchange import problems as problem_files
-from storage.worlds.importing import ImportSettings, import_part
-from storage.worlds.sources import source_at
-from tasks.requests.assistant import AssistantSettings
-from tasks.requests.solve_many import solve_many as solve_file
 
 
 def read_problems(path: str | Path, *, vehicle: str = "car") -> list[Problem]:
@@ -51,6 +47,9 @@ def read_worlds(
     Raises:
         StorageError: Nothing can be read.
     """
+    from storage.worlds.importing import ImportSettings, import_part  # late: a robot need not have SciPy
+    from storage.worlds.sources import source_at
+
     settings = ImportSettings(
         vehicle=vehicle_named(vehicle), count=count, seed=seed, scale=scale, resolution=resolution
     )
@@ -88,6 +87,9 @@ def solve_many(
         UsageError: A name is unknown, or a file would be written over another one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
+    from tasks.requests.assistant import AssistantSettings  # late: a robot need not have pyarrow
+    from tasks.requests.solve_many import solve_many as solve_file
+
     settings = AssistantSettings(
         planner=planner,
         assist=assist or ("none" if memory is None else "repair"),

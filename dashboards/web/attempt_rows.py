@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from planners.world.arrays import Flags, Floats
-from storage.tables.columns import Array
+from planners.world.arrays import Array, Flags, Floats
 from storage.tables.configurations import BASELINE, Configuration, configured
 
 COLUMNS: Final = (

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+from planners.world.arrays import Array
 from planners.world.geometry.occupancy import GRID
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.arrays import write_array
@@ -23,7 +24,6 @@ from storage.fields import parse_json
 from storage.places.files import local_text, whole_folder
 from storage.places.mirror import fetch_folder
 from storage.recorded_vehicle import fields_of, refuse_another
-from storage.tables.columns import Array
 
 VERSION: Final = 2  # one more whenever an older program could no longer read an archive
 LARGEST_HEADER_BYTES: Final = 1 << 24

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from storage.tables.columns import Array
+from planners.world.arrays import Array
 
 HEADER_BYTES: Final = 128  # the first ten: NumPy, version 1.0, the number of bytes of text that follow
 _BEGINNING: Final = b"\x93NUMPY\x01\x00" + (HEADER_BYTES - 10).to_bytes(2, "little")

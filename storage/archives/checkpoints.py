@@ -10,10 +10,10 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from planners.memory.encoder.training import Checkpoint
+from planners.world.arrays import Array
 from storage.archives.tensors import check_floats, packed_epochs, unpacked_epochs
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
-from storage.tables.columns import Array
 
 _KEY: Final = "key"
 

@@ -10,7 +10,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from planners.memory.encoder.training import Epoch
-from storage.tables.columns import Array
+from planners.world.arrays import Array
 
 Shapes = Mapping[str, tuple[int, ...]]
 

@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final
-
-import pyarrow as pa
-import pyarrow.parquet as pq
+from typing import TYPE_CHECKING, Any, Final
 
 from storage.errors import StorageError, sentence
 from storage.exchange.question_fields import QUESTION_FIELDS
 from storage.fields import check_fields, parse_json
 from storage.places.files import read_text
+
+if TYPE_CHECKING:
+    import pyarrow.parquet as pq
 
 FORMATS: Final = (".json", ".jsonl", ".parquet")
 FIELDS: Final = (
@@ -174,6 +174,9 @@ def _rows(
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+    import pyarrow as pa  # late: a robot has no pyarrow
+    import pyarrow.parquet as pq
+
     try:
         with pq.ParquetFile(path, buffer_size=BUFFER_BYTES) as file:
             check_problem_fields(file.schema_arrow.names)

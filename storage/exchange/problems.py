@@ -25,8 +25,6 @@ from storage.exchange.problem_files import (
 from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
 from storage.fields import number_of, scale_of, short, text_of
 from storage.places.files import whole_file, write_json
-from storage.tables.schemas import PROBLEMS
-from storage.tables.shards import table_of, write_table
 
 UNKNOWN_CLASS: Final = "unknown"
 _REQUIRED: Final = ("start", "goal", "bounds", "obstacles")
@@ -101,6 +99,9 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
             with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
                 file.writelines(json.dumps(row, allow_nan=False, ensure_ascii=False) + "\n" for row in rows)
         case _:
+            from storage.tables.schemas import PROBLEMS  # late: a robot has no pyarrow
+            from storage.tables.shards import table_of, write_table
+
             write_table(path, table_of(rows, PROBLEMS, "problem"))
 
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from planners.world.arrays import Array
 from planners.world.problem import Obstacles, Problem
 from storage.fields import scale_of, short, text_of
 
-Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 Bits = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 

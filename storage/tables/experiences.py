@@ -11,12 +11,13 @@ import numpy as np
 import pyarrow as pa
 
 from planners.memory.plans.experience import Experience
+from planners.world.arrays import Array
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from storage.errors import StorageError
 from storage.fields import parse_json, short
 from storage.recorded_vehicle import fields_of, refuse_another
-from storage.tables.columns import Array, list_column, lists_of, problem_columns, problems_of
+from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import metadata_of, read_table, sound, write_table
 

@@ -6,10 +6,6 @@ from typing import Final
 
 import pyarrow as pa
 
-# The version before, which is still read: ranking by the encoder was called ``centroid`` there.
-EARLIER: Final = {"attempts/2": "attempts/1", "recalls/2": "recalls/1"}
-RENAMED: Final = {"recall": {"centroid": "encoder"}}  # column: old value, new value
-
 GRID_BYTES: Final = 512  # 64 x 64 cells, one bit each
 
 _PROBLEM: Final = [

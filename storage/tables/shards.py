@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from storage.errors import StorageError
 from storage.places.files import whole_file
 from storage.places.mirror import fetch, note_of
-from storage.tables.schemas import EARLIER, RENAMED
+from storage.tables.earlier_versions import EARLIER, RENAMED
 
 ROW_GROUP_ROWS: Final = 4096  # 2,000 to 8,000 measured best for 64 x 64 grids
 SCHEMA_KEY: Final = b"schema"

@@ -1,4 +1,4 @@
-"""Attempts as rows, and the independent check of their plans."""
+"""Attempts as rows."""
 
 from __future__ import annotations
 
@@ -6,65 +6,23 @@ import functools
 import math
 import platform
 import subprocess
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
 from planners.solve import Attempt
-from planners.world.authority.authority import faults
-from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.tables.schemas import ATTEMPTS
-from tasks.settings.errors import RunError
 
 _FIELDS: Final = [field.name for field in fields(Attempt) if field.name in ATTEMPTS.names]
 _UNKNOWN_WHEN_UNSOLVED: Final = ("source", "length_m", "duration_s")
-
-
-class PlanFaultError(RunError):
-    """A plan of a solved problem is faulty: a bug, never data."""
-
-
-def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
-    """Have the authority judge the plan of an attempt, which has to be right.
-
-    Args:
-        problem: what was attempted.
-        attempt: the attempt.
-        accepted: plans for this problem that the authority has accepted; this one is added.
-        vehicle: who drives.
-
-    Returns:
-        the attempt with the authority's answer in ``verified``.
-
-    Raises:
-        PlanFaultError: the plan does not solve the problem.
-
-    """
-    judged = judged_attempt(problem, attempt, accepted, vehicle)
-    if judged.verified is False and attempt.plan is not None:
-        planner = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
-        fault = faults(problem, attempt.plan, vehicle)[0]
-        raise PlanFaultError(f"{problem.id} solved by {planner}: {fault}")
-    return judged
-
-
-def judged_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
-    """Like ``check_attempt``, but a plan that the authority refuses raises nothing."""
-    if attempt.plan is None:
-        return attempt
-    plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
-    right = plan in accepted or not faults(problem, attempt.plan, vehicle)
-    if right:
-        accepted.add(plan)
-    return replace(attempt, verified=right)
 
 
 def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
     """The row of an attempt (``storage.tables.schemas.ATTEMPTS``), with what the authority said of its plan.
 
     Args:
-        attempt: the attempt, as ``check_attempt`` returned it.
+        attempt: the attempt, as ``judged_attempts.check_attempt`` returned it.
         memory: name of the memory that it used, if any.
         run_id: the run that made the memory, if any.
         vehicle: who drives.

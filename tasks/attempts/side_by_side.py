@@ -15,8 +15,9 @@ from planners.solve import Attempt, solve
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.workspace import Workspace
-from tasks.attempts.attempt_rows import attempt_row, check_attempt
+from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.compile_assists import compile_assists
+from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import Source

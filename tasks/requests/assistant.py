@@ -23,7 +23,7 @@ from storage.exchange.plans import PlanRecord, write_plan
 from storage.exchange.problems import read_problems
 from storage.places.files import whole_file
 from storage.places.mirror import folders_here
-from tasks.attempts.attempt_rows import check_attempt
+from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from

@@ -23,7 +23,7 @@ from storage.exchange.plans import PlanRecord, write_plan
 from storage.places.files import whole_file
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
-from tasks.attempts.attempt_rows import PlanFaultError, check_attempt
+from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.settings.checks import check_known, check_outputs, check_picture

@@ -32,11 +32,11 @@ from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
-from tasks.attempts.attempt_rows import check_attempt
 from tasks.attempts.compile_assists import compile_assists
+from tasks.attempts.judged_attempts import check_attempt
 from tasks.registry.memory_at import memory_at
 from tasks.settings.checks import check_known
-from tasks.settings.errors import UsageError
+from tasks.settings.errors import RunError, UsageError
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ def load_planner(
     StorageError
         The memory is missing, damaged, or made for another vehicle.
     RunError
-        MLflow does not have the memory, or the run has several.
+        MLflow does not have the memory, the run has several, or its encoder needs a library that is missing.
 
     """
     check_known("vehicle", [vehicle], VEHICLES)
@@ -220,6 +220,13 @@ def load_planner(
         archive = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
     strategy = recall or default_recall(archive)
     compile_assists(archive.vehicle, planner, [strategy])
+    try:
+        archive.forward  # noqa: B018  made when it is first used
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
+            "pip install 'motion-memory[pipeline]'."
+        ) from None
     ready = RobotPlanner(archive, planner, assist, top_k, strategy, seed, judged)
     scale = archive.scales[0]
     away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])

@@ -37,7 +37,8 @@ from storage.tables.experiences import read_experiences
 from storage.tables.gained_experiences import gained_shards
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
-from tasks.attempts.attempt_rows import PlanFaultError, check_attempt, same_outcome
+from tasks.attempts.attempt_rows import same_outcome
+from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.settings.errors import RunError

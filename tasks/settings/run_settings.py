@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
-from storage.tables.schemas import RENAMED
+from storage.tables.earlier_versions import RENAMED
 from tasks.settings.encoder_training import Learning
 from tasks.settings.retraining_settings import Retraining
 

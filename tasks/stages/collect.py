@@ -15,7 +15,7 @@ from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.tables.experiences import copy_experiences, write_experiences
 from storage.tables.shards import shard_is_done
-from tasks.attempts.attempt_rows import check_attempt
+from tasks.attempts.judged_attempts import check_attempt
 from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of

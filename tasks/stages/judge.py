@@ -16,7 +16,7 @@ from planners.world.authority.authority import faults
 from storage.archives.memories import load_memory
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.experiences import read_experiences
-from tasks.attempts.attempt_rows import PlanFaultError
+from tasks.attempts.judged_attempts import PlanFaultError
 from tasks.attempts.side_by_side import Contestant, MemoryOfRun, side_by_side
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage

@@ -72,12 +72,14 @@ ARCHITECTURE = Architecture(channels=(2, 3), hidden=(8,), dimensions=4)
 WEIGHTS = initial_weights(ARCHITECTURE, np.random.default_rng(0))
 
 
-def a_memory(plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR) -> Memory:
-    """Some memory; its readout means nothing."""
+def a_memory(
+    plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR, architecture: Architecture = ARCHITECTURE
+) -> Memory:
+    """Some memory; its encoder and its readout mean nothing."""
     rng = np.random.default_rng(seed)
     stored = tuple(plan(5 + i, seed + i, vehicle) for i in range(plans))
     sweeps = sweep_plans(stored, vehicle)
-    rows = (plans + 1, ARCHITECTURE.dimensions)
+    rows = (plans + 1, architecture.dimensions)
     return Memory(
         class_name="trap",
         vehicle=vehicle,
@@ -88,7 +90,7 @@ def a_memory(plans: int = 3, seed: int = 0, vehicle: Vehicle = CAR) -> Memory:
         vectors=rng.normal(size=rows).astype(np.float32),
         biases=np.array([-np.inf, *rng.normal(size=plans)], np.float32),
         objective="labels",
-        weights=WEIGHTS,
+        weights=initial_weights(architecture, np.random.default_rng(0)),
         metadata={"run": "one", "problems": 120, "über": [1.5, None]},
     )
 

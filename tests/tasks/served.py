@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from planners.memory.encoder.encoder import Architecture
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
 from planners.solve import solve
@@ -16,7 +17,7 @@ from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from storage.archives.memories import save_memory
 from storage.exchange.problems import fields_of
-from tests.storage.samples import a_memory
+from tests.storage.samples import ARCHITECTURE, a_memory
 
 SEED: Final = 901
 EASY: Final = problem_class("random", "easy")
@@ -30,12 +31,13 @@ def problem(index: int) -> Problem:
     return EASY.draw(SEED, index)
 
 
-def write_memory(folder: Path, plans: int = 12) -> Path:
+def write_memory(folder: Path, plans: int = 12, architecture: Architecture = ARCHITECTURE) -> Path:
     """Write a memory of some driveable plans; its encoder has learned nothing."""
     found = [solve(problem(i), "follow").plan for i in range(plans)]
     driven = tuple(plan for plan in found if plan is not None)
     sweeps = sweep_plans(driven)
-    save_memory(folder, replace(a_memory(len(driven)), plans=driven, sweeps=sweeps, masks=masks_of(sweeps)))
+    memory = a_memory(len(driven), architecture=architecture)
+    save_memory(folder, replace(memory, plans=driven, sweeps=sweeps, masks=masks_of(sweeps)))
     return folder
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from planners.world.authority.authority import faults
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
-from tasks.attempts.attempt_rows import PlanFaultError
+from tasks.attempts.judged_attempts import PlanFaultError
 from tasks.attempts.side_by_side import in_turn
 from tasks.fan_out.keys import key_of
 from tests.speed.time_to_quality.methods import Found, Method

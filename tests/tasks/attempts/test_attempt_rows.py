@@ -10,13 +10,8 @@ from planners.solve import Attempt, solve
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
-from tasks.attempts.attempt_rows import (
-    PlanFaultError,
-    attempt_row,
-    check_attempt,
-    judged_attempt,
-    same_outcome,
-)
+from tasks.attempts.attempt_rows import attempt_row, same_outcome
+from tasks.attempts.judged_attempts import PlanFaultError, check_attempt, judged_attempt
 
 PROBLEM = problem_class("curves", "easy").draw(5, 0)
 

@@ -1,0 +1,17 @@
+"""Where the console script begins: it says what to install where only what a robot needs is there."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        from flows.cli.main import main as run
+    except ModuleNotFoundError as error:
+        sys.exit(
+            f"motion-memory: {error.name} is not installed; the command line needs "
+            "pip install 'motion-memory[pipeline]'."
+        )
+    run()

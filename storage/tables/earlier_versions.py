@@ -1,0 +1,6 @@
+"""What earlier versions of the tables called things, so that they are still read."""
+
+from typing import Final
+
+EARLIER: Final = {"attempts/2": "attempts/1", "recalls/2": "recalls/1"}  # schema: the one before
+RENAMED: Final = {"recall": {"centroid": "encoder"}}  # column: old value, new value, since the second

@@ -1,0 +1,50 @@
+"""The independent check of attempts' plans."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from planners.solve import Attempt
+from planners.world.authority.authority import faults
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
+from tasks.settings.errors import RunError
+
+
+class PlanFaultError(RunError):
+    """A plan of a solved problem is faulty: a bug, never data."""
+
+
+def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
+    """Have the authority judge the plan of an attempt, which has to be right.
+
+    Args:
+        problem: what was attempted.
+        attempt: the attempt.
+        accepted: plans for this problem that the authority has accepted; this one is added.
+        vehicle: who drives.
+
+    Returns:
+        the attempt with the authority's answer in ``verified``.
+
+    Raises:
+        PlanFaultError: the plan does not solve the problem.
+
+    """
+    judged = judged_attempt(problem, attempt, accepted, vehicle)
+    if judged.verified is False and attempt.plan is not None:
+        planner = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
+        fault = faults(problem, attempt.plan, vehicle)[0]
+        raise PlanFaultError(f"{problem.id} solved by {planner}: {fault}")
+    return judged
+
+
+def judged_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
+    """Like ``check_attempt``, but a plan that the authority refuses raises nothing."""
+    if attempt.plan is None:
+        return attempt
+    plan = attempt.plan.states.tobytes() + attempt.plan.controls.tobytes()
+    right = plan in accepted or not faults(problem, attempt.plan, vehicle)
+    if right:
+        accepted.add(plan)
+    return replace(attempt, verified=right)
