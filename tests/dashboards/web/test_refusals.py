@@ -143,14 +143,14 @@ WORLD = {
         {"world": WORLD | {"obstacles": {"a": 1}}},
         {"world": WORLD | {"start": ["a", 0, 0]}},
         {"world": WORLD | {"bounds": [0, 0, 1e308, 1e308]}},
-        {"world": WORLD | {"goal": [1, 1]}},
+        {"world": WORLD | {"goal": [999, 1]}},
         {"world": WORLD | {"obstacles": [[[0, 0], [1, 1], [0, 1], [1, 0]]]}},
         {"world": WORLD, "planner": "nobody"},
         {"world": WORLD, "memory": "../trap"},
         {"world": WORLD, "assist": "x"},
         {"world": WORLD, "assist": 7},
         {"world": WORLD, "planer": "gust"},
-        {"world": WORLD | {"start_speed": 1.0}},
+        {"world": WORLD | {"start_sped": 1.0}},
     ],
 )
 def test_a_world_that_makes_no_sense_is_told_why(client: httpx.Client, content: object) -> None:

@@ -190,7 +190,7 @@ def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
         ("{", "Problem 1: it is not valid JSON"),
         ("[]", "Problem 1: is list, expected an object"),
         ("{}", "Problem 1: field start is missing"),
-        (json.dumps(fields_of(worlds.problem_of([])) | {"goal": [9.0, 9.0]}), "cut a longer route"),
+        (json.dumps(fields_of(worlds.problem_of([])) | {"start_speed": 9.0}), "start speed is 9"),
     ],
 )
 def test_a_bad_problem_gets_one_clear_line(at_home: dict[str, str], text: str, reason: str) -> None:
