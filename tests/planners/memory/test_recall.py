@@ -14,7 +14,7 @@ from planners.memory.encoder.encoder import Architecture, Encoder, initial_weigh
 from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
 from planners.memory.plans.cell_masks import rank_by_cells
 from planners.memory.plans.free import ends_of, first_fitting, free_plans
-from planners.memory.ranking.readout import centroids_of, label_readout, nearest_readout
+from planners.memory.ranking.readout import centroids_of, nearest_readout
 from planners.memory.ranking.scores import best_plans
 from planners.memory.recall import (
     LIKELY_CELLS,
@@ -257,23 +257,6 @@ def test_nothing_is_recalled_where_row_0_scores_best(memory, problem_in):
     assert recalled_by(hopeless, problem, "exhaustive", 5).plans != ()
 
 
-@given(
-    seed=SEEDS,
-    k=st.integers(1, 30) | st.integers(1000, 2000),
-    count=st.integers(1, 30) | st.integers(1000, 2000),
-)
-def test_the_best_are_those_of_a_stable_sort(seed, k, count):
-    rng = generator(seed, "best")
-    vectors = rng.integers(-2, 3, (count + 1, 4)).astype(np.float32)
-    biases = rng.integers(-2, 3, count + 1).astype(np.float32)
-    embedding = rng.integers(-2, 3, 4).astype(np.float32)
-    scores = vectors @ embedding + biases
-    expected = np.argsort(-scores[1:], kind="stable")[:k].tolist()
-    assert best_plans(scores, k, never_none=True).tolist() == expected
-    nothing = scores[0] > scores[1:].max()
-    assert best_plans(scores, k).tolist() == ([] if nothing else expected)
-
-
 def test_the_default_is_exhaustive_until_there_are_too_many_plans(memory):
     assert default_recall(memory) == "exhaustive"
     many = dataclasses.replace(
@@ -311,13 +294,3 @@ def test_a_wrong_question_is_refused(memory, experiences, strategy, k):
 def test_blindly_needs_a_generator(memory, experiences):
     with pytest.raises(ValueError, match="pass an rng"):
         recall(memory, View(experiences[0].problem), "random", 1)
-
-
-@given(seed=SEEDS)
-def test_the_label_readout_is_what_was_learned_but_for_the_odds_of_no_plan(seed):
-    rng = generator(seed)
-    vectors, biases = rng.standard_normal((PLANS + 1, 6)), rng.standard_normal(PLANS + 1)
-    ready = label_readout(vectors.astype(np.float32), biases.astype(np.float32))
-    assert (ready[0] == vectors.astype(np.float32)).all()
-    assert (ready[1][1:] == biases.astype(np.float32)[1:]).all()
-    assert ready[1][0] == pytest.approx(biases[0] - np.log(20.0), abs=1e-5)

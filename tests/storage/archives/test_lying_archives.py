@@ -1,11 +1,10 @@
-"""Archives whose checksums are right and whose contents are not: refused in one line when they are loaded."""
+"""Memories whose checksums are right and whose contents are not: refused in one line when they are loaded."""
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,81 +12,20 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from safetensors.numpy import load_file, save_file
 
-from planners.memory.encoder.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
-from planners.memory.hallucination.learned_obstacles import weight_shapes
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.vehicles.vehicle import CAR_2_TRAILERS, DIFFERENTIAL_DRIVE
-from storage.archives.arrays import write_array
-from storage.archives.checkpoints import load_checkpoint, save_checkpoint
-from storage.archives.encoders import load_encoder, save_encoder
-from storage.archives.hallucinators import load_hallucinator, save_hallucinator
 from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
+from tests.storage.archives.lies import LOADERS, change_array, change_tensors, refusal
 from tests.storage.archives.signing import sign
-from tests.storage.samples import ARCHITECTURE, WEIGHTS, a_memory
+from tests.storage.samples import WEIGHTS, a_memory
 
 many = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
     max_examples=60,
 )
-ROWS = (4, ARCHITECTURE.dimensions)
-TRAINED = TrainedEncoder(
-    settings=TrainingSettings(architecture=ARCHITECTURE),
-    weights=WEIGHTS,
-    centroids=np.zeros(ROWS, np.float32),
-    vectors=np.ones(ROWS, np.float32),
-    biases=np.array([-np.inf, 0.0, 1.0, 2.0], np.float32),
-    popularity=np.array([0.1, 0.2, 0.3], np.float32),
-    history=(Epoch(1, float("nan"), 0.25, 0.5, 0.75, 1.5),),
-    held_out=np.array([1, 5, 9], np.int32),
-)
-LEARNED = {name: np.zeros(shape, np.float32) for name, shape in weight_shapes().items()}
-LOADERS: dict[str, Callable[[Path], object]] = {
-    "memory": load_memory,
-    "encoder": load_encoder,
-    "hallucinator": load_hallucinator,
-}
-
-
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("whole")
-    save_memory(folder / "memory", a_memory(3))
-    save_encoder(folder / "encoder", TRAINED)
-    save_hallucinator(folder / "hallucinator", LEARNED)
-    return folder
-
-
-@pytest.fixture
-def archives(whole: Path, tmp_path: Path) -> Path:
-    shutil.copytree(whole, tmp_path / "copy")
-    return tmp_path / "copy"
-
-
-def refusal(folder: Path) -> str:
-    with pytest.raises(StorageError) as error:
-        LOADERS[folder.name](folder)
-    text = str(error.value)
-    assert str(folder) in text
-    assert "\n" not in text
-    return text
-
-
-def change_array(folder: Path, name: str, change: Callable[[np.ndarray], object]) -> None:
-    array = np.load(folder / name).copy()
-    change(array)
-    with (folder / name).open("wb") as file:
-        write_array(file, array)
-    sign(folder)
-
-
-def change_tensors(folder: Path, name: str, tensors: Mapping[str, np.ndarray | None]) -> None:
-    changed = {**load_file(folder / name), **tensors}
-    save_file({key: tensor for key, tensor in changed.items() if tensor is not None}, folder / name)
-    sign(folder, folder.name)
 
 
 def moved(array: np.ndarray) -> None:
@@ -212,100 +150,6 @@ def test_plans_of_senseless_numbers_are_refused(archives: Path, name: str, value
 def test_a_header_that_claims_what_cannot_be_is_refused(archives: Path, change: dict[str, Any]) -> None:
     sign(archives / "memory", **change)
     refusal(archives / "memory")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {},
-        {"epochs": "x"},
-        {"epochs": 1e9},
-        {"threads": True},
-        {"learning_rate": "0.1"},
-        {"objective": "x"},
-        {"objective": ["labels"]},
-        {"semi_hard": 1},
-        {"held_out_share": None},
-        {"seed": 0.5},
-        {"unknown": 1},
-        {"architecture": {}},
-        {"architecture": {"channels": 2, "hidden": [8], "dimensions": 4}},
-        {"architecture": {"channels": [2, 3], "hidden": [8], "dimensions": 5}},
-        {"architecture": {"channels": [2, 3], "hidden": [8], "dimensions": "4"}},
-    ],
-)
-def test_settings_that_no_training_had_are_refused(archives: Path, change: dict[str, Any]) -> None:
-    claimed = json.loads(json.dumps(asdict(TRAINED.settings))) | change
-    sign(archives / "encoder", "encoder", settings=claimed if change else [])
-    refusal(archives / "encoder")
-
-
-@pytest.mark.parametrize(
-    "tensors",
-    [
-        {"centroids": np.zeros((3, 4), np.float32)},
-        {"centroids": np.zeros((4, 4), np.float64)},
-        {"vectors": np.full((4, 4), np.nan, np.float32)},
-        {"biases": np.zeros(5, np.float32)},
-        {"popularity": np.zeros(4, np.float32)},
-        {"held_out": np.array([-1], np.int32)},
-        {"held_out": np.array([0.5], np.float32)},
-        {"held_out": np.zeros((2, 2), np.int32)},
-        {"history": np.zeros((0, 6))},
-        {"history": np.zeros((1, 5))},
-        {"history": np.full((1, 6), np.nan)},
-        {"history": None},
-        {"extra": np.zeros(3, np.float32)},
-        {"weights.linear.0.bias": np.zeros(3, np.float32)},
-        {"weights.linear.0.bias": np.full(8, np.nan, np.float32)},
-    ],
-)
-def test_an_encoder_whose_arrays_do_not_fit_is_refused(
-    archives: Path, tensors: dict[str, np.ndarray | None]
-) -> None:
-    change_tensors(archives / "encoder", "tensors.safetensors", tensors)
-    refusal(archives / "encoder")
-
-
-@pytest.mark.parametrize(
-    "tensors",
-    [
-        {"linear.bias": np.full(LEARNED["linear.bias"].shape, np.nan, np.float32)},
-        {"linear.bias": LEARNED["linear.bias"].astype(np.float64)},
-        {"linear.bias": None},
-        {"more": np.zeros(3, np.float32)},
-    ],
-)
-def test_a_hallucinator_whose_arrays_do_not_fit_is_refused(
-    archives: Path, tensors: dict[str, np.ndarray | None]
-) -> None:
-    change_tensors(archives / "hallucinator", "weights.safetensors", tensors)
-    refusal(archives / "hallucinator")
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"values": np.zeros(4, np.float32)},
-        {"mean": np.zeros(5, np.float64)},
-        {"best": np.full(5, np.nan, np.float32)},
-        {"square": None},
-        {"history": np.zeros((0, 6))},
-        {"history": np.zeros((1, 5))},
-        {"history": np.zeros(6)},
-        {name: np.zeros((), np.float32) for name in ("values", "mean", "square", "best")},
-        {"history": np.full((1, 6), np.nan)},
-        {},
-    ],
-)
-def test_a_checkpoint_that_lies_is_none(tmp_path: Path, change: dict[str, np.ndarray | None]) -> None:
-    path = tmp_path / "0.checkpoint.safetensors"
-    states = [np.zeros(5, np.float32)] * 4
-    save_checkpoint(path, Checkpoint(TRAINED.history, *states), "key")
-    assert load_checkpoint(path, "key") is not None
-    kept = {name: tensor for name, tensor in (load_file(path) | change).items() if tensor is not None}
-    save_file(kept, path, {"key": "key"} if change else None)
-    assert load_checkpoint(path, "key") is None
 
 
 VALUES = st.recursive(
