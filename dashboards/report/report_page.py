@@ -1,4 +1,4 @@
-"""The report as one HTML page that needs no other file: claims, tables, figures, and how it was made."""
+"""The report as one HTML page that needs no other file: findings, tables, figures, claims, its making."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dashboards.cells import NAMES
 from dashboards.palette import style_sheet
+from dashboards.report.findings import findings
 from dashboards.report.tables import (
     FULL_HEADINGS,
     RETRIEVAL_HEADINGS,
@@ -94,6 +95,7 @@ def page(
         introduction=introduction,
         words=NAMES,
         keys=("configuration", "class"),  # which stay in sight when a table is scrolled
+        findings=findings(summary),
         claims=judged,
         kinds=_KINDS,
         verdicts=[_counted(each) for each in (claims, others) if each],

@@ -15,6 +15,7 @@ from dashboards.figures.bars import ablation, controls, planning_times, time_spl
 from dashboards.figures.planning_curves import continual_improvement, performance_profile, solved_against_time
 from dashboards.figures.recall_curves import retrieval_curves
 from dashboards.figures.style import save
+from dashboards.report.findings import findings_markdown
 from dashboards.report.tables import (
     as_csv,
     claims_markdown,
@@ -83,7 +84,12 @@ def report_run(data: str, settings: RunSettings) -> Report:
     report = Report(summary, report_retrieval(data, settings), judged, claims_by_other(data, settings))
     _write(run.summary("csv"), as_csv(summary))
     judgement = claims_markdown(report.claims, report.others)
-    texts = [summary_markdown(summary), retrieval_markdown(report.retrieval), judgement]
+    texts = [
+        findings_markdown(summary),
+        summary_markdown(summary),
+        retrieval_markdown(report.retrieval),
+        judgement,
+    ]
     _write(run.summary("md"), "\n".join(texts))
     figures = {
         "planning-times": planning_times(summary),

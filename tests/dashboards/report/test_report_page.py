@@ -72,7 +72,7 @@ def test_the_page_fetches_nothing_and_runs_nothing(html: str) -> None:
     kinds = {source.partition(",")[0] for source in reader.fetched}
     assert kinds == {"data:image/png;base64", "data:image/svg+xml;base64"}
     assert not re.search(r"url\(|@import|https?:", re.sub(r'src="data:[^"]*"', "", html))
-    assert reader.links == {"#claims", "#times", "#retrieval", "#endings", "#figures", "#made"}
+    assert reader.links == {"#found", "#claims", "#times", "#retrieval", "#endings", "#figures", "#made"}
     assert {link.removeprefix("#") for link in reader.links} <= reader.anchors
 
 
