@@ -34,11 +34,11 @@ def test_intervals_hold_their_own_figure(seed: int, problems: int, speed_up: flo
 
 
 def test_figures_are_those_of_a_plain_loop(attempt_rows: pd.DataFrame) -> None:
-    summary = summarise(attempt_rows, resamples=10)
+    summary, attempted = summarise(attempt_rows, resamples=10), attempt_rows.to_dict("records")
     for _, row in summary.iterrows():
         chosen = [
             attempt
-            for attempt in attempt_rows.to_dict("records")
+            for attempt in attempted
             if (attempt["problem_class"], attempt["planner"]) == (row["panel"], row["planner"])
         ]
         mine = [a for a in chosen if meant(a) == meant(row)]
