@@ -65,7 +65,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
     sample
         The share of the attempted problems whose attempts are made again, 0 to 1.
     workers
-        The number of worker processes.
+        The number of worker processes; one worker checks in this process.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
     faults_found: list[str] = []
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(checks)), mp_context=context) as pool:
-        for counts, new_faults in pool.map(_run, checks):
+        for counts, new_faults in (pool.map if workers > 1 else map)(_run, checks):
             checked += counts
             faults_found += new_faults
     for what, count in checked.items():

@@ -1,11 +1,9 @@
-"""One small run, made once for all processes of the tests and watched while it is made."""
+"""One small run, made once for all processes of the tests: by its command, watched, and stage by stage."""
 
 from __future__ import annotations
 
 import fcntl
 import json
-import subprocess
-import sys
 from typing import NamedTuple
 
 import pytest
@@ -13,13 +11,13 @@ import pytest
 from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder
 from tests.flows import small_run
-from tests.flows.planted import PLANTED, UNPLANTED
-from tests.flows.watched import ROOT, Port, Watched, watch
+from tests.flows.planted import PLANTED
+from tests.flows.watched import Port, Watched, watch
 from tests.prepared.prefect_database import with_prefect_database
 
 
 class SmallRuns(NamedTuple):
-    """A run by its command with two workers, and by its stages with one; what was seen of the command."""
+    """A run by its command with two workers, and by its stages in one process; what the command showed."""
 
     two: RunFolder
     one: RunFolder
@@ -39,12 +37,7 @@ def small_runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Smal
             command = ["run", *small_run.OPTIONS, "--data", str(first), "--workers", "2"]
             watched = watch(command, shared / "small-run.log", PLANTED)
             assert watched.code == 0, watched.output[-2000:]
-            (first / "first").touch()
-            script = [sys.executable, "-m", "tests.flows.small_run", str(first), str(second)]
-            again = subprocess.run(
-                script, cwd=ROOT, env=UNPLANTED, capture_output=True, text=True, timeout=500
-            )
-            assert again.returncode == 0, again.stderr[-2000:]
+            small_run.in_one_process(first, second)
             seen.write_text(json.dumps([watched.output, sorted(watched.ports)]))
     output, ports = json.loads(seen.read_text())
     (two,), (one,) = DataFolder(first).runs(), DataFolder(second).runs()

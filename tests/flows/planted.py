@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Final
 
 SECRET: Final = "s3cret-of-the-fleet"
@@ -12,4 +11,3 @@ PLANTED: Final = {
     "SOME_API_KEY": f"key-{SECRET}",
     "OF_AN_ADDRESS": f"postgresql://robot:{SECRET}@10.0.0.5/db",
 }
-UNPLANTED: Final = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}

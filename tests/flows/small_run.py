@@ -1,44 +1,40 @@
-"""A run of two classes, small enough for a test: its command with two workers, then its stages with one.
-
-The stages run again in the command's data folder, where nothing is left to do, and in a folder of their own.
-"""
+"""A run of two classes, small enough for a test: its command's options, and its stages in one process."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+from unittest.mock import patch
 
 from storage.places.data_folder import DataFolder, open_data_folder
-from tasks.servers.prefect_server import local_server
+from tasks.fan_out.stage import Stage
 from tasks.settings.recorded_settings import recorded_settings
+from tasks.stages import build_memory
+from tasks.stages.benchmark import BENCHMARK
+from tasks.stages.build_memory import BUILD_MEMORY
+from tasks.stages.collect import COLLECT
+from tasks.stages.curate import CURATE
+from tasks.stages.hallucinate import HALLUCINATE
+from tasks.stages.keep_experiences import COMBINE, KEEP
+from tasks.stages.measure_recall import MEASURE_RECALL
+from tasks.stages.relabel import RELABEL
+from tasks.stages.train import TRAIN
+from tests.tasks.in_process import collect, run_stage
 
 OPTIONS: Final = [
     "--preset", "paper", "--classes", "random", "trap", "--seed", "3", "--experiences", "4",
     "--candidates", "20", "--problems-per-experience", "10", "--test-problems", "6", "--epochs", "2",
     "--training-seeds", "2", "--continual", "none",
 ]  # fmt: skip
+COLLECTING: Final[tuple[Stage[Any], ...]] = (COLLECT, CURATE, KEEP, COMBINE)
+LATER: Final[tuple[Stage[Any], ...]] = (HALLUCINATE, RELABEL, TRAIN, BUILD_MEMORY, MEASURE_RECALL, BENCHMARK)
 
 
-def main(first: Path, second: Path) -> None:
-    """Do the stages in two folders, as the command did in the first."""
+def in_one_process(first: Path, second: Path) -> None:
+    """Do the stages of the run in the first data folder once more, in the second, chunks in reverse order."""
     (run,) = DataFolder(first).runs()
-    settings = recorded_settings(run)
-    with local_server(first) as server:
-        from flows.benchmark import benchmark
-        from flows.build_memory import build_memory
-        from flows.collect import collect
-        from flows.hallucinate import hallucinate
-        from flows.train import train
-        from tasks.fan_out.fan_out import cluster
-
-        with cluster(1):
-            if server is not None:
-                server.wait()
-            for data in (first, second):
-                for stage in (collect, hallucinate, train, build_memory, benchmark):
-                    stage(settings, str(data))
-
-
-if __name__ == "__main__":
-    main(*(open_data_folder(place).path for place in sys.argv[1:3]))
+    settings, data = recorded_settings(run), str(open_data_folder(second).path)
+    with patch.object(build_memory, "_draw"):  # seconds of pictures
+        collect(data, settings, backwards=True)
+        for stage in LATER:
+            run_stage(stage, data, settings, backwards=True)
