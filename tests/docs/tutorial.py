@@ -19,12 +19,14 @@ from tests.worlds import SHARED
 ROOT: Final = Path(__file__).parents[2]
 TUTORIAL: Final = ROOT / "docs" / "tutorial.md"
 ANY_LINES: Final = "…"  # in what is shown of a command's lines
-SMALLER: Final = {  # in the tutorial's commands: the same in a minute
+SMALLER: Final = {  # in the tutorial's commands: the same in a minute, with one worker
     "--preset laptop": "--preset smoke",
     "runs/laptop-": "runs/smoke-",
     "--problems 1000": "--problems 100",
     "--problems 500": "--problems 50",
-    "--test-problems 300": "--test-problems 10",
+    "--test-problems 300": "--test-problems 10 --workers 1",
+    "solve jobs.parquet": "solve jobs.parquet --workers 1",
+    "verify data": "verify data --workers 1",
 }
 _STEP: Final = re.compile(r"^```sh\n(.*?)^```\n(?:\s*^```text\n(.*?)^```$)?", re.MULTILINE | re.DOTALL)
 _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(pictures/([^)]+)\)")

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import psutil
 
 ROOT = Path(__file__).parents[2]
-LOOK_SECONDS = 0.25  # looking takes processor time from what is looked at
+LOOK_SECONDS = 0.5  # for ports: looking takes processor time from what is looked at
+READ_SECONDS = 0.05
 
 
 class Port(NamedTuple):
@@ -41,11 +42,12 @@ def watch(
     environment: dict[str, str] | None = None,
     until: Callable[[str], bool] = lambda _: False,
     script: str = "from flows.cli.main import main; main()",
+    ending: signal.Signals = signal.SIGTERM,
 ) -> Watched:
-    """Run a command; SIGTERM once its output is what ``until`` waits for."""
+    """Run a command; send it a signal once its output is what ``until`` waits for."""
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
     watched = Watched()
-    asked = False
+    asked, looked = False, 0.0
     with log.open("wb") as sink:
         running = psutil.Popen(
             [sys.executable, "-c", script, *arguments],
@@ -56,11 +58,13 @@ def watch(
         )
         try:
             while running.poll() is None:
-                watched.ports |= _ports(running)
+                if time.monotonic() - looked > LOOK_SECONDS:
+                    watched.ports |= _ports(running)
+                    looked = time.monotonic()
                 if not asked and until(log.read_text(errors="replace")):
-                    running.send_signal(signal.SIGTERM)
+                    running.send_signal(ending)
                     asked = True
-                time.sleep(LOOK_SECONDS)
+                time.sleep(READ_SECONDS)
         finally:  # a test that is given up leaves nobody behind
             if running.poll() is None:
                 running.kill()

@@ -6,6 +6,7 @@ import ipaddress
 import json
 import re
 import shutil
+import signal
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -16,15 +17,20 @@ import pytest
 
 from storage.exchange.problems import fields_of
 from storage.places.data_folder import DataFolder
+from storage.tables.attempts import read_attempts
+from tasks.requests.assistant import AssistantSettings
+from tasks.requests.solve_many import solve_many
 from tests.flows import small_run
 from tests.flows.conftest import SmallRuns
 from tests.flows.planted import PLANTED, SECRET
+from tests.flows.same_rows import equal_but_for_seconds
 from tests.flows.watched import ROOT, Watched, watch
 from tests.prepared.prefect_database import with_prefect_database
 from tests.tasks.served import JSON, good_request, problem, write_memory
 from tests.tasks.servers.attacks import EVIL
 
 ELSEWHERE = f"http://robot:{SECRET}@127.0.0.1:9"  # where nobody answers
+COUNT = 10  # problems to solve
 IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}
 PARTS_OF_ONE = """
 from flows.cli.main import main
@@ -55,7 +61,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("closed")
     write_memory(place / "memory")
     (place / "one.json").write_text(json.dumps(fields_of(problem(0))))
-    lines = [json.dumps(fields_of(problem(i))) for i in range(4)]
+    lines = [json.dumps(fields_of(problem(i))) for i in range(COUNT)]
     (place / "many.jsonl").write_text("\n".join(lines))
     return place
 
@@ -94,37 +100,61 @@ def test_failing_stages_tell_no_secret(small_runs: SmallRuns, place: Path) -> No
     assert failed.code == 1
     assert "masks.npy is damaged" in failed.output
     assert SECRET not in failed.output
-    unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
+    unreached = PLANTED | IMPATIENT | {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "0"}
     failed = watch(["report", *options], place / "mlflow.log", unreached)
     assert failed.code == 1
     assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
+    assert "Traceback" not in failed.output
     assert SECRET not in failed.output
     assert_nowhere_in(data)
 
 
-def test_solving_with_workers(place: Path) -> None:
-    with_prefect_database(place / "rows.parquet.parts")
-    arguments = ["solve", str(place / "many.jsonl"), "--out", str(place / "rows.parquet"), "--workers", "2"]
+@pytest.mark.timeout(600)
+def test_a_killed_solve_goes_on_with_two_workers_to_the_same_rows(place: Path) -> None:
+    problems, out = place / "many.jsonl", place / "solved" / "rows.parquet"
+    parts = with_prefect_database(out.with_name("rows.parquet.parts"))
+    arguments = ["solve", str(problems), "--out", str(out), "--workers", "2", "--planner", "gust"]
+
+    def some_are_done(_: str) -> bool:
+        return len(list(parts.glob("[0-9]*.parquet"))) > 1
+
+    watch(arguments, place / "killed.log", PLANTED, some_are_done, PARTS_OF_ONE, signal.SIGKILL)
+    assert list(parts.glob("[0-9]*.parquet"))
     watched = watch(arguments, place / "solve.log", PLANTED, script=PARTS_OF_ONE)
     assert watched.code == 0, watched.output[-2000:]
+    assert f"{COUNT} of {COUNT}" in watched.output
     assert {port.process for port in watched.ports} == {"server", "command", "child"}
     assert_closed("solve", watched)
     assert_nowhere_in(place)
+    solve_many(AssistantSettings("gust", "none", 5, None, 1), problems, place / "undisturbed.parquet")
+    assert equal_but_for_seconds(read_attempts(out), read_attempts(place / "undisturbed.parquet"))
+    assert list(out.parent.iterdir()) == [out]
 
 
 def test_serving_a_memory(place: Path) -> None:
+    answers = []
+
     def asked(output: str) -> bool:
         found = re.search(r"serving  (http://\S+)/invocations.*\naccess", output)
         if found is None:
             return False
-        for password in ("wrong", SECRET):
-            for body in (good_request(), b"{"):
-                httpx.post(f"{found[1]}/invocations", content=body, headers=JSON, auth=("robot", password))
+        with httpx.Client(base_url=found[1], timeout=60.0) as client:
+            for auth in (None, ("robot", "wrong"), ("robot", SECRET)):
+                for body in (good_request(), b"{"):
+                    answer = client.post("/invocations", content=body, headers=JSON, auth=auth)
+                    answers.append(answer.status_code)
+            answers.append(client.get("/version").status_code)
+            answers.append(client.get("/ping").status_code)
+            for foreign in ({"Origin": EVIL}, {"Host": "evil.example"}):
+                given = {"content": good_request(), "headers": JSON | foreign, "auth": ("robot", SECRET)}
+                answers.append(client.post("/invocations", **given).status_code)
         return True
 
     arguments = ["serve-memory", str(place / "memory"), "--port", "0"]
     watched = watch(arguments, place / "serve.log", PLANTED, asked)
     assert watched.code == 0, watched.output
+    assert answers[:8] == [401, 401, 401, 401, 200, 400, 401, 200]
+    assert set(answers[8:]) <= {400, 403}
     assert {port.process for port in watched.ports} >= {"child"}
     assert_closed("serve-memory", watched)
 
@@ -159,14 +189,13 @@ def test_servers_for_all(place: Path) -> None:
     assert_nowhere_in(place / "shared")
 
 
-@pytest.mark.parametrize("debug", ["0", "1"])
-def test_planning_opens_no_port_and_failing_tells_no_secret(place: Path, debug: str) -> None:
+def test_planning_opens_no_port_and_a_traceback_tells_no_secret(place: Path) -> None:
     arguments = ["plan", str(place / "one.json"), "--assist", "open", "--memory", "models:/x@y"]
-    unreached = {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": debug}
+    unreached = {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
     watched = watch(arguments, place / "plan.log", PLANTED | IMPATIENT | unreached)
     assert watched.code == 1
     assert "cannot be had from MLflow at http://***@127.0.0.1:9" in watched.output
-    assert ("Traceback" in watched.output) == (debug == "1")
+    assert "Traceback" in watched.output
     assert watched.ports == set()
     assert SECRET not in watched.output
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -26,7 +23,6 @@ from tasks.requests import problem_parts as parts
 from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows.same_rows import equal_but_for_seconds
-from tests.prepared.prefect_database import with_prefect_database
 
 ROOT = Path(__file__).parents[3]
 ASSISTANT = AssistantSettings("gust", "none", 5, None, 1)
@@ -187,33 +183,3 @@ def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) ->
         solve_many(ASSISTANT, problems, tmp_path / out, learn=tmp_path / "data")
     shards = gained_shards(DataFolder(tmp_path / "data").gained("car"))
     assert len(shards) == -(-COUNT // SIZE)
-
-
-@pytest.mark.timeout(600)
-def test_a_killed_command_goes_on_with_two_workers_to_the_same_rows(
-    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "rows.parquet"
-    with_prefect_database(tmp_path / "rows.parquet.parts")
-    script = (
-        "from flows.cli.main import main; from tasks.requests import problem_parts; "
-        "problem_parts.PART_PROBLEMS = 1; main()"
-    )
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PREFECT_")}
-    options = ["--out", str(out), "--workers", "2", "--planner", ASSISTANT.planner]
-    command = [sys.executable, "-c", script, "solve", str(problems), *options]
-    begun = subprocess.Popen(command, cwd=ROOT, env=environment, stderr=subprocess.DEVNULL)
-    folder = tmp_path / "rows.parquet.parts"
-    while begun.poll() is None and len(list(folder.glob("[0-9]*.parquet"))) < 2:
-        time.sleep(0.05)
-    begun.kill()
-    begun.wait()
-    finished = {path: path.stat().st_mtime_ns for path in folder.glob("[0-9]*.parquet")}
-    assert finished
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert f"{COUNT} of {COUNT}" in done.stdout
-    assert equal_but_for_seconds(read_attempts(out), undisturbed)
-    assert [path.name for path in tmp_path.iterdir()] == ["rows.parquet"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import random
 import re
-import signal
 import socket
 import subprocess
 import sys
@@ -17,8 +16,8 @@ import httpx
 import psutil
 import pytest
 
+from flows.cli.main import call
 from tests.tasks.served import JSON, good_request, malformed, write_memory
-from tests.tasks.servers.attacks import EVIL
 
 ROOT = Path(__file__).parents[3]
 SECRET = "robot:s3cret-of-the-fleet"
@@ -62,7 +61,7 @@ def serving(memory: Path, *options: str, **environment: str) -> Iterator[tuple[p
         running.stdout.close()
 
 
-def test_it_answers_replaces_a_dead_worker_and_ends_when_asked(memory: Path) -> None:
+def test_it_answers_replaces_a_dead_worker_and_killed_it_leaves_nobody(memory: Path) -> None:
     with serving(memory) as (running, address), httpx.Client(base_url=address, timeout=PATIENCE) as client:
         answer = client.post("/invocations", content=good_request(), headers=JSON)
         assert answer.status_code == 200
@@ -83,47 +82,35 @@ def test_it_answers_replaces_a_dead_worker_and_ends_when_asked(memory: Path) -> 
         )
         assert again.content == answer.content
         left = running.children(recursive=True)
-        running.send_signal(signal.SIGTERM)
-        assert running.wait(PATIENCE) == 0
-        psutil.wait_procs(left, timeout=PATIENCE)
-        assert [each for each in left if each.is_running()] == []
-
-
-def test_with_the_setting_only_who_knows_it_is_answered_and_killed_it_leaves_nobody(memory: Path) -> None:
-    user, _, password = SECRET.partition(":")
-    with serving(memory, MOTION_MEMORY_AUTH=SECRET) as (running, address):
-        asked = {"content": good_request(), "headers": JSON, "timeout": PATIENCE}
-        assert httpx.post(f"{address}/invocations", **asked).status_code == 401  # type: ignore[arg-type]
-        given = httpx.post(f"{address}/invocations", auth=(user, password), **asked)  # type: ignore[arg-type]
-        assert given.status_code == 200
-        assert httpx.get(f"{address}/version").status_code == 401
-        assert httpx.get(f"{address}/ping").status_code == 200
-        for foreign in ({"Origin": EVIL}, {"Host": "evil.example"}):
-            asked["headers"] = JSON | foreign
-            answer = httpx.post(f"{address}/invocations", auth=(user, password), **asked)  # type: ignore[arg-type]
-            assert answer.status_code in (400, 403)
-        left = running.children(recursive=True)
         running.kill()
         psutil.wait_procs(left, timeout=PATIENCE)
         assert [each for each in left if each.is_running()] == []
 
 
-def test_what_cannot_be_served_is_one_line(memory: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_served_is_one_line(
+    memory: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for options, told in (
+        ([str(memory), "--port", "99999"], "Port 99999: give one from 1 to 65535"),
+        ([str(tmp_path)], "holds no memory"),
+        ([str(memory), "--vehicle", "car-1-trailer"], "made for vehicle car"),
+    ):
+        assert call(["serve-memory", *options]) in (1, 2)
+        said = capsys.readouterr().err
+        assert told in said
+        assert said.count("\n") == 1
+
+
+def test_a_port_that_is_taken_is_one_line(memory: Path) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        for options, told in (
-            ([str(memory), "--port", port], f"Port {port} of 127.0.0.1 cannot be used"),
-            ([str(memory), "--port", "99999"], "Port 99999: give one from 1 to 65535"),
-            ([str(tmp_path)], "holds no memory"),
-            ([str(memory), "--vehicle", "car-1-trailer"], "made for vehicle car"),
-        ):
-            command = [sys.executable, "-m", "flows.cli.main", "serve-memory", *options]
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
-            assert done.returncode in (1, 2)
-            assert told in done.stderr
-            assert done.stderr.count("\n") == 1
+        command = [sys.executable, "-m", "flows.cli.main", "serve-memory", str(memory), "--port", port]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 1
+    assert f"Port {port} of 127.0.0.1 cannot be used" in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.slow
