@@ -45,8 +45,7 @@ format: $(READY)
 clean:
 	rm -rf $(VENV) build *.egg-info
 
-# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA. Compiling 24,000
-# files would take a minute; Python compiles those that are imported.
+# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)

@@ -25,7 +25,6 @@ LONGEST: Final = (  # files that take more than ten seconds, the longest first (
     "docs/test_tutorial.py",
     "tasks/servers/test_prefect_server.py",
     "flows/cli/test_closed_commands.py",
-    "tasks/requests/test_solve_many.py",
     "tasks/champions/test_conclude.py",
     "tasks/fan_out/test_fan_out.py",
     "tasks/serving/test_serve_memory.py",
@@ -33,7 +32,11 @@ LONGEST: Final = (  # files that take more than ten seconds, the longest first (
     "tasks/tracking/test_memory_model.py",
     "planners/memory/encoder/test_training.py",
     "tasks/servers/test_connections.py",
+    "tasks/stages/test_stages_of_vehicles.py",
     "tasks/champions/test_promote.py",
+    "tasks/serving/test_shared_servers.py",
+    "dashboards/figures/test_figures.py",
+    "planners/memory/hallucination/test_hallucination.py",
     "storage/archives/test_damaged_archives.py",
 )
 
