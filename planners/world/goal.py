@@ -58,3 +58,16 @@ def reaches(state: State, goal: Floats) -> bool:
         if abs(state[5 + k] - goal[HITCHES + 2 * k]) > goal[HITCHES + 2 * k + 1]:
             return False
     return True
+
+
+@inlined
+def asks_for_more(goal: Floats) -> bool:
+    """Whether a goal asks for a heading or a speed, besides the place."""
+    return bool(
+        goal[HEADING_TOLERANCE] < math.inf or goal[LEAST_SPEED] > -math.inf or goal[MOST_SPEED] < math.inf
+    )
+
+
+def goal_of_pose(x: float, y: float, heading: float) -> Floats:
+    """Make the goal ``[7]`` of whoever is to stand at a pose (metres, radians), with the usual tolerances."""
+    return np.array([x, y, 0.1, heading, 0.05, -SLACK, SLACK])

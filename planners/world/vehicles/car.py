@@ -97,6 +97,31 @@ def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
     return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - state[4])
 
 
+@implements(interface.tightest_bend, Car, CarWithTrailers)
+def _tightest_bend(speed: float, vehicle: CarLike) -> float:
+    return vehicle.max_steering
+
+
+@implements(interface.bend_rate, Car, CarWithTrailers)
+def _bend_rate(speed: float, vehicle: CarLike) -> float:
+    return vehicle.max_steering_rate
+
+
+@implements(interface.curvature_of, Car, CarWithTrailers)
+def _curvature_of(bend: float, vehicle: CarLike) -> float:
+    return tan(bend) / vehicle.wheelbase
+
+
+@implements(interface.bend_of, Car, CarWithTrailers)
+def _bend_of(state: State, vehicle: CarLike) -> float:
+    return state[4]
+
+
+@implements(interface.turn_in, Car, CarWithTrailers)
+def _turn_in(bend: float, speed: float, vehicle: CarLike) -> float:
+    return bend
+
+
 @implements(interface.is_folded, Car)
 def _is_folded(state: State, vehicle: Car) -> bool:
     return False

@@ -11,6 +11,8 @@ from planners.world.vehicles.interface import State, kept_within, leading_body
 from planners.world.vehicles.vehicle import DifferentialDrive
 
 LOOK_AHEAD_S = 0.5  # the present turn is counted on for this long: damps the controller, as steering a car's
+BEND_SHARE = 0.75  # of the turn acceleration is for changing bends, the rest for changing speed in a bend
+SLOW = 0.5  # m/s, below which a turn is no bend that it would be worth to go on with
 
 
 @implements(interface.load, DifferentialDrive)
@@ -57,6 +59,31 @@ def _admissible(state: State, first: float, second: float, vehicle: Differential
 @implements(interface.turn_error, DifferentialDrive)
 def _turn_error(state: State, x: float, y: float, vehicle: DifferentialDrive) -> float:
     return wrapped(angle_to(x - state[0], y - state[1]) - state[2] - LOOK_AHEAD_S * state[4])
+
+
+@implements(interface.tightest_bend, DifferentialDrive)
+def _tightest_bend(speed: float, vehicle: DifferentialDrive) -> float:
+    return vehicle.max_turn_rate / speed
+
+
+@implements(interface.bend_rate, DifferentialDrive)
+def _bend_rate(speed: float, vehicle: DifferentialDrive) -> float:
+    return BEND_SHARE * vehicle.max_turn_acceleration / speed
+
+
+@implements(interface.curvature_of, DifferentialDrive)
+def _curvature_of(bend: float, vehicle: DifferentialDrive) -> float:
+    return bend
+
+
+@implements(interface.bend_of, DifferentialDrive)
+def _bend_of(state: State, vehicle: DifferentialDrive) -> float:
+    return state[4] / max(abs(state[3]), SLOW) * (1.0 if state[3] >= 0.0 else -1.0)
+
+
+@implements(interface.turn_in, DifferentialDrive)
+def _turn_in(bend: float, speed: float, vehicle: DifferentialDrive) -> float:
+    return bend * speed
 
 
 @implements(interface.is_folded, DifferentialDrive)

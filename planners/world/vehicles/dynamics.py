@@ -9,13 +9,18 @@ from planners.world.jit import jit
 from planners.world.vehicles import car, car_with_trailers, differential_drive
 from planners.world.vehicles.interface import State as State
 from planners.world.vehicles.interface import admissible as admissible
+from planners.world.vehicles.interface import bend_of as bend_of
+from planners.world.vehicles.interface import bend_rate as bend_rate
 from planners.world.vehicles.interface import control_limits as control_limits
+from planners.world.vehicles.interface import curvature_of as curvature_of
 from planners.world.vehicles.interface import is_folded as is_folded
 from planners.world.vehicles.interface import load as load
 from planners.world.vehicles.interface import step as step
 from planners.world.vehicles.interface import store as store
 from planners.world.vehicles.interface import swept_bodies as swept_bodies
+from planners.world.vehicles.interface import tightest_bend as tightest_bend
 from planners.world.vehicles.interface import turn_error as turn_error
+from planners.world.vehicles.interface import turn_in as turn_in
 from planners.world.vehicles.interface import turn_limit as turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 

@@ -64,6 +64,39 @@ def turn_error(state: State, x: float, y: float, vehicle: Vehicle) -> float:
 
 
 @by_vehicle
+def tightest_bend(speed: float, vehicle: Vehicle) -> float:
+    """The largest bend that the vehicle can drive at all speeds (m/s) up to this one.
+
+    A bend is what stays as it is in an arc: the steering angle of a car, the curvature of the way otherwise.
+    """
+    raise NotImplementedError
+
+
+@by_vehicle
+def bend_rate(speed: float, vehicle: Vehicle) -> float:
+    """How much a bend can change in a second at all speeds (m/s) up to this one."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def curvature_of(bend: float, vehicle: Vehicle) -> float:
+    """The curvature of the way (1/m, left positive) in a bend."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def bend_of(state: State, vehicle: Vehicle) -> float:
+    """The bend that a state drives."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def turn_in(bend: float, speed: float, vehicle: Vehicle) -> float:
+    """The fifth variable of a state that drives a bend at this speed (m/s)."""
+    raise NotImplementedError
+
+
+@by_vehicle
 def is_folded(state: State, vehicle: Vehicle) -> bool:
     """Whether parts of the vehicle have come too close to each other (jack-knifed)."""
     raise NotImplementedError

@@ -1,0 +1,99 @@
+"""The words by which a state may be connected to a goal, the quickest first."""
+
+from __future__ import annotations
+
+import math
+
+from planners.search.connection.connection import (
+    Connection,
+    first_pose,
+    heading_at,
+    last_speed,
+    lead_of,
+    radius_at,
+)
+from planners.search.connection.profile import run_seconds
+from planners.search.connection.words import PARTS, list_words
+from planners.world.arrays import Floats
+from planners.world.goal import X, Y
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import sincos, wrapped
+from planners.world.vehicles.dynamics import control_limits, load
+from planners.world.vehicles.vehicle import Vehicle
+
+
+@lean
+def _estimate(
+    word: Floats, radius: float, lead: float, speed: float, goal: Floats, top: float, vehicle: Vehicle
+) -> float:
+    """How long a word takes to drive, in seconds; infinite if the speed at its ends does not allow it."""
+    acceleration = control_limits(vehicle)[0]
+    seconds = 0.0
+    k = 0
+    while k < PARTS and word[PARTS + k] == 0.0:
+        k += 1
+    first = True
+    while k < PARTS:
+        gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
+        metres = 0.0
+        while k < PARTS and gear * word[PARTS + k] >= 0.0:
+            metres += radius * abs(word[PARTS + k])
+            k += 1
+        begin = 0.0
+        if first:
+            begin = gear * speed
+            metres += lead
+            if begin < 0.0:
+                return math.inf
+        first = False
+        fastest = top if gear > 0.0 else min(top, -vehicle.min_speed)
+        if fastest <= 0.0:
+            return math.inf
+        end = 0.0
+        if k == PARTS:
+            end = min(last_speed(gear, begin, metres, goal, acceleration), fastest)
+            if end < 0.0:
+                return math.inf
+        seconds += run_seconds(metres, begin, end, fastest, acceleration)
+    return seconds
+
+
+@lean
+def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) -> int:
+    """List the words that may lead from ``c.states[0]`` to a goal.
+
+    Args:
+        c: buffers, the first state filled in.
+        goal: that of ``goal_of``.
+        top: the largest speed in m/s. Who drives more slowly may turn more sharply.
+        vehicle: what is driven.
+
+    Returns:
+        How many words there are in ``c.words``. ``c.seconds`` estimates how long each takes.
+    """
+    state = load(c.states, 0, vehicle)
+    x, y, heading = first_pose(state, top, vehicle)
+    radius = radius_at(top, vehicle)
+    dx = (goal[X] - x) / radius
+    dy = (goal[Y] - y) / radius
+    sin, cos = sincos(heading)
+    turn = wrapped(heading_at(state, goal) - heading)
+    count = list_words(dx * cos + dy * sin, dy * cos - dx * sin, turn, c.words)
+    lead = lead_of(state, top, vehicle)
+    for i in range(count):
+        c.seconds[i] = _estimate(c.words[i], radius, lead, state[3], goal, top, vehicle)
+    return count
+
+
+@inlined
+def next_word(c: Connection, count: int, within_s: float) -> int:
+    """Take the quickest of the first ``count`` words; -1 if all that are left take ``within_s`` or more."""
+    best = -1
+    least = within_s
+    for i in range(count):
+        if c.seconds[i] < least:
+            best = i
+            least = c.seconds[i]
+    if best >= 0:
+        c.seconds[best] = math.inf
+    return best

@@ -1,0 +1,99 @@
+"""Connections: drives to a goal pose that do not look at obstacles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from planners.search.connection.candidates import list_connections, next_word
+from planners.search.connection.connect import connect
+from planners.search.connection.connection import allocate_connection
+from planners.world.arrays import Floats
+from planners.world.authority.authority_equations import limits_of, simulate_again
+from planners.world.goal import goal_of_pose, reaches
+from planners.world.vehicles.dynamics import load
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle, state_size
+
+VEHICLES = {"car": CAR, "differential-drive": DIFFERENTIAL_DRIVE, "car-2-trailers": CAR_2_TRAILERS}
+Drive = tuple[Floats, Floats]
+
+
+def connection(start: Floats, goal: Floats, vehicle: Vehicle, top: float) -> Drive | None:
+    """States ``[T, S]`` and controls of the first of the three quickest words that leads to the goal."""
+    buffers = allocate_connection(state_size(vehicle))
+    buffers.states[0] = start
+    count = list_connections(buffers, goal, top, vehicle)
+    for _ in range(3):
+        word = next_word(buffers, count, math.inf)
+        steps = connect(buffers, word, goal, top, vehicle) if word >= 0 else 0
+        if steps > 0:
+            return buffers.states[: steps + 1].copy(), buffers.controls[:steps].copy()
+    return None
+
+
+def questions(vehicle: Vehicle, moving: bool, count: int, seed: int) -> list[tuple[Floats, Floats]]:
+    rng = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(count):
+        start = np.zeros(state_size(vehicle))
+        start[2] = rng.uniform(-math.pi, math.pi)
+        if moving:
+            start[3:5] = rng.uniform(0.0, 4.0), rng.uniform(-0.5, 0.5)
+        bearing, metres = rng.uniform(-math.pi, math.pi), rng.uniform(2.0, 30.0)
+        heading = rng.uniform(-math.pi, math.pi)
+        drawn.append((start, goal_of_pose(metres * math.cos(bearing), metres * math.sin(bearing), heading)))
+    return drawn
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+@pytest.mark.parametrize("moving", [False, True], ids=["from-rest", "moving"])
+def test_connections_are_lawful_drives_to_the_goal_and_nearly_always_there(
+    vehicle: Vehicle, moving: bool
+) -> None:
+    asked = questions(vehicle, moving, 60, 1)
+    closed = 0
+    for start, goal in asked:
+        drive = connection(start, goal, vehicle, vehicle.max_speed)
+        if drive is None:
+            continue
+        closed += 1
+        states, controls = drive
+        assert np.abs(simulate_again(start, controls, vehicle) - states).max() < 1e-6
+        assert reaches(load(states, len(states) - 1, vehicle), goal)
+        for limit in limits_of(states, controls, vehicle):
+            if not limit.name.lower().startswith("hitch"):
+                assert limit.values.min() >= limit.low - 1e-9
+                assert limit.values.max() <= limit.high + 1e-9
+    assert closed >= (0.8 if moving else 0.98) * len(asked)
+
+
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE], ids=["car", "differential-drive"])
+def test_a_mirrored_question_has_the_mirrored_drive(vehicle: Vehicle) -> None:
+    for start, goal in questions(vehicle, True, 30, 2):
+        across = np.array([1.0, -1.0, -1.0, 1.0, -1.0])
+        other = goal.copy()
+        other[[1, 3]] *= -1.0
+        one, two = (connection(*each, vehicle, 4.0) for each in ((start, goal), (start * across, other)))
+        assert (one is None) == (two is None)
+        if one is not None and two is not None:
+            assert np.abs(one[0] * across - two[0]).max() < 1e-6
+
+
+def test_tight_tolerances_and_speeds_at_the_goal_are_kept() -> None:
+    closed = 0
+    for start, goal in questions(CAR, False, 60, 3):
+        goal[2], goal[4] = 0.01, 0.002
+        goal[5:7] = 0.5, 1.5
+        drive = connection(start, goal, CAR, 4.0)
+        closed += drive is not None
+        assert drive is None or reaches(load(drive[0], len(drive[0]) - 1, CAR), goal)
+    assert closed >= 55
+
+
+def test_a_vehicle_that_cannot_drive_backwards_is_given_no_gears() -> None:
+    forwards = CAR._replace(min_speed=0.0)
+    for start, goal in questions(forwards, False, 20, 4):
+        drive = connection(start, goal, forwards, 4.0)
+        assert drive is None or drive[0][:, 3].min() >= 0.0
