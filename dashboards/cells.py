@@ -1,15 +1,13 @@
-"""How names and numbers are written, and tables of them: for a terminal and as Markdown."""
+"""How names and numbers are written, and tables of them, which as strings are Markdown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from rich import box
-from rich.console import Group
-from rich.table import Table
 
 from dashboards.statistics.panels import COMBINED
 from planners.world.arrays import Floats
@@ -17,7 +15,7 @@ from planners.world.arrays import Floats
 NOTHING: Final = "–"
 NAMES: Final = {  # headings of columns that are aligned to the left
     "stage", "planner", "configuration", "panel", "class", "memory", "protocol", "recall", "setting",
-    "verdict",
+    "verdict", "source", "use",
 }  # fmt: skip
 PLANNING_TIME: Final = (
     "Planning time is everything from receiving the obstacles to returning a plan: drawing the grid, "
@@ -74,41 +72,27 @@ def with_interval(value: float, low: float, high: float, decimals: int = 0) -> s
     return f"{100.0 * value:.{decimals}f} [{', '.join(ends)}]"
 
 
-def rich_table(title: str, headings: Sequence[str], groups: Sequence[Rows]) -> Table:
-    """A table for a terminal.
+@dataclass(frozen=True)
+class CellTable:
+    """A table of cells; as a string it is Markdown."""
 
-    ``title``, ``headings``: its texts; a heading of ``NAMES`` aligns its column to the left. ``groups``: rows
-    of cells; a group of several rows shows its first cell once, and a gap after it.
-    """
-    table = Table(
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        padding=(0, 1, 0, 0),
-    )
-    for heading in headings:
-        table.add_column(
-            heading, justify="left" if heading in NAMES else "right", no_wrap=heading != "verdict"
-        )
-    for group in groups:
-        for i, cells in enumerate(group):
-            table.add_row(cells[0] if i == 0 else "", *cells[1:], end_section=i == len(group) - 1 > 0)
-    return table
+    title: str
+    headings: Sequence[str]  # one of ``NAMES`` aligns its column to the left
+    groups: Sequence[Rows]  # rows that belong together stand together
+
+    def __str__(self) -> str:
+        rows = [cells for group in self.groups for cells in group]
+        return f"### {self.title}\n\n{markdown_table(self.headings, rows)}"
 
 
-def titled_tables(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> Group:
-    """Tables for a terminal under the same ``headings``, of pairs of a title and groups of rows."""
-    return Group(*[rich_table(title, headings, groups) for title, groups in titled])
+def titled_tables(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> list[CellTable]:
+    """Tables under the same ``headings``, of pairs of a title and groups of rows."""
+    return [CellTable(title, headings, groups) for title, groups in titled]
 
 
-def titled_markdown(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> str:
-    """Like ``titled_tables``, as Markdown."""
-    return "\n".join(
-        f"### {title}\n\n{markdown_table(headings, [cells for group in groups for cells in group])}"
-        for title, groups in titled
-    )
+def as_markdown(tables: Iterable[CellTable]) -> str:
+    """Several ``tables`` as Markdown, one below another."""
+    return "\n".join(map(str, tables))
 
 
 def markdown_table(headings: Sequence[str], rows: Rows) -> str:

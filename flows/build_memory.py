@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tasks.fan_out.fan_out import run_stage
-from tasks.reports.report import report_retrieval, show_retrieval
+from tasks.reports.report import log_retrieval, report_retrieval
 from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
@@ -18,4 +18,4 @@ def build_memory(settings: RunSettings, data: str) -> None:
     run_stage(MEASURE_RECALL, data, settings)
     retrieval = report_retrieval(data, settings)
     log_memories(data, settings, memories, retrieval)
-    show_retrieval(retrieval)
+    log_retrieval(retrieval)

@@ -9,7 +9,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
 from tasks.stages.curate import CURATE
 from tasks.stages.keep_experiences import COMBINE, KEEP
-from tasks.stages.read_worlds import READ_WORLDS, print_skipped
+from tasks.stages.read_worlds import READ_WORLDS, log_skipped
 
 
 @stage_flow
@@ -17,7 +17,7 @@ def collect(settings: RunSettings, data: str) -> None:
     """Draw problems of each class, solve them, polish and check the plans, and keep the N best of each."""
     keep_settings(data, settings)
     worlds = run_stage(READ_WORLDS, data, settings)
-    print_skipped(worlds.values())
+    log_skipped(worlds.values())
     run_stage(COLLECT, data, settings)
     run_stage(CURATE, data, settings)
     run_stage(KEEP, data, settings)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tasks.fan_out.fan_out import run_stage
 from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.hallucinate import HALLUCINATE, print_copied
+from tasks.stages.hallucinate import HALLUCINATE, log_copied
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION
 from tasks.stages.relabel import RELABEL
 
@@ -15,5 +15,5 @@ def hallucinate(settings: RunSettings, data: str) -> None:
     """Make many problems for each plan, label them, and label them once more for the combined memory."""
     run_stage(LEARN_HALLUCINATION, data, settings)
     hallucinated = run_stage(HALLUCINATE, data, settings)
-    print_copied(hallucinated.values())
+    log_copied(hallucinated.values())
     run_stage(RELABEL, data, settings)

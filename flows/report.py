@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.fan_out import run_stage
-from tasks.reports.report import report_run, show
+from tasks.reports.report import log_tables, report_run
 from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.draw_examples import DRAW_EXAMPLES
@@ -14,9 +14,9 @@ from tasks.tracking.logbook import log_report
 
 @stage_flow
 def report(settings: RunSettings, data: str) -> None:
-    """Turn the rows of a run into tables and figures, print the tables, and log all of it."""
+    """Turn the rows of a run into tables and figures, and log them."""
     run_stage(DRAW_EXAMPLES, data, settings)
     results, run = report_run(data, settings), run_folder(data, settings)
     log_report(data, settings, results)
     publish(run, results.claims + results.others)
-    show(results, run)
+    log_tables(results, run)

@@ -1,4 +1,4 @@
-"""The tables of a run and of its stages: for a terminal, as Markdown, as comma-separated values."""
+"""The tables of a run and of its stages, and rows as comma-separated values."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import pandas as pd
-from rich.console import Group
-from rich.table import Table
 
 from dashboards.cells import (
     NOTHING,
+    CellTable,
     Rows,
+    as_markdown,
     count,
     decimals_of,
     markdown_table,
     p_value,
     percent,
-    rich_table,
-    titled_markdown,
     titled_tables,
     with_interval,
 )
@@ -53,20 +51,20 @@ STAGE_HEADINGS: Final = (
 )  # fmt: skip
 
 
-def summary_table(summary: pd.DataFrame) -> Group:
-    """The ``summary`` of ``panels.summarise`` for a terminal of 110 columns or more: a table a panel."""
+def summary_tables(summary: pd.DataFrame) -> list[CellTable]:
+    """What fits 110 columns of the ``summary`` of ``panels.summarise``: a table for each panel."""
     titled = titled_rows(summary, _cells)
     return titled_tables(_HEADINGS, [(f"{title}; {_UNITS}", groups) for title, groups in titled])
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
     """The whole ``summary`` of ``panels.summarise`` as Markdown: a heading and a table a panel."""
-    return titled_markdown(FULL_HEADINGS, titled_rows(summary, full_cells))
+    return as_markdown(titled_tables(FULL_HEADINGS, titled_rows(summary, full_cells)))
 
 
-def retrieval_table(retrieval: pd.DataFrame) -> Table:
-    """The rows of ``retrieval_rates.summarise_retrieval`` for a terminal, in per cent of the problems."""
-    return rich_table("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
+def retrieval_table(retrieval: pd.DataFrame) -> CellTable:
+    """The rows of ``retrieval_rates.summarise_retrieval``, in per cent of the problems."""
+    return CellTable("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
@@ -75,13 +73,13 @@ def retrieval_markdown(retrieval: pd.DataFrame) -> str:
     return markdown_table(RETRIEVAL_HEADINGS, lines)
 
 
-def stages_table(rows: Sequence[Sequence[str]]) -> Table:
-    """The stages of a run for a terminal; ``rows`` of cells under ``STAGE_HEADINGS``."""
-    return rich_table("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
+def stages_table(rows: Sequence[Sequence[str]]) -> CellTable:
+    """The stages of a run; ``rows`` of cells under ``STAGE_HEADINGS``."""
+    return CellTable("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
 
 
-def sweep_table(rows: pd.DataFrame) -> Table:
-    """The variants of a sweep, ``rows`` of ``stages.sweep.sweep_rows``, for a terminal: the best first."""
+def sweep_table(rows: pd.DataFrame) -> CellTable:
+    """The variants of a sweep, ``rows`` of ``stages.sweep.sweep_rows``: the best first."""
     groups = [
         [
             [
@@ -93,11 +91,11 @@ def sweep_table(rows: pd.DataFrame) -> Table:
         ]
         for name, of_class in rows.groupby("class", sort=False)
     ]  # fmt: skip
-    return rich_table("Validation problems, % of what the stored plans solve", _SWEEP_HEADINGS, groups)
+    return CellTable("Validation problems, % of what the stored plans solve", _SWEEP_HEADINGS, groups)
 
 
-def experience_table(rows: pd.DataFrame) -> Table:
-    """The ``rows`` of ``experience_rows`` for a terminal: a line a number of experiences."""
+def experience_table(rows: pd.DataFrame) -> CellTable:
+    """The ``rows`` of ``experience_rows``: a line for each number of experiences."""
     panels = list(rows["panel"].unique())
     lines = []
     for plans, of_count in rows.groupby("plans"):
@@ -109,7 +107,7 @@ def experience_table(rows: pd.DataFrame) -> Table:
         ]
         lines.append([str(plans), *cells])
     title = "Fresh hit@5 [95 %] and oracle, % of problems"
-    return rich_table(title, ["experiences", *panels], [[line] for line in lines])
+    return CellTable(title, ["experiences", *panels], [[line] for line in lines])
 
 
 def claims_markdown(claims: Sequence[Claim], others: Sequence[Claim] = ()) -> str:

@@ -1,4 +1,4 @@
-"""The comparison of two runs as tables, for a terminal and as Markdown."""
+"""The comparison of two runs as tables."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pandas as pd
-from rich.console import Group
 
 from dashboards.cells import (
     NOTHING,
+    CellTable,
     Rows,
     decimals_of,
     percent,
-    titled_markdown,
     titled_tables,
     with_interval,
 )
@@ -37,14 +36,9 @@ def headings_of(rows: pd.DataFrame) -> tuple[str, ...]:
     return HEADINGS_IN_TURN if rows["reduction_low"].notna().any() else HEADINGS
 
 
-def comparison_table(rows: pd.DataFrame) -> Group:
-    """The ``rows`` of ``compare_runs`` for a terminal: a table a panel."""
+def comparison_tables(rows: pd.DataFrame) -> list[CellTable]:
+    """The ``rows`` of ``compare_runs``: a table for each panel."""
     return titled_tables(headings_of(rows), comparison_cells(rows))
-
-
-def comparison_markdown(rows: pd.DataFrame) -> str:
-    """The ``rows`` of ``compare_runs`` as Markdown: a heading and a table a panel."""
-    return titled_markdown(headings_of(rows), comparison_cells(rows))
 
 
 def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:

@@ -23,9 +23,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
-from rich.console import Group
 
-from dashboards.cells import Rows, decimals_of, percent, titled_markdown, titled_tables
+from dashboards.cells import CellTable, Rows, as_markdown, decimals_of, percent, titled_tables
 from dashboards.statistics.intervals import CONFIDENCE, bootstrap
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
@@ -107,8 +106,8 @@ def judgement_line(judged: Judgement) -> str:
     )
 
 
-def judgement_table(judged: Judgement) -> Group:
-    """The columns by which it was ``judged``, for a terminal: a table a class."""
+def judgement_tables(judged: Judgement) -> list[CellTable]:
+    """The columns by which it was ``judged``: a table for each class."""
     return titled_tables(HEADINGS, _titled(judged))
 
 
@@ -116,7 +115,7 @@ def judgement_markdown(judged: Judgement) -> str:
     """What was ``judged`` as Markdown: verdict, figures and columns."""
     verdict = "promoted" if judged.promoted else "refused"
     head = f"**{verdict}**: {judged.why}.\n\n{judgement_line(judged)}.\n\n"
-    return head + titled_markdown(HEADINGS, _titled(judged))
+    return head + as_markdown(judgement_tables(judged))
 
 
 def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:

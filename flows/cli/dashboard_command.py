@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 
@@ -21,4 +22,4 @@ def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = Tru
     from tasks.serving.serve_dashboard import serve_dashboard
     from tasks.settings.environment import default_data
 
-    serve_dashboard(data or default_data(), port, browser)
+    serve_dashboard(data or default_data(), port, browser and sys.stdout.isatty())

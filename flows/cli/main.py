@@ -23,6 +23,7 @@ from flows.cli import retraining_commands as operations
 from flows.cli import server_commands as serving
 from flows.cli import stage_commands as stages
 from flows.cli.configuration import check_configuration, configuration_file
+from flows.cli.terminal import notices_shown
 from tasks.settings.redaction import redacted
 
 FAILURE: Final = 1
@@ -69,12 +70,8 @@ def call(arguments: Sequence[str] | None = None) -> int:
         if configured is not None:
             check_configuration(configured, [name for name in app if not name.startswith("-")])
         app.config = () if configured is None else (Toml(configured),)
-        app(
-            arguments,
-            exit_on_error=False,
-            print_error=False,
-            result_action="return_none",
-        )
+        with notices_shown():
+            app(arguments, exit_on_error=False, print_error=False, result_action="return_none")
     except KeyboardInterrupt:
         return INTERRUPTED
     except SystemExit as end:

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from flows.cli.choices import AssistName
 from flows.cli.solve_options import MapOptions, SolveOptions
+from flows.cli.terminal import write, write_files
 
 _AS_IT_IS: Final = MapOptions()
 _USUAL: Final = SolveOptions()
@@ -57,7 +58,10 @@ def import_worlds(
     from tasks.requests import import_worlds as task
 
     settings = task.import_settings(vehicle, seed, strict, problems, **asdict(reading))
-    task.import_worlds(path, format, out, part, settings, picture)
+    counts = task.import_worlds(path, format, out, part, settings, picture)
+    write_files(picture=picture)
+    write(counts)
+    write_files(problems=out)
 
 
 def route(
@@ -102,4 +106,6 @@ def route(
 
     assistant = Assistant(*options.settings(assist, without_memory="fresh"))
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))
-    drive_route(path, format, begin, end, assistant, settings, out, picture)
+    driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
+    write(driven.legs, *driven.summary)
+    write_files(plan=out, picture=picture)

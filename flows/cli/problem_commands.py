@@ -10,9 +10,11 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, PlannerName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
+from flows.cli.terminal import write, write_files
 
 if TYPE_CHECKING:
     from tasks.requests.problem_parts import PartResult, SolveRequest
+    from tasks.requests.solve_many import SolvedMany
 
 _USUAL: Final = SolveOptions()
 
@@ -52,7 +54,11 @@ def plan(
     """
     from tasks.requests.assistant import Assistant, plan_one
 
-    plan_one(Assistant(*options.settings(assist, improve_seconds)), problem, out, picture, explain, learn)
+    assistant = Assistant(*options.settings(assist, improve_seconds))
+    attempt, found = plan_one(assistant, problem, out, picture, explain, learn)
+    times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
+    write(f"{attempt.source}, {times}")
+    write_files(plan=out, picture=picture)
 
 
 def optimise(
@@ -94,7 +100,12 @@ def optimise(
     from tasks.requests.optimise_one import initial_guess, optimise_one
 
     initial = initial_guess(plan, planner, straight, vehicle, seed)
-    optimise_one(initial, problem, clearance_weight, out, picture)
+    found = optimise_one(initial, problem, clearance_weight, out, picture)
+    write(
+        f"{found.summary}, {found.length_m:.1f} m, {found.duration_s:.1f} s"
+        f" (guess: {found.guess_duration_s:.1f} s), {found.clearance_m:.2f} m clear"
+    )
+    write_files(plan=out, picture=picture)
 
 
 def solve(
@@ -133,10 +144,26 @@ def solve(
     from tasks.requests.solve_many import solve_many
 
     settings = options.settings(assist, improve_seconds)
-    solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
+    solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
+    _write_summary(solved)
+    write_files(rows=out, plans=plans, learned=learn)
+    write(*(f"watched  {line}" for line in solved.drift))
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:
     from flows.solve import solve  # late: Prefect reads its environment when it is imported
 
     return solve(request)
+
+
+def _write_summary(solved: SolvedMany) -> None:
+    outcomes, seconds, _, _ = solved.tally
+    count, with_plan = len(seconds), sum(n for name, n in outcomes.items() if not name.startswith("("))
+    named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
+    speed = f"{solved.solved_now / solved.seconds:,.0f} problems/s"
+    mean_ms, median_ms, ninth_ms = (1e3 * each for each in solved.planning_seconds)
+    write(
+        f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
+        f"planning mean {mean_ms:.2f} ms, median {median_ms:.2f} ms, 90 % {ninth_ms:.2f} ms",
+        f"speed    {speed}: {solved.solved_now:,} in {solved.seconds:,.1f} s",
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flows.cli.run_options import worker_count
+from flows.cli.terminal import write
 
 
 def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) -> None:
@@ -41,6 +42,7 @@ def export(run: Path, *, format: str, out: Path) -> None:
     from tasks.reports.export import export_run
 
     export_run(run, format, out)
+    write(f"exported {out}")
 
 
 def compare(*runs: Path, out: Path | None = None, measure: bool = False, problems: int | None = None) -> None:
@@ -60,4 +62,6 @@ def compare(*runs: Path, out: Path | None = None, measure: bool = False, problem
     """
     from tasks.reports.compare import compare as task
 
-    task(runs, out, measure, problems)
+    write(*task(runs, out, measure, problems).told())
+    if out is not None:
+        write(f"compared {out}")

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from flows.cli.run_options import Options, worker_count
 from flows.cli.stage_commands import settings_of
+from flows.cli.terminal import write
 
 if TYPE_CHECKING:
     from prefect import Flow
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from tasks.settings.run_settings import RunSettings
 
 NO_OPTIONS: Final = Options()
+ENTRYPOINT: Final = "flows.cli.scheduled.retrain"
 Flag = Annotated[bool, Parameter(negative=())]
 
 
@@ -37,7 +39,7 @@ def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = 
     if dry_run:
         from tasks.champions.dry_run import dry_run as task
 
-        task(options.folder, settings)
+        write(*task(options.folder, settings))
         return
     from tasks.session.command_session import command_session
 
@@ -73,7 +75,7 @@ def serve(
 
     settings = _settings(options)
     workers = worker_count(options.workers)
-    task(retrain_flow, settings, options.folder, every, cron, approve, workers, options.scheduler)
+    task(retrain_flow, ENTRYPOINT, settings, options.folder, every, cron, approve, workers, options.scheduler)
 
 
 def retrain_flow() -> Flow[..., None]:
@@ -97,7 +99,8 @@ def promote(*, memory: str | None = None, data: Path | None = None) -> None:
     from tasks.champions.promote import promote_awaiting
     from tasks.settings.environment import default_data
 
-    promote_awaiting(data or default_data(), memory)
+    for name, before, now in promote_awaiting(data or default_data(), memory):
+        write(f"{name}: version {now} is champion, was {before}")
 
 
 def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
@@ -114,7 +117,8 @@ def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
     from tasks.champions.promote import roll_back
     from tasks.settings.environment import default_data
 
-    roll_back(data or default_data(), memory)
+    for name, before, now in roll_back(data or default_data(), memory):
+        write(f"{name}: version {now} is champion again, was {before}")
 
 
 def _settings(options: Options) -> RunSettings:

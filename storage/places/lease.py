@@ -8,10 +8,10 @@ succeed.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import platform
 import signal
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +23,8 @@ from storage.places.objects import Address
 
 RENEWED_SECONDS: Final = 15.0
 LOST_SECONDS: Final = 60.0
+
+_LOG = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -71,10 +73,10 @@ def _keep(address: Address, body: bytes, owner: str, tag: str, what: str, ended:
         except UnreachableError:  # no other command can take it meanwhile
             continue
         except StorageError as error:
-            print(f"The lease of {what} cannot be renewed: {error}", file=sys.stderr)
+            _LOG.error("The lease of %s cannot be renewed: %s", what, error)
             return
         if held is None:
-            print(f"Another command took {what} over, because this one was silent too long.", file=sys.stderr)
+            _LOG.error("Another command took %s over, because this one was silent too long.", what)
             os.kill(os.getpid(), signal.SIGINT)
             return
 

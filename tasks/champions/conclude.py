@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import NamedTuple
@@ -13,7 +14,7 @@ from dashboards.verdicts.promotion import (
     judge,
     judgement_line,
     judgement_markdown,
-    judgement_table,
+    judgement_tables,
 )
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
@@ -32,12 +33,13 @@ from tasks.registry.champion_registry import (
     registered_name,
 )
 from tasks.registry.model_uris import memory_digest
-from tasks.reports.report import console
 from tasks.settings.retraining_settings import number_of
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.judge import judged
 from tasks.tracking.artifacts import publish_judgements
 from tasks.tracking.logbook import log_judgement, tracker
+
+_LOG = logging.getLogger(__name__)
 
 
 class JudgedVersion(NamedTuple):
@@ -77,7 +79,7 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
 
     """
     judged_versions = [_register(data, run, registry, memory, approve) for memory in run.memories]
-    _show(judged_versions)
+    _log(judged_versions)
     for judged_version in judged_versions:
         version, verdict = judged_version.version, judged_version.verdict
         if verdict == FIRST and registry.aliased(version.name) is None:
@@ -148,9 +150,10 @@ def _markdown(run: RetrainingRun, memory: str, judgement: Judgement | None) -> s
     return heading + judgement_markdown(judgement)
 
 
-def _show(judged_versions: Sequence[JudgedVersion]) -> None:
+def _log(judged_versions: Sequence[JudgedVersion]) -> None:
     for judged_version in judged_versions:
         if judged_version.judgement is not None:
-            console().print(judgement_table(judged_version.judgement))
-            print(judgement_line(judged_version.judgement))
-        print(judged_version.summary)
+            for table in judgement_tables(judged_version.judgement):
+                _LOG.info(table)
+            _LOG.info(judgement_line(judged_version.judgement))
+        _LOG.info(judged_version.summary)

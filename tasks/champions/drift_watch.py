@@ -91,9 +91,7 @@ def _of_run(folder: Path) -> BenchmarkedMemory | None:
     return BenchmarkedMemory(f"{run.name}/{memory_folder.name}", benchmark, run.parent.parent)
 
 
-def report_drift(
-    memory: BenchmarkedMemory | None, now: Mapping[str, Usefulness], data: Path | None
-) -> list[str]:
+def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data: Path | None) -> list[str]:
     """Compare a memory with its benchmark, store the comparison, and send it to Prefect.
 
     Neither a failure to store nor a failure to send is raised: the problems are solved.
@@ -101,7 +99,7 @@ def report_drift(
     Parameters
     ----------
     memory
-        The memory with its benchmark, or None, which reports nothing.
+        The memory with its benchmark.
     now
         How useful the memory was just now, by planner and configuration.
     data
@@ -109,11 +107,9 @@ def report_drift(
 
     Returns
     -------
-    The lines to print.
+    A line for each comparison.
 
     """
-    if memory is None:
-        return []
     comparisons = drifts(memory.name, now, memory.benchmark)
     lines = [str(drift) for drift in comparisons]
     lines += _store(memory.data_folder, comparisons)

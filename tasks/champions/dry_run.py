@@ -1,11 +1,11 @@
-"""The command ``retrain --dry-run``: print what retraining would do, and write nothing."""
+"""The command ``retrain --dry-run``: say what retraining would do, and change nothing."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
-from dashboards.cells import rich_table
+from dashboards.cells import CellTable
 from planners.world.vehicles.vehicle import vehicle_named
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
@@ -15,7 +15,6 @@ from tasks.champions.new_experience import PendingRetraining, pending_retraining
 from tasks.inputs.champion_run import champion_run
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.registry.champion_registry import Registry
-from tasks.reports.report import console
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.curate import chosen
 from tasks.stages.hallucinate import plans_at_once
@@ -23,25 +22,35 @@ from tasks.stages.hallucinate import plans_at_once
 HEADINGS: Final = ("class", "champion", "new experiences", "plans that change", "shards hallucinated anew")
 
 
-def dry_run(data: Path, settings: RunSettings) -> None:
-    """Print what retraining would do now. Raises RunError if the registry cannot be reached."""
+def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
+    """Say in lines and a table what retraining would do now.
+
+    Args:
+        data: the data folder, which may not be there yet.
+        settings: of a run.
+
+    Raises:
+        RunError: the registry cannot be reached.
+
+    """
     path = local_place(data).expanduser().absolute()
     if not fetch(path / MARK).is_file():
-        print(f"{data} is no data folder yet: the run {settings.run_name} would make the first champions.")
-        return
+        return [f"{data} is no data folder yet: the run {settings.run_name} would make the first champions."]
     folder = DataFolder(path)
     pending = pending_retraining(folder, settings, Registry(folder))
+    said: list[str | CellTable] = []
     first_run = pending.first_run
     if first_run is not None:
         names = ", ".join([*first_run.class_names, *([COMBINED] if first_run.combined else [])])
-        print(f"No champion yet of {names}: the run {first_run.run_name} would make the first.")
+        said.append(f"No champion yet of {names}: the run {first_run.run_name} would make the first.")
     rows = [
         _row(folder, settings, pending, name) for name in settings.class_names if name in pending.champions
     ]
     if rows:
-        console().print(rich_table("Retraining now", HEADINGS, [rows]))
+        said.append(CellTable("Retraining now", HEADINGS, [rows]))
     if first_run is None and not pending.fresh:
-        print("Nothing new was learned since champions were last judged: nothing would be done.")
+        said.append("Nothing new was learned since champions were last judged: nothing would be done.")
+    return said
 
 
 def _row(folder: DataFolder, settings: RunSettings, pending: PendingRetraining, name: str) -> list[str]:

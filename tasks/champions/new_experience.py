@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,8 @@ from tasks.settings.retraining_settings import Champion, Retraining
 from tasks.settings.run_settings import COMBINED, RunSettings, world_class
 
 WARM_SHARE: Final = 0.5  # of the epochs: an encoder that starts from trained weights needs fewer
+
+_LOG = logging.getLogger(__name__)
 
 
 class RetrainingRun(NamedTuple):
@@ -113,7 +116,7 @@ def settings_for(settings: RunSettings, memories: Sequence[str]) -> RunSettings:
 def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) -> list[RetrainingRun]:
     """The runs of a retraining: one makes first champions, one makes challengers from new experiences.
 
-    A line about each memory with a champion is printed. The new experiences are frozen under the number of
+    A line about each memory with a champion is logged. The new experiences are frozen under the number of
     the retraining, and the champions are copied into the folder of the run. A retraining that was interrupted
     uses the same experiences and the same copies again.
 
@@ -143,7 +146,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
     if pending.first_run is not None:
         runs.append(RetrainingRun(pending.first_run, pending.without_champion, {}))
     for memory, champion in pending.champions.items():
-        print(_summary(memory, champion, pending))
+        _LOG.info(_summary(memory, champion, pending))
     if pending.fresh:
         runs.append(_challenger_run(folder, settings, registry, pending))
     return runs

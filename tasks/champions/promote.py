@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.mirror import fetch, local_place
@@ -17,6 +18,14 @@ from tasks.registry.champion_registry import (
     Version,
 )
 from tasks.settings.errors import RunError
+
+
+class ChampionChange(NamedTuple):
+    """A memory whose champion has changed."""
+
+    name: str  # in the registry
+    before: int  # number of the version that was champion
+    now: int
 
 
 def promote(registry: Registry, challenger: Version) -> None:
@@ -38,7 +47,7 @@ def promote(registry: Registry, challenger: Version) -> None:
     registry.set_alias(challenger)
 
 
-def promote_awaiting(data: Path, memory: str | None) -> None:
+def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
     """Promote the challengers that await approval.
 
     Parameters
@@ -47,6 +56,10 @@ def promote_awaiting(data: Path, memory: str | None) -> None:
         The data folder.
     memory
         The memory whose challenger is promoted; None promotes those of all memories.
+
+    Returns
+    -------
+    The changes of champions.
 
     Raises
     ------
@@ -63,14 +76,16 @@ def promote_awaiting(data: Path, memory: str | None) -> None:
     ]
     if not awaiting:
         raise RunError(f"{_subject(memory)} no challenger awaits approval; `retrain --approve` leaves one.")
+    changes = []
     for challenger in awaiting:
         promote(registry, challenger)
         registry.tagged(challenger, {"verdict": PROMOTED})
         registry.drop(challenger.name, CHALLENGER)
-        print(f"{challenger.name}: version {challenger.number} is champion, was {challenger.tag('against')}")
+        changes.append(ChampionChange(challenger.name, int(challenger.tag("against")), challenger.number))
+    return changes
 
 
-def roll_back(data: Path, memory: str | None) -> None:
+def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
     """Make the champion before the current one champion again.
 
     Parameters
@@ -79,6 +94,10 @@ def roll_back(data: Path, memory: str | None) -> None:
         The data folder.
     memory
         The memory whose champion changes; None changes those that the last retraining promoted.
+
+    Returns
+    -------
+    The changes of champions.
 
     Raises
     ------
@@ -92,6 +111,7 @@ def roll_back(data: Path, memory: str | None) -> None:
     if not champions:
         raise RunError(f"{_subject(memory)} no champion has one before it: nothing to roll back to.")
     last = max(champion.retraining for champion in champions)
+    changes = []
     for champion in champions:
         if memory is None and champion.retraining != last:
             continue
@@ -112,7 +132,8 @@ def roll_back(data: Path, memory: str | None) -> None:
         registry.set_alias(
             before
         )  # last: a roll back killed before this line goes back one version when repeated
-        print(f"{champion.name}: version {before.number} is champion again, was {champion.number}")
+        changes.append(ChampionChange(champion.name, champion.number, before.number))
+    return changes
 
 
 def _registry(data: Path) -> Registry:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import signal
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -32,9 +32,12 @@ QUERY_SECONDS: Final = 2.0  # between two questions to the server
 CRON_FIELDS: Final = 5
 END_SECONDS: Final = 5.0  # a retraining may take so long to end after Ctrl-C; then it is killed
 
+_LOG = logging.getLogger(__name__)
+
 
 def serve(
     flow: Callable[[], Flow[..., Any]],
+    entrypoint: str,
     settings: RunSettings,
     data: Path,
     every: float | None,
@@ -47,6 +50,7 @@ def serve(
 
     Args:
         flow: imports and returns the flow that retrains; called once Prefect's environment is set.
+        entrypoint: module and name from which the process of a retraining imports that flow.
         settings: of each retraining.
         data: the data folder.
         every: seconds from one retraining to the next; a day if neither this nor ``cron`` is given.
@@ -71,23 +75,23 @@ def serve(
         "scheduler": scheduler,
     }
     with local_server(data_path) as server:
-        deployment = _deployment(flow(), schedule, parameters)
+        deployment = _deployment(flow(), entrypoint, schedule, parameters)
         if server is not None:
             server.wait()
-            print(server, file=sys.stderr)
+            _LOG.info(str(server))
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
-        print(f"retrains {when}, and when hits have fallen; Ctrl-C ends it", flush=True)
+        _LOG.info("retrains %s, and when hits have fallen; Ctrl-C ends it", when)
         try:
             _run(deployment)
         finally:
             _end_children()
 
 
-def print_failure(_flow: Any, flow_run: Any, state: Any) -> None:
-    """Print why a retraining failed, if the schedule started it; the command ``retrain`` prints it itself."""
+def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
+    """Log why a retraining failed, if the schedule started it; the command ``retrain`` says so itself."""
     if flow_run.deployment_id is not None:
         reason = " ".join(str(state.message).split())
-        print(f"motion-memory: {reason.partition('exception: ')[2] or reason}", file=sys.stderr, flush=True)
+        _LOG.error("motion-memory: %s", reason.partition("exception: ")[2] or reason)
 
 
 def _schedule(every: float | None, cron: str | None) -> dict[str, Any]:
@@ -106,7 +110,7 @@ def _no_cron(text: str) -> UsageError:
 
 
 def _deployment(
-    flow: Flow[..., Any], schedule: dict[str, Any], parameters: dict[str, Any]
+    flow: Flow[..., Any], entrypoint: str, schedule: dict[str, Any], parameters: dict[str, Any]
 ) -> RunnerDeployment:
     """A deployment that retrains on the schedule, and whenever a drift event arrives."""
     from prefect.deployments.runner import RunnerDeployment
@@ -114,7 +118,7 @@ def _deployment(
     from prefect.types.entrypoint import EntrypointType
 
     try:
-        return RunnerDeployment.from_flow(
+        deployment = RunnerDeployment.from_flow(
             flow,
             NAME,
             **schedule,
@@ -127,6 +131,8 @@ def _deployment(
         if "cron" not in schedule:
             raise
         raise _no_cron(schedule["cron"]) from error
+    deployment.entrypoint = entrypoint
+    return deployment
 
 
 def _run(deployment: RunnerDeployment) -> None:

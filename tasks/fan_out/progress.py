@@ -1,49 +1,50 @@
-"""Show the progress of work on the error stream."""
+"""Tell how far work has come, through the log: ``flows.cli`` shows it as a bar or as lines."""
 
 from __future__ import annotations
 
-import sys
+import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from dataclasses import dataclass, replace
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+_LOG = logging.getLogger(__name__)
 
-LINE_SECONDS: Final = 5.0  # between two lines of progress, if the stream is no terminal
+
+@dataclass(frozen=True)
+class Progress:
+    """How far some work has come: a message in the log, at the level DEBUG."""
+
+    work: str
+    done: int  # items
+    total: int  # items; 0 if it is not known yet
+    began: float  # time.monotonic()
+    over: bool  # whether the work has ended, successfully or not
+    end_is_told: bool  # whether its end is worth a line if it took too little time for any other
 
 
 @contextmanager
-def progress(description: str, total: int = 0, ended: bool = True) -> Iterator[Callable[..., None]]:
-    """Show a bar with the time left on a terminal; elsewhere, print a line every few seconds.
+def progress(work: str, total: int = 0, end_is_told: bool = True) -> Iterator[Callable[..., None]]:
+    """Tell the progress of work while it is done.
 
     Args:
-        description: what is being done.
+        work: what is being done.
         total: number of items; 0 if it is not known yet.
-        ended: whether to print a line at the end of work that was too short for any other line.
+        end_is_told: whether the end of short work is worth a line.
 
     Yields:
         a function to call with the number of finished items, and with the number of all if ``total`` was 0.
 
     """
-    console = Console(file=sys.stderr)
     began = time.monotonic()
-    if console.is_terminal:
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with Progress(*columns, console=console) as bar:
-            row = bar.add_task(description, total=total)
-            yield lambda done, of=total: bar.update(row, completed=done, total=of)
-        return
-    last_line = began
-    complete = not ended
+    last = Progress(work, 0, total, began, False, end_is_told)
 
-    def print_line(done: int, of: int = total) -> None:
-        nonlocal last_line, complete
-        now = time.monotonic()
-        if now - last_line >= LINE_SECONDS or (done == of and not complete):
-            last_line, complete = now, done == of
-            left = f", {(now - began) / done * (of - done):.0f} s left" if 0 < done < of else ""
-            console.print(f"{description}: {done} of {of} after {now - began:.0f} s{left}", highlight=False)
+    def tell(done: int, of: int = total) -> None:
+        nonlocal last
+        last = replace(last, done=done, total=of)
+        _LOG.debug(last)
 
-    yield print_line
+    try:
+        yield tell
+    finally:
+        _LOG.debug(replace(last, over=True))

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from dashboards.cells import markdown_table, rich_table
+from dashboards.cells import CellTable, as_markdown, markdown_table
 from dashboards.verdicts.comparison import alarms, compare_runs, verdict
-from dashboards.verdicts.comparison_tables import BY_COUNTS, IN_TURN, comparison_markdown, comparison_table
+from dashboards.verdicts.comparison_tables import BY_COUNTS, IN_TURN, comparison_tables
 from storage.errors import StorageError
 from storage.places.data_folder import open_run
 from storage.places.files import whole_file
 from storage.tables.attempts import read_attempts
-from tasks.reports.report import NOT_NEEDED, console
+from tasks.reports.report import NOT_NEEDED
 from tasks.settings.checks import check_outputs
 from tasks.settings.errors import UsageError
 from tasks.settings.recorded_settings import recorded_settings
@@ -26,10 +26,28 @@ from tasks.settings.run_settings import RunSettings
 ENDINGS: Final = (".md", ".json", ".csv")
 
 
+class Comparison(NamedTuple):
+    """What differs between runs."""
+
+    names: Sequence[str]  # of the runs, the one first that the others are compared with
+    different: list[list[str]]  # of each setting in which they differ the name, then the value of each run
+    how: str  # what is judged by, in words
+    tables: dict[str, pd.DataFrame]  # of each other run the rows of ``compare_runs``
+
+    def told(self) -> Iterator[str | CellTable]:
+        """All of it in lines and tables."""
+        yield CellTable("What differs", ("setting", *self.names), [self.different])
+        yield self.how
+        for name, rows in self.tables.items():
+            yield f"{name} against {self.names[0]}: {verdict(rows)}"
+            yield from alarms(rows)
+            yield from comparison_tables(rows)
+
+
 def compare(
     runs: Sequence[Path], out: Path | None, measure: bool = False, problems: int | None = None
-) -> None:
-    """Print in which settings runs differ, and what each does better or worse than the first.
+) -> Comparison:
+    """Compare runs: in which settings they differ, and what each does better or worse than the first.
 
     Args:
         runs: folders of runs.
@@ -62,19 +80,11 @@ def compare(
                 f"{name} and {names[0]} have no attempt at the same problem in common; benchmark both with "
                 "the same classes, difficulty and seed."
             )
-    headings = ("setting", *names)
-    console().print(rich_table("What differs", headings, [different]))
     how = IN_TURN if measure else BY_COUNTS
-    console().print(how)
-    for name, rows in tables.items():
-        console().print(f"[bold]{name}[/bold] against {names[0]}: {verdict(rows)}")
-        for line in alarms(rows):
-            console().print(line)
-        console().print(comparison_table(rows))
     if out is not None:
         with whole_file(out) as temporary:
             temporary.write_text(_written(out.suffix, names, different, tables, how), encoding="utf-8")
-        print(f"compared {out}")
+    return Comparison(names, different, how, tables)
 
 
 def _measured(
@@ -103,7 +113,7 @@ def _written(
     parts = [title, f"{how}\n", markdown_table(("setting", *names), different)]
     for name, rows in tables.items():
         parts += [f"## {name}: {verdict(rows)}\n", *(f"{line}\n" for line in alarms(rows))]
-        parts.append(comparison_markdown(rows))
+        parts.append(as_markdown(comparison_tables(rows)))
     return "\n".join(parts)
 
 

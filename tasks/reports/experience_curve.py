@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,10 +14,11 @@ from dashboards.report.tables import experience_table
 from dashboards.statistics.experience_recall import experience_rows
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import run_folder
-from tasks.reports.report import console
 from tasks.settings.fewer_experiences import runs_of_continual
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.measure_recall import MEASURE_RECALL
+
+_LOG = logging.getLogger(__name__)
 
 
 def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
@@ -28,9 +30,9 @@ def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
 
 
 def report_curve(data: str, runs: Sequence[RunSettings]) -> None:
-    """Print the curve of some runs, and draw it among the figures of the last one, the largest."""
+    """Log the curve of some runs, and draw it among the figures of the last one, the largest."""
     rows = pd.concat([_rows(data, run) for run in runs], ignore_index=True)
-    console().print(experience_table(rows))
+    _LOG.info(experience_table(rows))
     save(experience_chart(rows), run_folder(data, runs[-1]).figures, "experience-curve")
 
 

@@ -51,7 +51,6 @@ def export_run(folder: Path, form: str, out: Path) -> None:
                 write_planner_arena(temporary, classes, _origin(run))
             else:
                 _write_csv(temporary, run.results)
-    print(f"exported {out}")
 
 
 def _write_csv(path: Path, results: Path) -> None:

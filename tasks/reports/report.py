@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -9,7 +10,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import pandas as pd
-from rich.console import Console
 
 from dashboards.figures.bars import ablation, controls, planning_times, time_split
 from dashboards.figures.planning_curves import continual_improvement, performance_profile, solved_against_time
@@ -23,7 +23,7 @@ from dashboards.report.tables import (
     retrieval_table,
     stages_table,
     summary_markdown,
-    summary_table,
+    summary_tables,
     sweep_table,
 )
 from dashboards.statistics.distributions import performance_profile as profile_curve
@@ -49,7 +49,6 @@ from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.measure_recall import MEASURE_RECALL
 from tasks.stages.sweep import sweep_rows
 
-COLUMNS: Final = 110  # width of tables that are not printed to a terminal
 NOT_NEEDED: Final = (
     "recalled", "run_id", "vehicle", "seed", "nodes", "expansions", "length_m",
     "host", "commit",
@@ -60,6 +59,8 @@ MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared b
 )  # fmt: skip
 ALIKE: Final = ("classes", "worlds", "difficulty", "seed", "vehicle")  # of runs by the two methods
 MEASURED_ON: Final = ["problem_class", "planner"]
+
+_LOG = logging.getLogger(__name__)
 
 
 class Report(NamedTuple):
@@ -215,26 +216,22 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
     return read_recalls([chunk.shard("recalls") for chunk in MEASURE_RECALL.chunks(data, settings)])
 
 
-def show(report: Report, run: RunFolder) -> None:
-    """Print the tables, and how long each stage took."""
-    console().print(summary_table(report.summary))
-    show_retrieval(report.retrieval)
-    console().print(stages_table(stage_cells(stages_of(run))))
+def log_tables(report: Report, run: RunFolder) -> None:
+    """Log the tables of a report, and how long each stage took."""
+    for table in summary_tables(report.summary):
+        _LOG.info(table)
+    log_retrieval(report.retrieval)
+    _LOG.info(stages_table(stage_cells(stages_of(run))))
 
 
-def show_retrieval(retrieval: pd.DataFrame) -> None:
-    """Print what the memories recall."""
-    console().print(retrieval_table(retrieval))
+def log_retrieval(retrieval: pd.DataFrame) -> None:
+    """Log what the memories recall."""
+    _LOG.info(retrieval_table(retrieval))
 
 
-def show_sweep(chunks: Iterable[Chunk]) -> None:
-    """Print how well each variant of a sweep ranks."""
-    console().print(sweep_table(sweep_rows(chunks)))
-
-
-def console() -> Console:
-    """The console that tables are printed on, as wide as the terminal if there is one."""
-    return Console(width=None if Console().is_terminal else COLUMNS, highlight=False)
+def log_variants(chunks: Iterable[Chunk]) -> None:
+    """Log how well each variant of a sweep ranks."""
+    _LOG.info(sweep_table(sweep_rows(chunks)))
 
 
 def _write(path: Path, text: str) -> None:

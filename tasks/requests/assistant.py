@@ -172,8 +172,8 @@ def plan_one(
     drawing: Path | None,
     explained: bool = False,
     learn: Path | None = None,
-) -> None:
-    """Plan for the one problem in a file, and print a line about the plan.
+) -> tuple[Attempt, Plan]:
+    """Plan for the one problem in a file.
 
     Parameters
     ----------
@@ -184,9 +184,13 @@ def plan_one(
     out, drawing
         Where to write the plan and a picture, or None.
     explained
-        Whether to print and draw the recalled plans, where they collide and how they were used.
+        Whether to log and draw the recalled plans, where they collide and how they were used.
     learn
         The data folder to which the problem and its plan are added as an experience, or None.
+
+    Returns
+    -------
+    The attempt and its plan, in the frame of the problem.
 
     Raises
     ------
@@ -221,19 +225,16 @@ def plan_one(
         _explain(assistant, problems[0], attempt, recalled)
     if plan is None:
         raise RunError(f"No plan for {problems[0].id or problem}: {summary}.")
-    print(f"{summary}, {problems[0].scale * plan.length_m:.1f} m, {plan.duration_s:.1f} s")
-    for label, path in (("plan", out), ("picture", drawing)):
-        if path is not None:
-            print(f"{label:8} {path}")
+    return attempt, plan
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
-    from tasks.requests.explain import print_explanation  # late: tables cost a tenth of a second
+    from tasks.requests.explain import log_explanation  # late: tables cost a tenth of a second
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
     recollected = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
-    print_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale)
+    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale)
 
 
 def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:

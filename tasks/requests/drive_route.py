@@ -7,11 +7,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
+from dashboards.cells import CellTable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
 from planners.solve import WITHOUT_MEMORY, Attempt
@@ -31,6 +29,7 @@ from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
+HEADINGS: Final = ("leg", "source", "driven m", "turning m", "s", "planning ms", "retrieval ms")
 RETRIEVAL: Final = (
     "occupancy",
     "encode",
@@ -62,6 +61,13 @@ class _Solver:
         return attempt
 
 
+class DrivenRoute(NamedTuple):
+    """A route, as its legs and as a whole."""
+
+    legs: CellTable
+    summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
+
+
 def _numbers_of(text: str, count: int, option: str, meaning: str) -> tuple[float, ...]:
     """The numbers in a text like ``1,2``. Raises UsageError unless there are ``count``, all finite."""
     try:
@@ -82,8 +88,8 @@ def drive_route(
     settings: ImportSettings,
     out: Path | None,
     drawing: Path | None,
-) -> None:
-    """Plan a route over a map, check it as one plan, write plan and picture, and print a table of its legs.
+) -> DrivenRoute:
+    """Plan a route over a map, check it as one plan, and write plan and picture.
 
     Parameters
     ----------
@@ -159,11 +165,7 @@ def drive_route(
         figure = route_picture(world, route, goals_m, scale, summary[0], assistant.vehicle)
         with whole_file(drawing) as temporary:
             figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
-    Console(highlight=False).print(_table(route, assistant, scale))
-    print(*summary, sep="\n")
-    for label, written_path in (("plan", out), ("picture", drawing)):
-        if written_path is not None:
-            print(f"{label:8} {written_path}")
+    return DrivenRoute(_table(route, assistant, scale), summary)
 
 
 def _drive_mirrored(
@@ -220,16 +222,14 @@ def _driven_m(leg: Leg, assistant: Assistant) -> float:
     return Plan(states, leg.controls[: leg.driving]).length_m
 
 
-def _table(route: Route, assistant: Assistant, scale: float) -> Table:
-    table = Table("leg", "source", "driven m", "turning m", "s", "planning ms", "retrieval ms", box=None)
-    for column in table.columns[2:]:
-        column.justify = "right"
+def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
+    rows = []
     for number, leg in enumerate(route.legs, start=1):
         states, driven = leg.states(assistant.vehicle), _driven_m(leg, assistant)
         whole = Plan(states, leg.controls, assistant.vehicle.dt)
         retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
         used_memory = leg.attempt.assist not in WITHOUT_MEMORY
-        table.add_row(
+        cells = [
             f"{number}",
             leg.source,
             f"{scale * driven:.1f}",
@@ -237,14 +237,15 @@ def _table(route: Route, assistant: Assistant, scale: float) -> Table:
             f"{whole.duration_s:.1f}",
             f"{1000.0 * leg.attempt.planning_seconds:.2f}",
             f"{1000.0 * retrieval:.2f}" if used_memory else "-",
-        )
-    return table
+        ]
+        rows.append(cells)
+    return CellTable("", HEADINGS, [rows])
 
 
 def _summary(
     route: Route, plan: Plan, solver: _Solver, assistant: Assistant, scale: float, seconds: float
 ) -> list[str]:
-    """The lines to print: the whole route, the share that came from memory, the planning times."""
+    """Lines: the whole route, the share that came from memory, the planning times."""
     legs = route.legs
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES

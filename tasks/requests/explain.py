@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
-from rich.console import Console
-from rich.table import Table
-
+from dashboards.cells import CellTable
 from planners.explanation import Recollection
 from planners.memory.memory import Memory
 from planners.solve import Attempt
@@ -20,15 +19,18 @@ USES: Final = {
     "guide": "guided the search",
     "": "",
 }
+HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
+
+_LOG = logging.getLogger(__name__)
 
 
-def print_explanation(
+def log_explanation(
     attempt: Attempt,
     memory: Memory | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
 ) -> None:
-    """Print how the memory was used, a table of the recalled plans, the work done and the times.
+    """Log how the memory was used, a table of the recalled plans, the work done and the times.
 
     Parameters
     ----------
@@ -42,14 +44,12 @@ def print_explanation(
         How many metres of the problem are one canonical metre.
 
     """
-    print(_recall_line(attempt, memory, recalled))
+    _LOG.info(_recall_line(attempt, memory, recalled))
     if recalled:
-        Console(highlight=False).print(_table(recalled, scale))
-    print(
-        f"work     {attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions, "
-        f"{attempt.nodes:,} nodes"
-    )
-    print(f"ms       {_times(attempt)}")
+        _LOG.info(_table(recalled, scale))
+    work = f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions"
+    _LOG.info("work     %s, %s nodes", work, f"{attempt.nodes:,}")
+    _LOG.info("ms       %s", _times(attempt))
 
 
 def _recall_line(
@@ -66,16 +66,14 @@ def _recall_line(
     return f"{line}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
 
 
-def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> Table:
-    table = Table("", "plan", "rank", "cells", "states", "first", "at", "use", box=None)
-    for column in table.columns[:-1]:
-        column.justify, column.no_wrap = "right", True
+def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellTable:
+    rows = []
     for position, (recollection, plan) in enumerate(recalled, start=1):
         first = recollection.first_blocked
         x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
         missed_m = recollection.goal_missed_m
         missed = f"ends {scale * missed_m:.1f} m off the goal" if missed_m > 1e-9 else ""
-        table.add_row(
+        cells = [
             f"{position}",
             f"{recollection.plan}",
             f"{recollection.encoder_rank}",
@@ -84,8 +82,9 @@ def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> Table
             "-" if first is None else f"{first}",
             "-" if first is None else f"({x:.1f}, {y:.1f})",
             USES[recollection.use] or missed,
-        )
-    return table
+        ]
+        rows.append(cells)
+    return CellTable("", HEADINGS, [rows])
 
 
 def _times(attempt: Attempt) -> str:

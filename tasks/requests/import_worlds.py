@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import math
-import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from rich.console import Console
-from rich.table import Table
-
+from dashboards.cells import CellTable
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
@@ -28,6 +26,10 @@ PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
 SHOWN_SKIPPED: Final = 20
 ONLY_OF_MAPS: Final = {"scale": 1.0, "tolerance_m": 0.0, "seed": 1}  # options with their defaults
+
+HEADINGS: Final = ("class", "part", "problems", "skipped", "pieces", "a problem", "seconds")
+
+_LOG = logging.getLogger(__name__)
 
 Unknown = Literal["occupied", "free"]
 
@@ -100,8 +102,8 @@ def import_worlds(
     part: str,
     settings: ImportSettings,
     drawing: Path | None,
-) -> None:
-    """Import worlds or a map, write the problems, and print a table of them.
+) -> CellTable:
+    """Import worlds or a map, and write the problems.
 
     Parameters
     ----------
@@ -117,6 +119,10 @@ def import_worlds(
         How worlds and maps are read.
     drawing
         Where to draw the map and the problems, or None.
+
+    Returns
+    -------
+    A table that counts the problems of each part.
 
     Raises
     ------
@@ -138,20 +144,19 @@ def import_worlds(
     if out.suffix == "":
         _refuse_foreign(out, source)
     parts: tuple[Part, ...] = ("train", "test") if part == BOTH else tuple(p for p in PARTS if p == part)
-    table = Table("class", "part", "problems", "skipped", "pieces", "a problem", "seconds", box=None)
+    rows = []
     imported_parts: dict[Part, Imported] = {}
     for name in parts:
         began = time.perf_counter()
-        with progress(f"import {name}", ended=False) as show:
+        with progress(f"import {name}", end_is_told=False) as show:
             imported_parts[name] = import_part(source, name, settings, show)
-        _add_row(table, source, name, imported_parts[name], time.perf_counter() - began)
+        rows.append(_cells(source, name, imported_parts[name], time.perf_counter() - began))
     _refuse_empty(source, out, imported_parts)
     _write(out, imported_parts)
     if drawing is not None:
         _draw(source, settings, imported_parts, drawing)
-    Console().print(table)
-    _print_skipped([line for imported in imported_parts.values() for line in imported.skipped])
-    print(f"problems {out}")
+    _warn_of_skipped([line for imported in imported_parts.values() for line in imported.skipped])
+    return CellTable("", HEADINGS, [[row] for row in rows])
 
 
 def _write(out: Path, imported_parts: Mapping[Part, Imported]) -> None:
@@ -200,26 +205,19 @@ def _refuse_empty(source: Source, out: Path, imported_parts: Mapping[Part, Impor
         raise RunError(f"{source.path} holds no usable problem of part {empty[0]} ({reason}).")
 
 
-def _add_row(table: Table, source: Source, part: str, imported: Imported, seconds: float) -> None:
+def _cells(source: Source, part: str, imported: Imported, seconds: float) -> list[str]:
     pieces = sum(len(problem.obstacles.piece_starts) - 1 for problem in imported.problems)
     mean = pieces / len(imported.problems) if imported.problems else 0.0
     counts = (len(imported.problems), len(imported.skipped), pieces)
-    table.add_row(
-        source.class_name, part, *(f"{count:,}" for count in counts), f"{mean:.1f}", f"{seconds:.1f}"
-    )
+    return [source.class_name, part, *(f"{count:,}" for count in counts), f"{mean:.1f}", f"{seconds:.1f}"]
 
 
-def _print_skipped(skipped: list[tuple[str, str]]) -> None:
+def _warn_of_skipped(skipped: list[tuple[str, str]]) -> None:
     if skipped:
         shown = [f"{item}: {reason}" for item, reason in skipped[:SHOWN_SKIPPED]]
         more = [f"and {len(skipped) - SHOWN_SKIPPED:,} more"] * (len(skipped) > SHOWN_SKIPPED)
-        print(
-            f"{len(skipped):,} skipped (use --strict to stop instead):",
-            *shown,
-            *more,
-            sep="\n  ",
-            file=sys.stderr,
-        )
+        heading = f"{len(skipped):,} skipped (use --strict to stop instead):"
+        _LOG.warning("\n  ".join([heading, *shown, *more]))
 
 
 def _draw(
@@ -231,4 +229,3 @@ def _draw(
     figure = map_picture(load_map(source, settings), cuts, settings.scale, settings.vehicle)
     with whole_file(drawing) as temporary:
         figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
-    print(f"picture  {drawing}")

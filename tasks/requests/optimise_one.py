@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Final
+from typing import Final, NamedTuple
 
 from dashboards.figures.pictures import picture
 from planners.optimisation.clearance_field import least_clearance
@@ -22,6 +23,8 @@ from tasks.settings.checks import check_known, check_outputs, check_picture, che
 from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -52,13 +55,22 @@ class InitialGuess:
         return outcome.plan, self.planner
 
     def warn_of_other_problem(self, problem: Problem) -> None:
-        """Print a line if the plan file was made for another problem."""
+        """Warn if the plan file was made for another problem."""
         record = None if self.plan is None else read_plan(self.plan, self.vehicle)
         if record is not None and (record.problem_id, record.scale) != (problem.id, problem.scale):
-            print(
-                f"only a guess: {self.plan} is for problem {record.problem_id} of scale {record.scale:g}, "
-                f"not for {problem.id} of scale {problem.scale:g}"
-            )
+            made_for = f"problem {record.problem_id} of scale {record.scale:g}"
+            wanted = f"{problem.id} of scale {problem.scale:g}"
+            _LOG.warning("only a guess: %s is for %s, not for %s", self.plan, made_for, wanted)
+
+
+class OptimisedOne(NamedTuple):
+    """How a plan was optimised, and the plan that came of it, in metres of the problem."""
+
+    summary: str  # how it ended, after how many iterations and milliseconds
+    length_m: float
+    duration_s: float
+    guess_duration_s: float
+    clearance_m: float  # the least distance to an obstacle
 
 
 def initial_guess(
@@ -97,8 +109,8 @@ def initial_guess(
 
 def optimise_one(
     initial: InitialGuess, problem_file: Path, clearance_weight: float, out: Path | None, drawing: Path | None
-) -> None:
-    """Optimise a plan for the one problem in a file, and print a line about it.
+) -> OptimisedOne:
+    """Optimise a plan for the one problem in a file.
 
     Parameters
     ----------
@@ -146,13 +158,13 @@ def optimise_one(
     if optimised.plan is None:
         raise RunError(f"No plan for {problem.id or problem_file}: {summary}.")
     clearance = least_clearance(problem, optimised.plan.states, initial.vehicle)
-    print(
-        f"{summary}, {problem.scale * optimised.plan.length_m:.1f} m, {optimised.plan.duration_s:.1f} s"
-        f" (guess: {guess.duration_s:.1f} s), {problem.scale * clearance:.2f} m clear"
+    return OptimisedOne(
+        summary,
+        problem.scale * optimised.plan.length_m,
+        optimised.plan.duration_s,
+        guess.duration_s,
+        problem.scale * clearance,
     )
-    for label, path in (("plan", out), ("picture", drawing)):
-        if path is not None:
-            print(f"{label:8} {path}")
 
 
 def _record(

@@ -50,6 +50,21 @@ class Tally(NamedTuple):
     repeated_id: str | None  # a message about an id that occurs twice, or None
 
 
+class SolvedMany(NamedTuple):
+    """What became of the problems of a file."""
+
+    tally: Tally
+    solved_now: int  # problems that were attempted by this command; an earlier one attempted the others
+    seconds: float  # that these took
+    drift: Sequence[str]  # lines on how the memory did beside its benchmark
+
+    @property
+    def planning_seconds(self) -> tuple[float, float, float]:
+        """Mean, median and 90 % quantile of the planning times."""
+        median, ninth = np.quantile(self.tally.seconds, [0.5, 0.9]).tolist()
+        return float(self.tally.seconds.mean()), median, ninth
+
+
 def solve_many(
     settings: AssistantSettings,
     problems: Path,
@@ -58,8 +73,8 @@ def solve_many(
     learn: Path | None = None,
     workers: int = 1,
     flow: SolveFlow | None = None,
-) -> None:
-    """Solve every problem of a file, write one attempt row each, and print a summary.
+) -> SolvedMany:
+    """Solve every problem of a file, and write one attempt row each.
 
     If the command is killed, the same command solves only what is left.
 
@@ -109,14 +124,13 @@ def solve_many(
                 raise StorageError(tally.repeated_id)
             join_attempts(out, [part.shard for part in parts])
             remove_folder(request.folder)
-    _print_summary(request, tally, sum(part.problem_slice.count for part in left), seconds)
-    if benchmarked is not None:
-        _print_drift(benchmarked, request, tally)
+    solved_now = sum(part.problem_slice.count for part in left)
+    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request, tally))
 
 
 def _in_this_process(parts: Sequence[FilePart]) -> list[PartResult]:
     numbers = count(1)  # of the problems, as they are solved
-    with progress("solve", sum(part.problem_slice.count for part in parts), ended=False) as show:
+    with progress("solve", sum(part.problem_slice.count for part in parts), end_is_told=False) as show:
         return [solve_part_reporting(part, lambda: show(next(numbers))) for part in parts]
 
 
@@ -163,8 +177,10 @@ def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
     return benchmarked_memory(memory)
 
 
-def _print_drift(memory: BenchmarkedMemory, request: SolveRequest, tally: Tally) -> None:
+def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally) -> Sequence[str]:
     """Compare the memory with its benchmark; all rows are of one planner and configuration."""
+    if memory is None:
+        return []
     import pandas as pd
 
     from dashboards.verdicts.drift import usefulness_of
@@ -174,8 +190,7 @@ def _print_drift(memory: BenchmarkedMemory, request: SolveRequest, tally: Tally)
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
     now = usefulness_of(tally.outcomes["recalled"], tally.seconds, tally.driving)
-    for line in report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn):
-        print(f"watched  {line}")
+    return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)
 
 
 def _repeated_id(parts: Sequence[FilePart], id_hashes: Floats) -> str | None:
@@ -199,20 +214,3 @@ def _location_and_id(parts: Sequence[FilePart], ends: Floats, index: int) -> tup
     identity = attempt_columns(part.shard, ["problem_id"])["problem_id"][within]
     path = part.problem_slice.path
     return f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}", identity
-
-
-def _print_summary(request: SolveRequest, tally: Tally, solved_now: int, seconds: float) -> None:
-    """Print the summary."""
-    count = len(tally.seconds)
-    solved = sum(number for outcome, number in tally.outcomes.items() if not outcome.startswith("("))
-    outcomes = ", ".join(f"{outcome} {number:,}" for outcome, number in tally.outcomes.most_common())
-    mean_ms, (median_ms, ninth_ms) = 1e3 * tally.seconds.mean(), 1e3 * np.quantile(tally.seconds, [0.5, 0.9])
-    lines = [
-        ("solved", f"{solved:,} of {count:,} ({solved / count:.2%}): {outcomes}"),
-        ("planning", f"mean {mean_ms:.2f} ms, median {median_ms:.2f} ms, 90 % {ninth_ms:.2f} ms"),
-        ("speed", f"{solved_now / seconds:,.0f} problems/s: {solved_now:,} in {seconds:,.1f} s"),
-        ("rows", str(request.out)),
-        ("plans", None if request.plans is None else str(request.plans)),
-        ("learned", None if request.learn is None else str(request.learn)),
-    ]
-    print(*(f"{name:9}{text}" for name, text in lines if text is not None), sep="\n")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -49,14 +49,16 @@ from tasks.stages.measure_recall import LONGEST_ORDER
 
 LABELS_EVERY: Final = 50  # one hallucinated problem in so many has its grid and labels made again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
-MOST_FAULTS_PRINTED: Final = 20
+MOST_FAULTS_TOLD: Final = 20
+
+_LOG = logging.getLogger(__name__)
 
 Findings = tuple[Counter[str], list[str]]  # counts of what was checked, and a line for each fault
 Check = Callable[[], Findings]
 
 
 def verify_folder(folder: Path, sample: float, workers: int) -> None:
-    """Check a whole data folder, and print what was checked, with counts.
+    """Check a whole data folder, and log what was checked, with counts.
 
     Parameters
     ----------
@@ -70,7 +72,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
     Raises
     ------
     RunError
-        The folder holds no run, or something in it is wrong; the faults are printed.
+        The folder holds no run, or something in it is wrong; the faults are logged.
 
     """
     data = open_data_folder(folder)
@@ -87,14 +89,14 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
             checked += counts
             faults_found += new_faults
     for what, count in checked.items():
-        print(f"{count:9,} {what}")
+        _LOG.info(f"{count:9,} {what}")
     if faults_found:
-        print(*faults_found[:MOST_FAULTS_PRINTED], sep="\n", file=sys.stderr)
+        _LOG.error("\n".join(faults_found[:MOST_FAULTS_TOLD]))
         raise RunError(
             f"{len(faults_found)} faults in {folder}; delete the files that are named, and repeat the "
             "command that made them."
         )
-    print("No fault found.")
+    _LOG.info("No fault found.")
 
 
 def _run(check: Check) -> Findings:

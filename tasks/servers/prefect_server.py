@@ -9,6 +9,7 @@ server has a new password, in a file that only the owner can read.
 from __future__ import annotations
 
 import fcntl
+import logging
 import os
 import socket
 import subprocess
@@ -36,6 +37,8 @@ HOST: Final = "127.0.0.1"
 CLIENT: Final = ("PREFECT_API_URL", "PREFECT_API_AUTH_STRING")
 URL, SECRET, LOG = "server.url", "server.auth", "server.log"  # files of the server's folder
 
+_LOG = logging.getLogger(__name__)
+
 # Set before Prefect, MLflow, Dask or a BLAS is imported, unless the user has set them.
 ENVIRONMENT: Final = {
     "DO_NOT_TRACK": "true",
@@ -51,7 +54,8 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
     "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command itself reports a failure, in one line
     "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server missed is no failure
-    "PREFECT_LOGGING_TO_API_ENABLED": "false",  # logs would cost one request for each task; states are enough
+    "PREFECT_LOGGING_EXTRA_LOGGERS": "tasks,storage",  # only what is logged here goes into a run's log
+    "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",  # before and after a flow
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
     "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
     "MLFLOW_LOGGING_LEVEL": "ERROR",
@@ -226,7 +230,7 @@ def _keep(server: LocalServer, listener: socket.socket | None, done: threading.E
             deaths += 1
             if deaths > RESTARTS:
                 _give_up(server, "died several times in a row")
-            print("The local Prefect server died; starting it again.", file=sys.stderr)
+            _LOG.warning("The local Prefect server died; starting it again.")
             _start(server, listener)
     if listener is not None:
         listener.close()
@@ -234,11 +238,11 @@ def _keep(server: LocalServer, listener: socket.socket | None, done: threading.E
 
 def _give_up(server: LocalServer, reason: str) -> None:
     """End this process; otherwise it would wait minutes for the server."""
-    print(
-        f"motion-memory: The local Prefect server {reason}; see {server.folder / LOG}. Finished work is "
-        "kept; the same command goes on from here.",
-        file=sys.stderr,
-        flush=True,
+    _LOG.error(
+        "motion-memory: The local Prefect server %s; see %s. Finished work is kept; the same command goes on "
+        "from here.",
+        reason,
+        server.folder / LOG,
     )
     os._exit(1)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import socket
-import sys
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 IMPATIENT = {"MLFLOW_HTTP_REQUEST_TIMEOUT": "2", "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}  # a page waits
 
+_LOG = logging.getLogger(__name__)
+
 
 def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     """Serve the pages of a data folder until Ctrl-C.
@@ -38,7 +40,7 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     port
         A port from 1 to 65535, or 0 for any free one.
     open_browser
-        Whether to open the dashboard in a browser, if the output is a terminal.
+        Whether to open the dashboard in a browser.
 
     Raises
     ------
@@ -66,8 +68,9 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     versions = partial(_versions, Registry(folder))
     threading.Thread(target=_read_ahead, args=(versions,), name="registry", daemon=True).start()
     config = config_of(partial(guarded_dashboard, folder, versions))
-    print(f"data      {folder.path}\ndashboard {address} (until Ctrl-C)", flush=True)
-    if open_browser and sys.stdout.isatty():
+    _LOG.info("data      %s", folder.path)
+    _LOG.info("dashboard %s (until Ctrl-C)", address)
+    if open_browser:
         import webbrowser
 
         webbrowser.open(address)

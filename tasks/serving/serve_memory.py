@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import logging
 import math
 import os
 from pathlib import Path
@@ -17,6 +18,8 @@ from tasks.servers.guard import Guard
 from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
 from tasks.servers.prefect_server import ENVIRONMENT
 from tasks.settings.checks import check_known
+
+_LOG = logging.getLogger(__name__)
 
 
 def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) -> None:
@@ -50,12 +53,13 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
     with memory_at(memory) as folder, bound(host, port) as listener:
         archive = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
 
-        def print_addresses() -> None:
-            print(f"memory   {memory}: {len(archive.plans)} plans of class {archive.class_name}, {vehicle}")
-            print(f"serving  {address_of(listener)}/invocations, workers: {workers}; Ctrl-C stops")
-            print(f"access   {access()}", flush=True)
+        def log_addresses() -> None:
+            plans = f"{len(archive.plans)} plans of class {archive.class_name}, {vehicle}"
+            _LOG.info("memory   %s: %s", memory, plans)
+            _LOG.info("serving  %s/invocations, workers: %d; Ctrl-C stops", address_of(listener), workers)
+            _LOG.info("access   %s", access())
 
-        serve_with(functools.partial(scoring_app, str(folder), vehicle), listener, workers, print_addresses)
+        serve_with(functools.partial(scoring_app, str(folder), vehicle), listener, workers, log_addresses)
 
 
 def scoring_app(folder: str, vehicle: str) -> Guard:

@@ -8,6 +8,7 @@ Prefect's records decides what its clients run, so these servers always need a p
 from __future__ import annotations
 
 import functools
+import logging
 import multiprocessing
 import os
 import shlex
@@ -36,6 +37,8 @@ from tasks.settings.errors import RunError
 from tasks.tracking.mlflow_database import ready_database
 
 POLL_SECONDS: Final = 0.2  # between two checks that the processes are alive
+
+_LOG = logging.getLogger(__name__)
 
 
 def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
@@ -74,9 +77,9 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
         healthy = (f"{address_of(prefect_socket)}/api", address_of(mlflow_socket))
         with _running(apps) as wait:
             wait(lambda: all(is_healthy(url) for url in healthy), START_SECONDS)
-            print(f"Prefect  {address_of(prefect_socket)}  PREFECT_API_URL={healthy[0]}")
-            print(f"MLflow   {address_of(mlflow_socket)}  MLFLOW_TRACKING_URI={healthy[1]}")
-            print(f"access   {access_line}; Ctrl-C stops", flush=True)
+            _LOG.info("Prefect  %s  PREFECT_API_URL=%s", address_of(prefect_socket), healthy[0])
+            _LOG.info("MLflow   %s  MLFLOW_TRACKING_URI=%s", address_of(mlflow_socket), healthy[1])
+            _LOG.info("access   %s; Ctrl-C stops", access_line)
             wait(lambda: False, float("inf"))
 
 

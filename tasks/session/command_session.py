@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import logging
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
@@ -19,12 +19,14 @@ from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import RunSettings
 from tasks.tracking.mlflow_runs import tracking_uri
 
+_LOG = logging.getLogger(__name__)
+
 
 @contextmanager
 def command_session(
     name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
 ) -> Iterator[str]:
-    """Provide everything that the flow of a command needs; print at the end where its results lie.
+    """Provide everything that the flow of a command needs; log at the end where its results lie.
 
     Prefect reads its environment when it is imported, so import the flow only inside this context.
 
@@ -53,7 +55,7 @@ def command_session(
         _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
     ):
         yield folder.place
-    _print_locations(folder, settings)
+    _log_locations(folder, settings)
 
 
 @contextmanager
@@ -77,22 +79,20 @@ def _workers_for(
         local = scheduler is None and name != "report"
         stack.enter_context(warm_up(shared, vehicle) if local else nullcontext())
         if server is not None:
-            print(server, file=sys.stderr)
+            _LOG.info(str(server))
             server.wait()
         yield
 
 
-def _print_locations(folder: DataFolder, settings: RunSettings) -> None:
+def _log_locations(folder: DataFolder, settings: RunSettings) -> None:
     run = folder.run(settings.run_name)
-    print(f"data     {shown(run.path if is_there(run.settings) else folder.path)}")
+    _LOG.info("data     %s", shown(run.path if is_there(run.settings) else folder.path))
     if is_there(run.figures):
-        print(f"figures  {shown(run.figures)}")
+        _LOG.info("figures  %s", shown(run.figures))
     uri = redacted(tracking_uri(folder))
-    print(f"MLflow   {uri}" if uri.startswith("http") else f"MLflow   mlflow ui --backend-store-uri {uri}")
-    if os.environ.get("PREFECT_API_URL"):
-        print(f"Prefect  {redacted(os.environ['PREFECT_API_URL']).removesuffix('/api')}")
-    else:
-        print(f"Prefect  motion-memory servers --data {folder.path}")
+    _LOG.info("MLflow   %s", uri if uri.startswith("http") else f"mlflow ui --backend-store-uri {uri}")
+    server = redacted(os.environ.get("PREFECT_API_URL", "")).removesuffix("/api")
+    _LOG.info("Prefect  %s", server or f"motion-memory servers --data {folder.path}")
 
 
 def _check_reachable(scheduler: str | None) -> None:

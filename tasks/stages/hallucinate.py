@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import islice
@@ -42,6 +43,8 @@ ORIGIN: Final = "origin"  # a problem that was collected
 
 MadeProblem = tuple[Problem, str]  # a problem, and the method that made it
 Identity = tuple[str, bytes]  # of an experience: id of the problem, states and controls of the plan
+
+_LOG = logging.getLogger(__name__)
 
 
 class Hallucinated(NamedTuple):
@@ -211,10 +214,12 @@ HALLUCINATE: Final = Stage(
 )
 
 
-def print_copied(results: Iterable[Hallucinated]) -> None:
-    """Print for how many plans problems were copied from the champion's run, if there are any."""
+def log_copied(results: Iterable[Hallucinated]) -> None:
+    """Tell for how many plans problems were copied from the champion's run, if there are any."""
     results = list(results)
     copied = sum(result.copied_plans for result in results)
     plans = sum(result.plans for result in results)
     if copied:
-        print(f"hallucinated anew for {plans - copied} of {plans} plans; the champion's run had the others'")
+        _LOG.info(
+            "hallucinated anew for %d of %d plans; the champion's run had the others'", plans - copied, plans
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import logging
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +19,8 @@ from tasks.settings.errors import RunError
 from tasks.settings.run_settings import world_class
 
 CUT_FROM_MAP: Final = 2  # problems to collect from, for each solved one that is wanted: some are not solved
+
+_LOG = logging.getLogger(__name__)
 
 
 class WorldsRead(NamedTuple):
@@ -58,9 +60,9 @@ READ_WORLDS: Final = Stage(
 )
 
 
-def print_skipped(results: Iterable[WorldsRead]) -> None:
-    """List on the error stream the worlds that were left out, each with the reason."""
+def log_skipped(results: Iterable[WorldsRead]) -> None:
+    """Warn of the worlds that were left out, each with the reason."""
     skipped = [line for result in results for line in result.skipped]
     if skipped:
         heading = f"{len(skipped)} worlds skipped (use --strict to stop instead):"
-        print(heading, *skipped, sep="\n  ", file=sys.stderr)
+        _LOG.warning("\n  ".join([heading, *skipped]))

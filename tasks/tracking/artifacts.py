@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-import sys
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -15,6 +15,8 @@ from storage.places.run_folder import RunFolder
 from tasks.fan_out.progress_artifact import artifact_key
 
 MAX_IMAGE_BYTES: Final = 700_000  # an artifact is one row in the server's database
+
+_LOG = logging.getLogger(__name__)
 
 
 def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
@@ -56,7 +58,7 @@ def publish_judgements(run_name: str, verdicts: Sequence[tuple[str, str, str]]) 
 
 def _warn(what: str, error: Exception) -> None:
     reason = (str(error) or type(error).__name__).splitlines()[0]
-    print(f"Prefect did not take all artifacts of {what}: {reason}", file=sys.stderr)
+    _LOG.warning("Prefect did not take all artifacts of %s: %s", what, reason)
 
 
 def _key(run: RunFolder, name: str) -> str:

@@ -7,9 +7,9 @@ is upgraded, which then replaces the database in one step. The old database is k
 from __future__ import annotations
 
 import functools
+import logging
 import os
 import sqlite3
-import sys
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -19,6 +19,8 @@ from storage.places.files import locked, whole_file
 from tasks.settings.errors import RunError
 
 OWNER_ONLY: Final = 0o600
+
+_LOG = logging.getLogger(__name__)
 
 if TYPE_CHECKING:
     from alembic.script import ScriptDirectory
@@ -78,7 +80,7 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         engine.dispose()
         if not kept.exists():
             os.link(path, kept)
-    print(f"{path} now has this MLflow's schema; the old one is kept as {kept.name}", file=sys.stderr)
+    _LOG.warning("%s now has this MLflow's schema; the old one is kept as %s", path, kept.name)
 
 
 @functools.cache

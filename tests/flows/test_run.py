@@ -180,6 +180,16 @@ def test_every_figure_is_an_artifact_in_mlflow_and_prefect(runs: tuple[RunFolder
     assert (kinds["report"], kinds["summary"], kinds["claims"]) == ("markdown", "markdown", "table")
 
 
+def test_the_log_of_a_run_in_prefect_holds_what_was_told_and_nothing_else(
+    runs: tuple[RunFolder, RunFolder],
+) -> None:
+    data = runs[0].path.parents[1]
+    with closing(sqlite3.connect(data / "prefect" / "prefect.db")) as database:
+        lines = database.execute("SELECT name, message FROM log WHERE flow_run_id IS NOT NULL").fetchall()
+    assert {name.partition(".")[0] for name, _ in lines} == {"tasks"}
+    assert any("Retrieval" in message for _, message in lines)
+
+
 def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
     runs: tuple[RunFolder, RunFolder], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -139,9 +139,9 @@ def _automated(data: Path) -> int:
 def test_a_schedule_that_cannot_be_is_refused_before_anything_starts(
     every: float | None, cron: str | None, told: str, tmp_path: Path
 ) -> None:
-    from flows.cli.retraining_commands import retrain_flow
+    from flows.cli.retraining_commands import ENTRYPOINT, retrain_flow
     from tasks.champions.retraining_schedule import serve
 
     with pytest.raises(UsageError, match=told):
-        serve(retrain_flow, SETTINGS, tmp_path / "data", every, cron, False, 1)
+        serve(retrain_flow, ENTRYPOINT, SETTINGS, tmp_path / "data", every, cron, False, 1)
     assert not (tmp_path / "data").exists()

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 
 import pandas as pd
 import pytest
-from rich.console import Console, RenderableType
 
+from dashboards.cells import CellTable
 from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
@@ -14,26 +15,27 @@ from dashboards.report.tables import (
     retrieval_markdown,
     retrieval_table,
     summary_markdown,
-    summary_table,
+    summary_tables,
 )
 from dashboards.statistics.panels import summarise
 from dashboards.statistics.retrieval_rates import retrieval_curve, summarise_retrieval
+from flows.cli.terminal import write
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import ABLATION, STANDARD, attempts, recalls
 
 ALL = [*STANDARD, *ABLATION, Configuration("open", "hybrid", 5)]
 
 
-def rendered(table: RenderableType) -> list[str]:
-    text = io.StringIO()
-    Console(file=text, width=110).print(table)
+def rendered(*tables: CellTable) -> list[str]:
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        write(*tables)
     return text.getvalue().splitlines()
 
 
 def test_the_table_holds_every_planner_configuration_and_class() -> None:
     seen = set()
     panel = planner = ""
-    for line in rendered(summary_table(summarise(attempts(configurations=ALL), resamples=10))):
+    for line in rendered(*summary_tables(summarise(attempts(configurations=ALL), resamples=10))):
         words = line.split()
         if "problems;" in words:
             panel = words[0].rstrip(",")
@@ -68,7 +70,7 @@ def test_the_tables_fit_110_columns_uncut(slowness: float) -> None:
     rows["planning_seconds"] *= slowness
     rows["collision_checks"] = (rows["collision_checks"] * slowness).astype(int)
     retrieval = summarise_retrieval(retrieval_curve(recalls(("multiple_bugtraps",))))
-    for table in (summary_table(summarise(rows, resamples=50)), retrieval_table(retrieval)):
+    for table in (*summary_tables(summarise(rows, resamples=50)), retrieval_table(retrieval)):
         lines = rendered(table)
         assert max(len(line) for line in lines) <= 110
         assert not any("…" in line for line in lines)

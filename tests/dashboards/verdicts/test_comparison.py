@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dashboards.cells import as_markdown
 from dashboards.verdicts.comparison import (
     ALARM,
     BETTER,
@@ -17,7 +18,7 @@ from dashboards.verdicts.comparison import (
     compare_runs,
     verdict,
 )
-from dashboards.verdicts.comparison_tables import comparison_markdown, comparison_table
+from dashboards.verdicts.comparison_tables import comparison_tables
 from tests.dashboards.synthetic import attempts
 
 DRAWN = 1000
@@ -155,6 +156,6 @@ def test_only_problems_that_are_in_both_count(run: pd.DataFrame) -> None:
 
 def test_both_forms_show_every_line(run: pd.DataFrame) -> None:
     rows = _compare(run, run)
-    text = comparison_markdown(rows)
+    text = as_markdown(comparison_tables(rows))
     assert text.count("\n|") == len(rows) + 3 * 2
-    assert len(comparison_table(rows).renderables) == 3
+    assert len(comparison_tables(rows)) == 3

@@ -14,7 +14,7 @@ from dashboards.verdicts.promotion import (
     SOONER,
     judge,
     judgement_markdown,
-    judgement_table,
+    judgement_tables,
 )
 from storage.tables.configurations import Configuration
 from tests.dashboards.synthetic import attempts
@@ -155,4 +155,4 @@ def test_both_forms_show_every_column_and_the_verdict(champion: pd.DataFrame) ->
     assert text.startswith("**promoted**: sooner there: ")
     assert "50.0 % less time" in text
     assert text.count("\n|") == COLUMNS + 2 * 2
-    assert len(judgement_table(found).renderables) == 2
+    assert len(judgement_tables(found)) == 2

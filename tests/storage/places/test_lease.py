@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from flows.cli.terminal import notices_shown
 from storage.errors import InUseError
 from storage.places import lease, objects
 from storage.places.data_folder import open_data_folder
@@ -94,7 +95,7 @@ def test_a_lease_is_renewed_and_its_loss_ends_the_command(
         ended.set()
 
     monkeypatch.setattr(lease.os, "kill", kill)
-    with leased(PLACE, "me", "it"):
+    with notices_shown(), leased(PLACE, "me", "it"):
         assert not ended.wait(0.3)
         storage.put_object(Bucket=BUCKET, Key=PLACE.key, Body=b'{"owner": "other"}')
         assert ended.wait(5.0)

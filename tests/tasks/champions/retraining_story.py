@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flows.cli.terminal import notices_shown
 from storage.archives.memories import load_memory
 from storage.places.data_folder import open_data_folder
 from storage.places.files import remove_folder
@@ -59,12 +60,16 @@ class Story:
         registered = load_from(self.versions()[1].uri, made.vehicle)
         self.seen["registered as made"] = bool(np.array_equal(registered.masks, made.masks))
 
+    def dry(self) -> str:
+        """What a dry run says."""
+        return "\n".join(map(str, dry_run(Path(self.data), SETTINGS)))
+
     def nothing_new(self) -> None:
         self.seen["without news"] = len(retrain(self.data))
-        self.seen["dry without news"] = said(lambda: dry_run(Path(self.data), SETTINGS))
+        self.seen["dry without news"] = self.dry()
         learn(self.data, seed=902, count=3)
         before = self.listing()
-        self.seen["dry with three"] = said(lambda: dry_run(Path(self.data), SETTINGS))
+        self.seen["dry with three"] = self.dry()
         self.seen["dry runs wrote"] = self.listing() != before
 
     def taken_over(self, patch: pytest.MonkeyPatch) -> None:
@@ -164,8 +169,8 @@ def roll_back_to_first(story: Story) -> None:
 
 
 def said(call: Any) -> str:
-    """What a call prints."""
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
+    """What the command line shows during a call."""
+    with contextlib.redirect_stdout(io.StringIO()) as printed, notices_shown():
         call()
     return printed.getvalue()
 

@@ -63,7 +63,6 @@ def test_drift_is_told_when_robots_are_there_later(sent: Sent) -> None:
 
 
 def test_nothing_is_told_of_what_no_benchmark_knows(sent: Sent) -> None:
-    assert report_drift(None, {NAME: FALLEN}, None) == []
     assert report_drift(BENCHMARKED, {"rrt open 5 exhaustive": FALLEN}, None) == []
     assert sent.events == []
 

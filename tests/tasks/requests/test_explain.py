@@ -65,7 +65,7 @@ def test_the_command_tells_and_draws_it(
     told = capsys.readouterr().out
     attempt = solve(WALL, "lattice", "open", 5, memory, seed=1)
     assert f"{len(attempt.recalled)} of 6 plans of test, none of them free" in told
-    rows = [match for line in told.splitlines() if (match := re.match(r" \d+ +(\d+) .* of ", line))]
+    rows = [match for line in told.splitlines() if (match := re.match(r"\s*\d+ +(\d+) .* of ", line))]
     assert [int(row[1]) for row in rows] == list(attempt.recalled)
     assert "guided the search" in told
     assert f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions" in told

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dashboards.verdicts.comparison import CONTROL, SAME, compare_runs
+from flows.cli.terminal import notices_shown
 from planners.world.classes.problem_classes import problem_class
 from planners.world.vehicles.vehicle import CAR_1_TRAILER
 from storage.archives.memories import load_memory
@@ -79,7 +80,8 @@ def test_its_figures_are_drawn(run: RunFolder) -> None:
 
 
 def test_verify_makes_the_same_attempts_again(run: RunFolder, capsys: pytest.CaptureFixture[str]) -> None:
-    verify_folder(run.path.parents[1], sample=1.0, workers=1)
+    with notices_shown():
+        verify_folder(run.path.parents[1], sample=1.0, workers=1)
     told = capsys.readouterr().out
     assert "No fault found." in told
     assert f"{3 * (1 + len(ASSISTS))} attempts made again" in told

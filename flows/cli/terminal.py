@@ -1,0 +1,166 @@
+"""What the command line writes: results and notices to the output, warnings and progress to the error stream.
+
+Nothing else writes to a terminal. Below ``flows.cli`` results are returned, and what has to be told meanwhile
+is logged: as text, as a ``CellTable``, or as the ``Progress`` of work.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
+    from rich.table import Table
+
+    from dashboards.cells import CellTable
+    from tasks.fan_out.progress import Progress
+
+LOGGERS: Final = ("tasks", "storage")
+PROGRESS: Final = "tasks.fan_out.progress"
+COLUMNS: Final = 110  # width of tables that are not written to a terminal
+LINE_SECONDS: Final = 5.0  # between two lines of progress, if the error stream is no terminal
+
+
+def write(*items: str | CellTable) -> None:
+    """Write lines and tables to the output."""
+    for item in items:
+        if isinstance(item, str):
+            print(item)
+        else:
+            _draw(item)
+    sys.stdout.flush()
+
+
+def write_files(**paths: object) -> None:
+    """Write a line for each of ``paths`` that is not None: the name of the argument, then the path."""
+    write(*(f"{name:8} {path}" for name, path in paths.items() if path is not None))
+
+
+@contextmanager
+def notices_shown() -> Iterator[None]:
+    """Show what ``tasks`` and ``storage`` log while this lasts."""
+    show_notices()
+    try:
+        yield
+    finally:
+        for name in (*LOGGERS, PROGRESS):
+            logger = logging.getLogger(name)
+            logger.setLevel(logging.NOTSET)
+            logger.propagate = True
+            for handler in [each for each in logger.handlers if isinstance(each, Notices | ProgressShown)]:
+                logger.removeHandler(handler)
+
+
+def show_notices() -> None:
+    """Show what ``tasks`` and ``storage`` log from now on."""
+    for name in LOGGERS:
+        _listen(name, logging.INFO, Notices())
+    _listen(PROGRESS, logging.DEBUG, ProgressShown())
+
+
+def _listen(name: str, level: int, handler: logging.Handler) -> None:
+    logger = logging.getLogger(name)
+    logger.setLevel(level)
+    logger.propagate = False  # Prefect's handler of the root logger would write the same once more
+    if not any(isinstance(each, type(handler)) for each in logger.handlers):
+        logger.addHandler(handler)
+
+
+class Notices(logging.Handler):
+    """Writes notices to the output, and warnings and errors to the error stream."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record; its message is a text or a ``CellTable``."""
+        if record.levelno >= logging.WARNING:
+            print(record.getMessage(), file=sys.stderr, flush=True)
+        else:
+            write(record.getMessage() if isinstance(record.msg, str) else record.msg)
+
+
+class ProgressShown(logging.Handler):
+    """Shows progress: as a bar with the time left on a terminal, elsewhere as a line every few seconds."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._bars: Bars | None = None
+        self._began = 0.0  # when the work began whose progress was shown last
+        self._last_line = 0.0
+        self._complete = False  # whether a line said that all is done, or none has to
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show a record whose message is a ``Progress``."""
+        progress: Progress = record.msg  # type: ignore[assignment]  # a message may be any object
+        if sys.stderr.isatty():
+            self._draw_bar(progress)
+        elif not progress.over:
+            self._write_line(progress)
+
+    def _draw_bar(self, progress: Progress) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
+
+        if self._bars is None:
+            columns = (
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeRemainingColumn(),
+            )
+            self._bars = Bars(*columns, console=Console(file=sys.stderr))
+            self._bars.add_task(progress.work)
+            self._bars.start()
+        self._bars.update(self._bars.task_ids[0], completed=progress.done, total=progress.total)
+        if progress.over:
+            self._bars.stop()
+            self._bars = None
+
+    def _write_line(self, progress: Progress) -> None:
+        done, total, now = progress.done, progress.total, time.monotonic()
+        if progress.began != self._began:
+            self._began = self._last_line = progress.began
+            self._complete = not progress.end_is_told
+        if now - self._last_line >= LINE_SECONDS or (done == total and not self._complete):
+            self._last_line, self._complete = now, done == total
+            seconds = now - progress.began
+            left = f", {seconds / done * (total - done):.0f} s left" if 0 < done < total else ""
+            line = f"{progress.work}: {done} of {total} after {seconds:.0f} s{left}"
+            print(line, file=sys.stderr, flush=True)
+
+
+def _draw(table: CellTable) -> None:
+    """Draw a table on the output, as wide as the terminal if it is one."""
+    from rich.console import Console
+
+    Console(width=None if sys.stdout.isatty() else COLUMNS, highlight=False).print(rich_table(table))
+
+
+def rich_table(table: CellTable) -> Table:
+    """A table as Rich draws it. In a group, the first cell is shown only where it changes; a gap follows."""
+    from rich import box
+    from rich.table import Table
+
+    from dashboards.cells import NAMES
+
+    drawn = Table(
+        title=table.title or None,
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD if table.title else None,
+        pad_edge=not table.title,
+        padding=(0, 1, 0, 0 if table.title else 1),
+    )
+    for heading in table.headings:
+        drawn.add_column(
+            heading, justify="left" if heading in NAMES else "right", no_wrap=heading != "verdict"
+        )
+    for group in table.groups:
+        for i, (first, *others) in enumerate(group):
+            again = i > 0 and first == group[i - 1][0]
+            drawn.add_row("" if again else first, *others, end_section=i == len(group) - 1 > 0)
+    return drawn
