@@ -28,7 +28,6 @@ def quality_curves(curves: pd.DataFrame, title: str, colours: Mapping[str, str])
             time; ``memory`` is true for the ways with a memory, whose lines are bold.
         title: of the figure.
         colours: of the kinds.
-
     """
     if curves.empty:
         return message_figure(title, "No plans to show: measure some first.")

@@ -45,7 +45,6 @@ def differences(families: Sequence[Floats], seed: int = 0, drawn: int = DRAWN) -
     Returns:
         for each family its mean differences ``[C]`` and the ends of their intervals ``[C]``; NaN if no
         problem has both sides.
-
     """
     generator = np.random.default_rng(seed)
     there = [~np.isnan(family) for family in families]

@@ -114,7 +114,6 @@ def compare_runs(
         problem; unless ``in_turn`` only driving counts. ``_low`` and ``_high`` are the ends of intervals that
         hold for all rows at once; planning has them only ``in_turn``. ``verdict`` is BETTER, WORSE or SAME,
         without memory CONTROL or ALARM, and ``why`` says by what.
-
     """
     pairs = _paired(first, other)
     if not pairs:

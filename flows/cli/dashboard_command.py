@@ -9,15 +9,10 @@ from pathlib import Path
 def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = True) -> None:
     """Serve the dashboard on loopback until Ctrl-C: runs, problems, memories, live planning, comparisons.
 
-    Parameters
-    ----------
-    data
-        Data folder; default $MOTION_MEMORY_DATA or ./data. Nothing in it is changed.
-    port
-        Port to listen on; 0 takes any free one.
-    browser
-        Open the dashboard in a browser, if the output is a terminal.
-
+    Args:
+        data: Data folder; default $MOTION_MEMORY_DATA or ./data. Nothing in it is changed.
+        port: Port to listen on; 0 takes any free one.
+        browser: Open the dashboard in a browser, if the output is a terminal.
     """
     from tasks.serving.serve_dashboard import serve_dashboard
     from tasks.settings.environment import default_data

@@ -31,29 +31,19 @@ def import_worlds(
 ) -> None:
     """Make problems from worlds, or cut them from a map.
 
-    Parameters
-    ----------
-    path
-        A folder of worlds or problem files, one such file, or a map: .map, .scen, .yaml (ROS), .npy, .npz.
-    format
-        png, polygons, problems, moving-ai, ros or numpy; by default recognised by the files' endings.
-    out
-        A .parquet, .jsonl or .json file, or a new folder with parts train and test for run --worlds.
-    part
-        train, test, validation, or both of the first two.
-    problems
-        Problems of each part; default 1,000 of a map, all of worlds.
-    seed
-        Decides where problems are cut from a map.
-    vehicle
-        Vehicle that must have room to start: car, differential-drive, car-1-trailer or car-2-trailers.
-    strict
-        Stop at a bad world instead of skipping it.
-    picture
-        Where to draw the map with its problems, .png, .svg or .pdf.
-    reading
-        How a map is read.
-
+    Args:
+        path: A folder of worlds or problem files, one such file, or a map: .map, .scen, .yaml (ROS), .npy,
+            .npz.
+        format: png, polygons, problems, moving-ai, ros or numpy; by default recognised by the files' endings.
+        out: A .parquet, .jsonl or .json file, or a new folder with parts train and test for run --worlds.
+        part: train, test, validation, or both of the first two.
+        problems: Problems of each part; default 1,000 of a map, all of worlds.
+        seed: Decides where problems are cut from a map.
+        vehicle: Vehicle that must have room to start: car, differential-drive, car-1-trailer or
+            car-2-trailers.
+        strict: Stop at a bad world instead of skipping it.
+        picture: Where to draw the map with its problems, .png, .svg or .pdf.
+        reading: How a map is read.
     """
     from tasks.requests import import_worlds as task
 
@@ -78,27 +68,17 @@ def route(
 ) -> None:
     """Plan a drive over a map, made of local plans, from memory where possible.
 
-    Parameters
-    ----------
-    path
-        A map: .map, .yaml (ROS), .npy, .npz.
-    begin
-        Pose of the vehicle in the map's frame: x,y,heading, in metres and radians.
-    end
-        Goal: x,y in metres. Can be repeated: the drive then passes all goals in this order.
-    format
-        moving-ai, ros or numpy; by default recognised by the file's ending.
-    assist
-        How the memory helps; fresh is a guide without memory. Default: repair with a memory, fresh without.
-    out
-        Where to write the plan, .json.
-    picture
-        Where to draw the route, .png, .svg or .pdf.
-    options
-        How to solve local problems.
-    reading
-        How the map is read.
-
+    Args:
+        path: A map: .map, .yaml (ROS), .npy, .npz.
+        begin: Pose of the vehicle in the map's frame: x,y,heading, in metres and radians.
+        end: Goal: x,y in metres. Can be repeated: the drive then passes all goals in this order.
+        format: moving-ai, ros or numpy; by default recognised by the file's ending.
+        assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, fresh
+            without.
+        out: Where to write the plan, .json.
+        picture: Where to draw the route, .png, .svg or .pdf.
+        options: How to solve local problems.
+        reading: How the map is read.
     """
     from tasks.requests.assistant import Assistant
     from tasks.requests.drive_route import drive_route

@@ -32,25 +32,16 @@ def plan(
 ) -> None:
     """Plan for one problem; write the plan and a picture.
 
-    Parameters
-    ----------
-    problem
-        A .json, .jsonl or .parquet file with one problem.
-    assist
-        How the memory helps; fresh is a guide without memory. Default: repair with a memory, none without.
-    improve_seconds
-        Seconds to improve the plan; 0 keeps the first plan.
-    explain
-        Print and draw which plans were recalled, where they collide and how they were used.
-    out
-        Where to write the plan, .json.
-    picture
-        Where to draw it, .png, .svg or .pdf.
-    learn
-        Data folder that remembers the plan if it is new.
-    options
-        How the problem is solved.
-
+    Args:
+        problem: A .json, .jsonl or .parquet file with one problem.
+        assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
+            without.
+        improve_seconds: Seconds to improve the plan; 0 keeps the first plan.
+        explain: Print and draw which plans were recalled, where they collide and how they were used.
+        out: Where to write the plan, .json.
+        picture: Where to draw it, .png, .svg or .pdf.
+        learn: Data folder that remembers the plan if it is new.
+        options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant, plan_one
 
@@ -75,27 +66,16 @@ def optimise(
 ) -> None:
     """Optimise a plan for one problem, from a plan that may collide, a planner's plan, or a straight line.
 
-    Parameters
-    ----------
-    problem
-        A .json, .jsonl or .parquet file with one problem.
-    plan
-        Begin with the plan of this .json file, made for this problem or another.
-    planner
-        Begin with the plan of this planner; default follow.
-    straight
-        Begin with a straight line from start to goal.
-    clearance_weight
-        Weight of the distance to obstacles against the duration of the plan.
-    vehicle
-        car, differential-drive, car-1-trailer or car-2-trailers.
-    seed
-        Everything random follows from it.
-    out
-        Where to write the plan, .json.
-    picture
-        Where to draw the guess and the plan, .png, .svg or .pdf.
-
+    Args:
+        problem: A .json, .jsonl or .parquet file with one problem.
+        plan: Begin with the plan of this .json file, made for this problem or another.
+        planner: Begin with the plan of this planner; default follow.
+        straight: Begin with a straight line from start to goal.
+        clearance_weight: Weight of the distance to obstacles against the duration of the plan.
+        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        seed: Everything random follows from it.
+        out: Where to write the plan, .json.
+        picture: Where to draw the guess and the plan, .png, .svg or .pdf.
     """
     from tasks.requests.optimise_one import initial_guess, optimise_one
 
@@ -121,25 +101,16 @@ def solve(
 ) -> None:
     """Solve many problems, and write one row each. A repeated command continues where it stopped.
 
-    Parameters
-    ----------
-    problems
-        A .json, .jsonl or .parquet file.
-    assist
-        How the memory helps; fresh is a guide without memory. Default: repair with a memory, none without.
-    improve_seconds
-        Seconds to improve the plan; 0 keeps the first plan.
-    out
-        Where to write the rows, .parquet.
-    plans
-        Folder for the plans, one .json for each problem.
-    learn
-        Data folder that remembers the newly solved problems.
-    workers
-        Worker processes; default one for each core. A few problems are solved without.
-    options
-        How the problems are solved.
-
+    Args:
+        problems: A .json, .jsonl or .parquet file.
+        assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
+            without.
+        improve_seconds: Seconds to improve the plan; 0 keeps the first plan.
+        out: Where to write the rows, .parquet.
+        plans: Folder for the plans, one .json for each problem.
+        learn: Data folder that remembers the newly solved problems.
+        workers: Worker processes; default one for each core. A few problems are solved without.
+        options: How the problems are solved.
     """
     from tasks.requests.solve_many import solve_many
 

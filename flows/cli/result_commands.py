@@ -11,15 +11,10 @@ from flows.cli.terminal import write
 def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) -> None:
     """Check every shard, archive and stored plan of a data folder, and make some attempts again.
 
-    Parameters
-    ----------
-    folder
-        The data folder.
-    sample
-        Share of the benchmark's problems that are attempted again, 0 to 1.
-    workers
-        Worker processes; default one for each core.
-
+    Args:
+        folder: The data folder.
+        sample: Share of the benchmark's problems that are attempted again, 0 to 1.
+        workers: Worker processes; default one for each core.
     """
     from tasks.requests.verify import verify as task
 
@@ -29,15 +24,11 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
 def export(run: Path, *, format: str, out: Path) -> None:
     """Write the attempts of a run in a format of other tools.
 
-    Parameters
-    ----------
-    run
-        Folder of the run, in the data folder's runs.
-    format
-        ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv (.csv).
-    out
-        The file or folder to write.
-
+    Args:
+        run: Folder of the run, in the data folder's runs.
+        format: ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv
+            (.csv).
+        out: The file or folder to write.
     """
     from tasks.reports.export import export_run
 
@@ -48,17 +39,11 @@ def export(run: Path, *, format: str, out: Path) -> None:
 def compare(*runs: Path, out: Path | None = None, measure: bool = False, problems: int | None = None) -> None:
     """Compare runs with the first one, paired by problem: solved, driving, work, and times if measured.
 
-    Parameters
-    ----------
-    runs
-        Two or more folders of runs, in the data folder's runs.
-    out
-        A file that the comparison is also written to: .md, .json or .csv.
-    measure
-        Measure the memories of both runs in turn, instead of going by what each has measured alone.
-    problems
-        How many test problems of a class to measure; default 300.
-
+    Args:
+        runs: Two or more folders of runs, in the data folder's runs.
+        out: A file that the comparison is also written to: .md, .json or .csv.
+        measure: Measure the memories of both runs in turn, instead of going by what each has measured alone.
+        problems: How many test problems of a class to measure; default 300.
     """
     from tasks.reports.compare import compare as task
 

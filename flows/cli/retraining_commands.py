@@ -25,15 +25,10 @@ Flag = Annotated[bool, Parameter(negative=())]
 def retrain(*, approve: Flag = False, dry_run: Flag = False, options: Options = NO_OPTIONS) -> None:
     """Train challengers with the experiences learned since the champions; promote those that are better.
 
-    Parameters
-    ----------
-    approve
-        A challenger that is better waits for `motion-memory promote`.
-    dry_run
-        Print what would be done, and write nothing.
-    options
-        What a run is and where it happens.
-
+    Args:
+        approve: A challenger that is better waits for `motion-memory promote`.
+        dry_run: Print what would be done, and write nothing.
+        options: What a run is and where it happens.
     """
     settings = _settings(options)
     if dry_run:
@@ -59,17 +54,11 @@ def serve(
 ) -> None:
     """Retrain on a schedule, and when the memory answers fewer of the incoming problems; until Ctrl-C.
 
-    Parameters
-    ----------
-    every
-        Seconds between two retrainings; 86,400 (a day) if neither this nor --cron is given.
-    cron
-        When to retrain, such as "0 3 * * *" for three each night.
-    approve
-        A challenger that is better waits for `motion-memory promote`.
-    options
-        What a run is and where it happens.
-
+    Args:
+        every: Seconds between two retrainings; 86,400 (a day) if neither this nor --cron is given.
+        cron: When to retrain, such as "0 3 * * *" for three each night.
+        approve: A challenger that is better waits for `motion-memory promote`.
+        options: What a run is and where it happens.
     """
     from tasks.champions.retraining_schedule import serve as task
 
@@ -88,13 +77,9 @@ def retrain_flow() -> Flow[..., None]:
 def promote(*, memory: str | None = None, data: Path | None = None) -> None:
     """Approve better challengers: they become champions.
 
-    Parameters
-    ----------
-    memory
-        Approve the challenger of this memory, such as trap; by default all that wait.
-    data
-        Data folder; default $MOTION_MEMORY_DATA or ./data.
-
+    Args:
+        memory: Approve the challenger of this memory, such as trap; by default all that wait.
+        data: Data folder; default $MOTION_MEMORY_DATA or ./data.
     """
     from tasks.champions.promote import promote_awaiting
     from tasks.settings.environment import default_data
@@ -106,13 +91,9 @@ def promote(*, memory: str | None = None, data: Path | None = None) -> None:
 def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
     """Make the champion before the current one champion again.
 
-    Parameters
-    ----------
-    memory
-        Roll back this memory, such as trap; by default all that the last retraining promoted.
-    data
-        Data folder; default $MOTION_MEMORY_DATA or ./data.
-
+    Args:
+        memory: Roll back this memory, such as trap; by default all that the last retraining promoted.
+        data: Data folder; default $MOTION_MEMORY_DATA or ./data.
     """
     from tasks.champions.promote import roll_back
     from tasks.settings.environment import default_data

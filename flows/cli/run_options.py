@@ -31,71 +31,43 @@ _LEARNING: Final = (
 class Options:
     """What a run is and where it happens.
 
-    Parameters
-    ----------
-    preset
-        Size of the run: smoke (a minute), laptop (minutes) or paper (an hour). paper-method is the paper's
-        method as published (hours), paper-method-laptop the same with fewer problems.
-    classes
-        Generated problem classes; default all of them, or none if --worlds is given.
-    worlds
-        A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
-    difficulty
-        Difficulty of the generated classes.
-    vehicle
-        car, differential-drive, car-1-trailer or car-2-trailers.
-    seed
-        Everything random follows from it.
-    objective
-        What the encoder is trained for; default labels, triplet by the paper's method.
-    data
-        Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
-    workers
-        Worker processes; default one for each core.
-    scheduler
-        Dask scheduler to use instead, such as tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
-    strict
-        Stop at a bad world instead of skipping it.
-    continual
-        Also measure with 20, 40 ... % of the experiences; paper: GUST on curves only.
-    experiences
-        Solved problems to keep of each class; the preset gives the default, as for the next four.
-    candidates
-        Solved problems of each class to choose them from; if as many as experiences, the first are kept.
-    problems_per_experience
-        Problems hallucinated for each experience.
-    test_problems
-        New problems of each class to measure with.
-    epochs
-        The most epochs of a training.
-    training_seeds
-        Encoders trained for each memory, each with its own seed; the best on validation problems is kept.
-    patience
-        Epochs without improvement after which a training ends.
-    learning_rate
-        The highest learning rate of the schedule.
-    origin_weight
-        Objective labels: how much the plan that a problem was made from should rank before other free plans,
-        at first; it falls to a tenth.
-    margin
-        Objective triplet: how much farther away a dissimilar problem should be than a similar one.
-    semi_hard
-        Objective triplet: learn only from triplets within the margin.
-    channels
-        Widths of the encoder's convolutions.
-    hidden
-        Widths of the encoder's fully connected layers.
-    dimensions
-        Dimensions of the embedding.
-    network
-        The encoder's; pooled is the paper's, which has a max-pool after each convolution.
-    learned
-        Also use the experiences that --learn has added to the data folder. The name freezes those that exist
-        when it is first used; later the same name means the same experiences.
-    hallucination
-        Methods that make problems around a plan, with weights, such as rearrange=0.7 minimal=0.3; the methods
-        are rearrange, maximal, minimal and learned.
-
+    Args:
+        preset: Size of the run: smoke (a minute), laptop (minutes) or paper (an hour). paper-method is the
+            paper's method as published (hours), paper-method-laptop the same with fewer problems.
+        classes: Generated problem classes; default all of them, or none if --worlds is given.
+        worlds: A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
+        difficulty: Difficulty of the generated classes.
+        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        seed: Everything random follows from it.
+        objective: What the encoder is trained for; default labels, triplet by the paper's method.
+        data: Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
+        workers: Worker processes; default one for each core.
+        scheduler: Dask scheduler to use instead, such as tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
+        strict: Stop at a bad world instead of skipping it.
+        continual: Also measure with 20, 40 ... % of the experiences; paper: GUST on curves only.
+        experiences: Solved problems to keep of each class; the preset gives the default, as for the next
+            four.
+        candidates: Solved problems of each class to choose them from; if as many as experiences, the first
+            are kept.
+        problems_per_experience: Problems hallucinated for each experience.
+        test_problems: New problems of each class to measure with.
+        epochs: The most epochs of a training.
+        training_seeds: Encoders trained for each memory, each with its own seed; the best on validation
+            problems is kept.
+        patience: Epochs without improvement after which a training ends.
+        learning_rate: The highest learning rate of the schedule.
+        origin_weight: Objective labels: how much the plan that a problem was made from should rank before
+            other free plans, at first; it falls to a tenth.
+        margin: Objective triplet: how much farther away a dissimilar problem should be than a similar one.
+        semi_hard: Objective triplet: learn only from triplets within the margin.
+        channels: Widths of the encoder's convolutions.
+        hidden: Widths of the encoder's fully connected layers.
+        dimensions: Dimensions of the embedding.
+        network: The encoder's; pooled is the paper's, which has a max-pool after each convolution.
+        learned: Also use the experiences that --learn has added to the data folder. The name freezes those
+            that exist when it is first used; later the same name means the same experiences.
+        hallucination: Methods that make problems around a plan, with weights, such as rearrange=0.7
+            minimal=0.3; the methods are rearrange, maximal, minimal and learned.
     """
 
     preset: PresetName = "laptop"

@@ -20,19 +20,13 @@ def serve_memory(
 ) -> None:
     """Answer problems over HTTP, in MLflow's protocol, with ranked and checked plans of a memory.
 
-    Parameters
-    ----------
-    memory
-        Folder of a memory, or of a run with one, or a model in MLflow: models:/name/1, models:/name@alias, …
-    vehicle
-        car, differential-drive, car-1-trailer or car-2-trailers.
-    host
-        Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
-    port
-        Port to listen on; 0 takes any free one.
-    workers
-        Worker processes.
-
+    Args:
+        memory: Folder of a memory, or of a run with one, or a model in MLflow: models:/name/1,
+            models:/name@alias, …
+        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        host: Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
+        port: Port to listen on; 0 takes any free one.
+        workers: Worker processes.
     """
     from tasks.serving.serve_memory import serve_memory as task
 
@@ -48,17 +42,11 @@ def servers(
 ) -> None:
     """Run shared servers of Prefect and MLflow until Ctrl-C.
 
-    Parameters
-    ----------
-    data
-        Data folder whose records the servers show; default $MOTION_MEMORY_DATA or ./data.
-    host
-        Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
-    prefect_port
-        Port of Prefect's server.
-    mlflow_port
-        Port of MLflow's server.
-
+    Args:
+        data: Data folder whose records the servers show; default $MOTION_MEMORY_DATA or ./data.
+        host: Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
+        prefect_port: Port of Prefect's server.
+        mlflow_port: Port of MLflow's server.
     """
     from tasks.serving.shared_servers import servers as task
     from tasks.settings.environment import default_data

@@ -18,21 +18,14 @@ if TYPE_CHECKING:
 class SolveOptions:
     """How ``plan``, ``solve`` and ``route`` solve problems, except for the assist.
 
-    Parameters
-    ----------
-    planner
-        What searches where no recalled plan will do.
-    top_k
-        How many plans to recall.
-    recall
-        How to recall them; default: by the size of the memory.
-    memory
-        Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias, runs:/…
-    vehicle
-        car, differential-drive, car-1-trailer or car-2-trailers.
-    seed
-        Everything random follows from it.
-
+    Args:
+        planner: What searches where no recalled plan will do.
+        top_k: How many plans to recall.
+        recall: How to recall them; default: by the size of the memory.
+        memory: Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias,
+            runs:/…
+        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        seed: Everything random follows from it.
     """
 
     planner: PlannerName = "lattice"
@@ -69,18 +62,12 @@ class SolveOptions:
 class MapOptions:
     """How ``import-worlds`` and ``route`` read a map.
 
-    Parameters
-    ----------
-    scale
-        Metres of the map in a canonical metre, as in the memory: 2 for a robot twice as large, with goals
-        twice as far away.
-    resolution
-        Metres in a cell of a .map or NumPy map; default 1.
-    unknown
-        What unknown cells of the map count as.
-    tolerance
-        Metres that outlines of obstacles may move to have fewer pieces; 0 keeps them exact.
-
+    Args:
+        scale: Metres of the map in a canonical metre, as in the memory: 2 for a robot twice as large, with
+            goals twice as far away.
+        resolution: Metres in a cell of a .map or NumPy map; default 1.
+        unknown: What unknown cells of the map count as.
+        tolerance: Metres that outlines of obstacles may move to have fewer pieces; 0 keeps them exact.
     """
 
     scale: float = 1.0

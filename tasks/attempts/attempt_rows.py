@@ -26,7 +26,6 @@ def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicl
         memory: name of the memory that it used, if any.
         run_id: the run that made the memory, if any.
         vehicle: who drives.
-
     """
     row = {name: getattr(attempt, name) for name in _FIELDS}
     if not attempt.solved:

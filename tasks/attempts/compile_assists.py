@@ -41,7 +41,6 @@ def compile_assists(
         vehicle: whose kernels are compiled.
         planner: the planner that is assisted.
         strategies: strategies of recall.
-
     """
     workspace = Workspace()
     plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan

@@ -29,7 +29,6 @@ def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehi
 
     Raises:
         PlanFaultError: the plan does not solve the problem.
-
     """
     judged = judged_attempt(problem, attempt, accepted, vehicle)
     if judged.verified is False and attempt.plan is not None:

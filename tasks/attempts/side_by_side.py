@@ -52,7 +52,6 @@ def in_turn(
 
     Returns:
         what each attempt returned, by the number of the problem and of the way.
-
     """
     turns = [generator(seed, "order", problem.id).permutation(ways) for problem in problems]
     made: dict[tuple[int, int], Made] = {}
@@ -86,7 +85,6 @@ def side_by_side(
 
     Raises:
         PlanFaultError: the authority finds fault with a plan.
-
     """
     vehicle, seed, workspace = chunk.vehicle, chunk.settings.seed, Workspace()
 

@@ -59,24 +59,15 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
     The verdict of a version is noted last, after the alias is moved, which is one step. So a version without
     a verdict was interrupted, and the same command finishes it.
 
-    Parameters
-    ----------
-    data
-        The data folder.
-    run
-        The run, whose stages are done.
-    registry
-        Where the memories are registered.
-    approve
-        Whether better challengers wait for ``motion-memory promote``.
+    Args:
+        data: the data folder.
+        run: the run, whose stages are done.
+        registry: where the memories are registered.
+        approve: whether better challengers wait for ``motion-memory promote``.
 
-    Raises
-    ------
-    RunError
-        The registry cannot be reached, or somebody changed a champion meanwhile.
-    StorageError
-        A memory is damaged.
-
+    Raises:
+        RunError: the registry cannot be reached, or somebody changed a champion meanwhile.
+        StorageError: a memory is damaged.
     """
     judged_versions = [_register(data, run, registry, memory, approve) for memory in run.memories]
     _log(judged_versions)

@@ -43,15 +43,11 @@ class BenchmarkedMemory(NamedTuple):
 def benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
     """Look up the benchmark of a memory: of a registered version, or of the run whose folder holds it.
 
-    Parameters
-    ----------
-    memory
-        What ``--memory`` was given: a folder or a model's address. None means that no memory is used.
+    Args:
+        memory: what ``--memory`` was given: a folder or a model's address. None means that no memory is used.
 
-    Returns
-    -------
-    The memory, or None if it has no benchmark or the registry does not answer: solving goes on without.
-
+    Returns:
+        the memory, or None if it has no benchmark or the registry does not answer: solving goes on without.
     """
     model = _MODEL.fullmatch(memory) if memory else None
     try:
@@ -96,19 +92,13 @@ def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data:
 
     Neither a failure to store nor a failure to send is raised: the problems are solved.
 
-    Parameters
-    ----------
-    memory
-        The memory with its benchmark.
-    now
-        How useful the memory was just now, by planner and configuration.
-    data
-        A data folder whose Prefect server gets the events, besides that of the default folder, or None.
+    Args:
+        memory: the memory with its benchmark.
+        now: how useful the memory was just now, by planner and configuration.
+        data: a data folder whose Prefect server gets the events, besides that of the default folder, or None.
 
-    Returns
-    -------
-    A line for each comparison.
-
+    Returns:
+        a line for each comparison.
     """
     comparisons = drifts(memory.name, now, memory.benchmark)
     lines = [str(drift) for drift in comparisons]

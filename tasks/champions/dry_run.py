@@ -31,7 +31,6 @@ def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
 
     Raises:
         RunError: the registry cannot be reached.
-
     """
     path = local_place(data).expanduser().absolute()
     if not fetch(path / MARK).is_file():

@@ -52,20 +52,13 @@ class PendingRetraining(NamedTuple):
 def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Registry) -> PendingRetraining:
     """Look up in the registry and the data folder what a retraining would do; write nothing.
 
-    Parameters
-    ----------
-    folder
-        The data folder, which holds the experiences gained on the job.
-    settings
-        The settings of a run; they name the memories.
-    registry
-        The registry of the champions.
+    Args:
+        folder: the data folder, which holds the experiences gained on the job.
+        settings: the settings of a run; they name the memories.
+        registry: the registry of the champions.
 
-    Raises
-    ------
-    RunError
-        The registry cannot be reached.
-
+    Raises:
+        RunError: the registry cannot be reached.
     """
     champions, last_judged, seen_snapshots = {}, {}, {}
     for memory in settings.memory_names:
@@ -120,24 +113,16 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
     the retraining, and the champions are copied into the folder of the run. A retraining that was interrupted
     uses the same experiences and the same copies again.
 
-    Parameters
-    ----------
-    folder
-        The data folder.
-    settings
-        What a run is asked to do.
-    registry
-        The registry of the champions.
+    Args:
+        folder: the data folder.
+        settings: what a run is asked to do.
+        registry: the registry of the champions.
 
-    Returns
-    -------
-    None, one or two runs. There is none for classes without new experiences.
+    Returns:
+        None, one or two runs. There is none for classes without new experiences.
 
-    Raises
-    ------
-    RunError
-        The registry cannot be reached.
-
+    Raises:
+        RunError: the registry cannot be reached.
     """
     for memory in settings.memory_names:
         _note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle)))

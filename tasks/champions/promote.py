@@ -50,22 +50,15 @@ def promote(registry: Registry, challenger: Version) -> None:
 def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
     """Promote the challengers that await approval.
 
-    Parameters
-    ----------
-    data
-        The data folder.
-    memory
-        The memory whose challenger is promoted; None promotes those of all memories.
+    Args:
+        data: the data folder.
+        memory: the memory whose challenger is promoted; None promotes those of all memories.
 
-    Returns
-    -------
-    The changes of champions.
+    Returns:
+        the changes of champions.
 
-    Raises
-    ------
-    RunError
-        No challenger awaits approval, or a champion has changed since its challenger was judged.
-
+    Raises:
+        RunError: no challenger awaits approval, or a champion has changed since its challenger was judged.
     """
     registry = _registry(data)
     challengers = [registry.aliased(name, CHALLENGER) for name in _names(registry, memory)]
@@ -88,22 +81,15 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
 def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
     """Make the champion before the current one champion again.
 
-    Parameters
-    ----------
-    data
-        The data folder.
-    memory
-        The memory whose champion changes; None changes those that the last retraining promoted.
+    Args:
+        data: the data folder.
+        memory: the memory whose champion changes; None changes those that the last retraining promoted.
 
-    Returns
-    -------
-    The changes of champions.
+    Returns:
+        the changes of champions.
 
-    Raises
-    ------
-    RunError
-        There was no champion before, or its version is no longer in the registry.
-
+    Raises:
+        RunError: there was no champion before, or its version is no longer in the registry.
     """
     registry = _registry(data)
     current = [registry.aliased(name) for name in _names(registry, memory)]

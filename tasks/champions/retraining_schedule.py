@@ -62,7 +62,6 @@ def serve(
     Raises:
         UsageError: both ``every`` and ``cron`` are given, or one of them is not a schedule.
         InUseError: another command uses the data folder.
-
     """
     schedule = _schedule(every, cron)
     with locked_folder(data) as folder:  # raises if it is in use; each retraining locks it again

@@ -85,7 +85,6 @@ def chunks_of(stage: str, data: str, settings: RunSettings, class_name: str, cut
         settings: the settings of the run.
         class_name: a problem class, or the name of a memory.
         cut: how many items there are, and how many of them make a chunk.
-
     """
     bounds = [(first, min(first + cut.size, cut.total)) for first in range(0, cut.total, cut.size)]
     keys = [key_of(stage, class_name, *each, *cut.inputs) for each in bounds]

@@ -69,7 +69,6 @@ def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterato
     Raises:
         RuntimeError: no scheduler answers at the address, or it does not accept this client's certificate.
         UsageError: the address and Dask's settings disagree on encryption.
-
     """
     outer = _shared.get()
     if outer is not None:
@@ -188,7 +187,6 @@ def run_stage(stage: Stage[Result], data: str, settings: RunSettings) -> dict[Ch
     Raises:
         ChunkError: a chunk failed.
         RunError: the scheduler went away for too long or too often.
-
     """
     results: dict[Chunk, Result] = {}
     while left := [chunk for chunk in stage.chunks(data, settings) if chunk not in results]:
@@ -211,7 +209,6 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
     Raises:
         ChunkError: a piece failed; the others are not awaited.
         RunError: the scheduler went away for too long or too often.
-
     """
     task, sizes = piece_task(job), [job.units(piece) for piece in pieces]
     done: dict[int, Done[Result]] = {}

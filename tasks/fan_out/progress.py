@@ -34,7 +34,6 @@ def progress(work: str, total: int = 0, end_is_told: bool = True) -> Iterator[Ca
 
     Yields:
         a function to call with the number of finished items, and with the number of all if ``total`` was 0.
-
     """
     began = time.monotonic()
     last = Progress(work, 0, total, began, False, end_is_told)

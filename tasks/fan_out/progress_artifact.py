@@ -26,7 +26,6 @@ def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show
 
     Yields:
         a function to call with the number of finished items.
-
     """
     from prefect import artifacts
 

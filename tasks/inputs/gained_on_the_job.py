@@ -36,7 +36,6 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
 
     Returns:
         how many plans were added.
-
     """
     new = [
         (Experience(problem, attempt.plan, vehicle), attempt)
@@ -65,7 +64,6 @@ def with_gained(settings: RunSettings, data: Path, name: str) -> RunSettings:
 
     Raises:
         StorageError: nothing was learned for the vehicle.
-
     """
     folder = open_data_folder(data).gained(settings.vehicle)
     snapshot = take_snapshot(folder, checked_name(name), vehicle_named(settings.vehicle))

@@ -109,17 +109,13 @@ class Registry:
     ) -> Version:
         """Register a logged model as a version, once however often this is called.
 
-        Parameters
-        ----------
-        name
-            The memory's name in the registry.
-        run_id, model_id
-            The MLflow run and the logged model that the version is made of.
-        key
-            What the version was made from; a version with the same key is taken again.
-        tags, description
-            Written to the version, whether it is new or not.
-
+        Args:
+            name: the memory's name in the registry.
+            run_id: the MLflow run that logged the memory.
+            model_id: the logged model that the version is made of.
+            key: what the version was made from; a version with the same key is taken again.
+            tags: written to the version, whether it is new or not.
+            description: likewise.
         """
         self._missing = False
         version = next((each for each in self.versions(name) if each.tag("key") == key), None)

@@ -15,16 +15,12 @@ from tasks.settings.run_settings import COMBINED
 def memory_at(address: str) -> Iterator[Path]:
     """The folder of a memory, kept for as long as the context lasts.
 
-    Parameters
-    ----------
-    address
-        The folder of a memory; or of a run, for its combined memory or its only one; or a model in MLflow.
+    Args:
+        address: the folder of a memory; or of a run, for its combined memory or its only one; or a model in
+            MLflow.
 
-    Raises
-    ------
-    RunError
-        The run has several memories, or MLflow has none at this address.
-
+    Raises:
+        RunError: the run has several memories, or MLflow has none at this address.
     """
     with memory_folder(address) as folder:
         assert folder is not None  # only an address of None has no folder

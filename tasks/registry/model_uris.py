@@ -86,24 +86,16 @@ def load_from(address: str, vehicle: Vehicle) -> Memory:
 def download(uri: str, scratch: str, server: str) -> Path:
     """Download a model's memory from MLflow.
 
-    Parameters
-    ----------
-    uri
-        The model: ``models:/…`` or ``runs:/…``.
-    scratch
-        The folder to put it into.
-    server
-        The tracking URI of MLflow.
+    Args:
+        uri: the model: ``models:/…`` or ``runs:/…``.
+        scratch: the folder to put it into.
+        server: the tracking URI of MLflow.
 
-    Returns
-    -------
-    The memory's folder.
+    Returns:
+        the memory's folder.
 
-    Raises
-    ------
-    RunError
-        MLflow does not answer, or holds no such model.
-
+    Raises:
+        RunError: MLflow does not answer, or holds no such model.
     """
     set_mlflow_environment()
     from mlflow.artifacts import download_artifacts

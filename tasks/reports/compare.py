@@ -59,7 +59,6 @@ def compare(
         UsageError: there are fewer than two runs, or ``out`` has another ending or lies in a run's folder.
         StorageError: a folder is not a run, its settings were edited, or it has no attempt that one of the
             first run can be compared with.
-
     """
     if len(runs) < 2:
         raise UsageError(f"{len(runs)} run to compare: give two or more, folders in DATA/runs.")

@@ -32,7 +32,6 @@ def export_run(folder: Path, form: str, out: Path) -> None:
     Raises:
         UsageError: another form, or a path that does not fit the form or lies in the run's folder.
         StorageError: the folder is not a run, or has no attempts.
-
     """
     check_known("format", [form], ENDINGS)
     if ENDINGS[form] and out.suffix != ENDINGS[form]:

@@ -56,7 +56,6 @@ def measure_in_turn(
         UsageError: there are fewer than 1 problems.
         StorageError: the runs have another vehicle, difficulty or no class and planner in common, or a
             memory is missing.
-
     """
     check_count("problems", problems)
     classes, planners = _in_common(first.settings, other.settings)

@@ -115,7 +115,6 @@ def check_verified(attempts: pd.DataFrame) -> None:
 
     Raises:
         StorageError: there is such an attempt.
-
     """
     if "verified" not in attempts:  # rows from before the answer was kept
         return
@@ -139,7 +138,6 @@ def claims_by_other(data: str, settings: RunSettings) -> list[Claim]:
     Returns:
         the claims by the run of that folder with the same classes, vehicle, difficulty and seed and the most
         experiences and test problems; none if there is no such run.
-
     """
     found = []
     for run, other in _runs_with_rows(data):
@@ -176,7 +174,6 @@ def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> 
 
     Returns:
         attempts, with the column ``experiences``; none if all runs have the same number.
-
     """
     own = run_folder(data, settings)
     results: dict[int, Path] = {}  # by number of experiences

@@ -52,7 +52,6 @@ def page_of(
         claims: the paper's claims, with a verdict each.
         others: the same by the other method; empty if that was not measured.
         made_by: "host" and "commit", and all that the rows say of them.
-
     """
     problems = attempts["problem_id"].nunique()
     return page(

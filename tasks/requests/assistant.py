@@ -63,26 +63,19 @@ class Assistant:
     ) -> None:
         """Check the settings; memories are loaded later.
 
-        Parameters
-        ----------
-        planner, assist, vehicle, recall
-            Names; ``recall`` None takes the strategy that suits the memory.
-        top_k
-            How many plans to recall, at least 1.
-        memory
-            The folder of a memory or a run, or a model in MLflow; None for assists without a memory.
-        seed
-            Seed of the search, 0 or more.
-        improve_seconds
-            How long to improve a plan after it is found, in seconds.
+        Args:
+            planner: the planner's name.
+            assist: how the memory helps.
+            top_k: how many plans to recall, at least 1.
+            memory: the folder of a memory or a run, or a model in MLflow; None for assists without a memory.
+            seed: seed of the search, 0 or more.
+            vehicle: the vehicle's name.
+            improve_seconds: how long to improve a plan after it is found, in seconds.
+            recall: the strategy of recall; None takes the one that suits the memory.
 
-        Raises
-        ------
-        UsageError
-            A name is unknown, a number is out of range, or the assist needs a memory.
-        StorageError
-            The memory lies in object storage and cannot be fetched.
-
+        Raises:
+            UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
+            StorageError: the memory lies in object storage and cannot be fetched.
         """
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
@@ -175,30 +168,20 @@ def plan_one(
 ) -> tuple[Attempt, Plan]:
     """Plan for the one problem in a file.
 
-    Parameters
-    ----------
-    assistant
-        Solves the problem.
-    problem
-        The file; it must hold one problem.
-    out, drawing
-        Where to write the plan and a picture, or None.
-    explained
-        Whether to log and draw the recalled plans, where they collide and how they were used.
-    learn
-        The data folder to which the problem and its plan are added as an experience, or None.
+    Args:
+        assistant: solves the problem.
+        problem: the file; it must hold one problem.
+        out: where to write the plan, or None.
+        drawing: where to draw it, or None.
+        explained: whether to log and draw the recalled plans, where they collide and how they were used.
+        learn: the data folder to which the problem and its plan are added as an experience, or None.
 
-    Returns
-    -------
-    The attempt and its plan, in the frame of the problem.
+    Returns:
+        the attempt and its plan, in the frame of the problem.
 
-    Raises
-    ------
-    UsageError
-        The picture's format is unknown, or an output would be written over an input.
-    RunError
-        The file does not hold exactly one problem, or no plan was found.
-
+    Raises:
+        UsageError: the picture's format is unknown, or an output would be written over an input.
+        RunError: the file does not hold exactly one problem, or no plan was found.
     """
     check_picture(drawing)
     check_outputs([problem, *assistant.files], [out, drawing])

@@ -91,32 +91,21 @@ def drive_route(
 ) -> DrivenRoute:
     """Plan a route over a map, check it as one plan, and write plan and picture.
 
-    Parameters
-    ----------
-    path
-        The map's file.
-    map_format
-        The file's format, or None to recognise it by the file's ending.
-    start
-        The first pose as ``x,y,heading``, in metres and radians, in the map's frame.
-    goals
-        The goals in the order of the drive, each as ``x,y`` in metres.
-    assistant
-        Solves the local problems.
-    settings
-        How to read the map, and the metres of the map in a canonical metre.
-    out, drawing
-        Where to write the plan and a picture, or None.
+    Args:
+        path: the map's file.
+        map_format: the file's format, or None to recognise it by the file's ending.
+        start: the first pose as ``x,y,heading``, in metres and radians, in the map's frame.
+        goals: the goals in the order of the drive, each as ``x,y`` in metres.
+        assistant: solves the local problems.
+        settings: how to read the map, and the metres of the map in a canonical metre.
+        out: where to write the plan, or None.
+        drawing: where to draw it, or None.
 
-    Raises
-    ------
-    UsageError
-        An option is malformed, start or goal cannot be used, or an output would be written over an input.
-    RunError
-        No route was found.
-    PlanFaultError
-        The independent judge refuses the route.
-
+    Raises:
+        UsageError: an option is malformed, start or goal cannot be used, or an output would be written over
+            an input.
+        RunError: no route was found.
+        PlanFaultError: the independent judge refuses the route.
     """
     check_picture(drawing)
     check_known("format", [] if map_format is None else [map_format], FORMATS)

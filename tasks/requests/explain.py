@@ -32,17 +32,11 @@ def log_explanation(
 ) -> None:
     """Log how the memory was used, a table of the recalled plans, the work done and the times.
 
-    Parameters
-    ----------
-    attempt
-        The attempt to explain.
-    memory
-        The memory that was used, or None.
-    recalled
-        The recalled plans, best first; each ``Plan`` is in the frame of the problem.
-    scale
-        How many metres of the problem are one canonical metre.
-
+    Args:
+        attempt: the attempt to explain.
+        memory: the memory that was used, or None.
+        recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
+        scale: how many metres of the problem are one canonical metre.
     """
     _LOG.info(_recall_line(attempt, memory, recalled))
     if recalled:

@@ -47,30 +47,18 @@ def import_settings(
 ) -> ImportSettings:
     """Check the options of an import, and return its settings.
 
-    Parameters
-    ----------
-    vehicle
-        The vehicle's name; it must have room at the start of each problem.
-    seed
-        Seed of the poses on a map, 0 or more.
-    strict
-        Whether to stop at the first unfit world.
-    problems
-        How many problems of each part to import, at least 1, or None for the default.
-    scale
-        Metres of the map in a canonical metre.
-    resolution
-        Metres in a cell of the map, or None to take the map's own.
-    unknown
-        What unknown cells count as: "occupied" or "free".
-    tolerance
-        How far the outline of what is occupied may move, in metres, 0 or more.
+    Args:
+        vehicle: the vehicle's name; it must have room at the start of each problem.
+        seed: seed of the poses on a map, 0 or more.
+        strict: whether to stop at the first unfit world.
+        problems: how many problems of each part to import, at least 1, or None for the default.
+        scale: metres of the map in a canonical metre.
+        resolution: metres in a cell of the map, or None to take the map's own.
+        unknown: what unknown cells count as: "occupied" or "free".
+        tolerance: how far the outline of what is occupied may move, in metres, 0 or more.
 
-    Raises
-    ------
-    UsageError
-        An option is out of range or its name is unknown.
-
+    Raises:
+        UsageError: an option is out of range or its name is unknown.
     """
     check_known("vehicle", [vehicle], VEHICLES)
     check_known("meaning of unknown cells", [unknown], get_args(Unknown))
@@ -105,33 +93,21 @@ def import_worlds(
 ) -> CellTable:
     """Import worlds or a map, and write the problems.
 
-    Parameters
-    ----------
-    path
-        The file or folder to import.
-    source_format
-        Its format, or None to recognise it.
-    out
-        Where to write: a file of problems, or a folder with a file for each part.
-    part
-        One of the parts of the worlds, or "both" for "train" and "test".
-    settings
-        How worlds and maps are read.
-    drawing
-        Where to draw the map and the problems, or None.
+    Args:
+        path: the file or folder to import.
+        source_format: its format, or None to recognise it.
+        out: where to write: a file of problems, or a folder with a file for each part.
+        part: one of the parts of the worlds, or "both" for "train" and "test".
+        settings: how worlds and maps are read.
+        drawing: where to draw the map and the problems, or None.
 
-    Returns
-    -------
-    A table that counts the problems of each part.
+    Returns:
+        a table that counts the problems of each part.
 
-    Raises
-    ------
-    UsageError
-        An option is not possible or would change nothing, ``out`` holds something else, or an output would be
-        written over an input.
-    RunError
-        There is no problem to write, or two parts have a problem of the same id.
-
+    Raises:
+        UsageError: an option is not possible or would change nothing, ``out`` holds something else, or an
+            output would be written over an input.
+        RunError: there is no problem to write, or two parts have a problem of the same id.
     """
     check_known("format", [] if source_format is None else [source_format], FORMATS)
     check_known("part", [part], (*PARTS, BOTH))

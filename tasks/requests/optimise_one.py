@@ -78,24 +78,15 @@ def initial_guess(
 ) -> InitialGuess:
     """The source of the first guess, from the options of the command; the default is a plan by Follow.
 
-    Parameters
-    ----------
-    plan_file
-        A plan file to begin with, or None.
-    planner
-        The planner whose plan to begin with, or None.
-    straight
-        Whether to begin with a straight line from start to goal.
-    vehicle
-        The vehicle's name.
-    seed
-        The planner's seed, 0 or more.
+    Args:
+        plan_file: a plan file to begin with, or None.
+        planner: the planner whose plan to begin with, or None.
+        straight: whether to begin with a straight line from start to goal.
+        vehicle: the vehicle's name.
+        seed: the planner's seed, 0 or more.
 
-    Raises
-    ------
-    UsageError
-        Two guesses are chosen, a name is unknown, or the seed is negative.
-
+    Raises:
+        UsageError: two guesses are chosen, a name is unknown, or the seed is negative.
     """
     options = {"--plan": plan_file, "--planner": planner, "--straight": straight}
     given = [option for option, value in options.items() if value]
@@ -112,25 +103,18 @@ def optimise_one(
 ) -> OptimisedOne:
     """Optimise a plan for the one problem in a file.
 
-    Parameters
-    ----------
-    initial
-        Where the first guess comes from.
-    problem_file
-        The file; it must hold one problem.
-    clearance_weight
-        Weight of the clearance in the objective, 0 or more; 0 asks for the least time alone.
-    out, drawing
-        Where to write the plan and a picture, or None.
+    Args:
+        initial: where the first guess comes from.
+        problem_file: the file; it must hold one problem.
+        clearance_weight: weight of the clearance in the objective, 0 or more; 0 asks for the least time
+            alone.
+        out: where to write the plan, or None.
+        drawing: where to draw it, or None.
 
-    Raises
-    ------
-    UsageError
-        The weight is negative or infinite, the picture's format is unknown, or an output would be written
-        over an input.
-    RunError
-        The file does not hold exactly one problem, or the optimisation does not converge.
-
+    Raises:
+        UsageError: the weight is negative or infinite, the picture's format is unknown, or an output would be
+            written over an input.
+        RunError: the file does not hold exactly one problem, or the optimisation does not converge.
     """
     check_picture(drawing)
     check_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], [out, drawing])

@@ -69,19 +69,13 @@ class RobotPlanner:
     def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
         """Plan for one problem; if there is no plan, the answer says so.
 
-        Parameters
-        ----------
-        problem
-            A ``Problem``, which is not checked again, or a problem in the exchange format
-            (docs/problem-files.md) as a mapping or JSON text.
+        Args:
+            problem: a ``Problem``, which is not checked again, or a problem in the exchange format
+                (docs/problem-files.md) as a mapping or JSON text.
 
-        Raises
-        ------
-        ValueError
-            The problem is malformed or impossible, or the memory is not made for its scale.
-        PlanFaultError
-            The independent judge refuses the plan.
-
+        Raises:
+            ValueError: the problem is malformed or impossible, or the memory is not made for its scale.
+            PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
         return self._planned(self.problem(problem), began)
@@ -104,30 +98,20 @@ class RobotPlanner:
     ) -> Answer:
         """Plan for a problem that is in arrays already; otherwise like ``plan``.
 
-        Parameters
-        ----------
-        start
-            x, y in metres, heading in radians.
-        goal
-            x, y in metres.
-        points
-            ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after another.
-        polygon_starts
-            ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i + 1]]``.
-        goal_radius
-            Metres.
-        bounds
-            x_min, y_min, x_max, y_max in metres.
-        scale
-            Metres of these lengths in one metre of the memory's problems.
+        Args:
+            start: x, y in metres, heading in radians.
+            goal: x, y in metres.
+            points: ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after
+                another.
+            polygon_starts: ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i +
+                1]]``.
+            goal_radius: Metres.
+            bounds: x_min, y_min, x_max, y_max in metres.
+            scale: Metres of these lengths in one metre of the memory's problems.
 
-        Raises
-        ------
-        ValueError
-            A polygon is none, or the problem is impossible.
-        PlanFaultError
-            The independent judge refuses the plan.
-
+        Raises:
+            ValueError: a polygon is none, or the problem is impossible.
+            PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
         problem = checked_problem(
@@ -186,29 +170,19 @@ def load_planner(
 ) -> RobotPlanner:
     """Read and check a memory, compile the kernels and plan once, so that the first real call is fast.
 
-    Parameters
-    ----------
-    memory
-        The folder of a memory, the folder of a run with one memory, or a model in MLflow.
-    vehicle, planner, assist, recall
-        Names; ``recall`` None takes the strategy that suits the memory.
-    top_k
-        How many plans to recall, at least 1.
-    seed
-        Seed of the search.
-    judged
-        Whether code that shares nothing with the planners simulates and sweeps each plan again, which takes
-        some milliseconds.
+    Args:
+        memory: the folder of a memory, the folder of a run with one memory, or a model in MLflow.
+        vehicle, planner, assist, recall: Names; ``recall`` None takes the strategy that suits the memory.
+        top_k: how many plans to recall, at least 1.
+        seed: seed of the search.
+        judged: whether code that shares nothing with the planners simulates and sweeps each plan again, which
+            takes some milliseconds.
 
-    Raises
-    ------
-    UsageError
-        A name is unknown, or ``top_k`` is below 1.
-    StorageError
-        The memory is missing, damaged, or made for another vehicle.
-    RunError
-        MLflow does not have the memory, the run has several, or its encoder needs a library that is missing.
-
+    Raises:
+        UsageError: a name is unknown, or ``top_k`` is below 1.
+        StorageError: the memory is missing, damaged, or made for another vehicle.
+        RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
+            missing.
     """
     check_known("vehicle", [vehicle], VEHICLES)
     check_known("planner", [planner], PLANNERS)

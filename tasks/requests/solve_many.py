@@ -93,7 +93,6 @@ def solve_many(
             be written over an input.
         StorageError: a problem is malformed, or two have the same id. All other parts are solved and kept,
             so once the problem is corrected the same command has little left to do.
-
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")

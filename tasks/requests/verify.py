@@ -13,22 +13,14 @@ from tasks.settings.errors import RunError, UsageError
 def verify(folder: Path, sample: float, workers: int) -> None:
     """Check the files of a data folder.
 
-    Parameters
-    ----------
-    folder
-        The data folder.
-    sample
-        Share of the benchmark's problems that are attempted again, 0 to 1.
-    workers
-        The number of worker processes.
+    Args:
+        folder: the data folder.
+        sample: share of the benchmark's problems that are attempted again, 0 to 1.
+        workers: the number of worker processes.
 
-    Raises
-    ------
-    UsageError
-        The sample is not a share.
-    RunError
-        The folder is no data folder, or something in it is wrong.
-
+    Raises:
+        UsageError: the sample is not a share.
+        RunError: the folder is no data folder, or something in it is wrong.
     """
     if not 0.0 <= sample <= 1.0:
         raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")

@@ -60,20 +60,13 @@ Check = Callable[[], Findings]
 def verify_folder(folder: Path, sample: float, workers: int) -> None:
     """Check a whole data folder, and log what was checked, with counts.
 
-    Parameters
-    ----------
-    folder
-        The data folder.
-    sample
-        The share of the attempted problems whose attempts are made again, 0 to 1.
-    workers
-        The number of worker processes; one worker checks in this process.
+    Args:
+        folder: the data folder.
+        sample: the share of the attempted problems whose attempts are made again, 0 to 1.
+        workers: the number of worker processes; one worker checks in this process.
 
-    Raises
-    ------
-    RunError
-        The folder holds no run, or something in it is wrong; the faults are logged.
-
+    Raises:
+        RunError: the folder holds no run, or something in it is wrong; the faults are logged.
     """
     data = open_data_folder(folder)
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]

@@ -40,17 +40,11 @@ class Guard:
     ) -> None:
         """Guard an ASGI application.
 
-        Parameters
-        ----------
-        app
-            The application to protect.
-        secret
-            The ``user:password`` to ask for (HTTP Basic); None asks for none.
-        names
-            Names by which clients may call the server, besides its address.
-        closed
-            Paths that nobody gets an answer from.
-
+        Args:
+            app: the application to protect.
+            secret: the ``user:password`` to ask for (HTTP Basic); None asks for none.
+            names: names by which clients may call the server, besides its address.
+            closed: paths that nobody gets an answer from.
         """
         self._app = app
         self._credentials = None if secret is None else base64.b64encode(secret.encode())

@@ -25,20 +25,13 @@ HEALTH_SECONDS: Final = 60  # a worker that does not answer for so long is repla
 def bound(host: str, port: int) -> socket.socket:
     """A socket bound to an address; connections are refused until a server listens on it.
 
-    Parameters
-    ----------
-    host
-        The name or address of this machine.
-    port
-        The port; 0 takes a free one.
+    Args:
+        host: the name or address of this machine.
+        port: the port; 0 takes a free one.
 
-    Raises
-    ------
-    UsageError
-        There is no such port.
-    RunError
-        The address is in use, or is not an address of this machine.
-
+    Raises:
+        UsageError: there is no such port.
+        RunError: the address is in use, or is not an address of this machine.
     """
     if not 0 <= port <= 65_535:
         raise UsageError(f"Port {port}: give one from 1 to 65535, or 0 for a free one.")
@@ -79,17 +72,11 @@ def config_of(
 
     This also lets the process open as many files as its connections need.
 
-    Parameters
-    ----------
-    app
-        Makes the ASGI application; with several workers it must be importable.
-    workers
-        The number of worker processes.
-    log_level
-        The least important messages of Uvicorn that are printed.
-    stop_seconds
-        How long requests that are being answered at the end may take.
-
+    Args:
+        app: makes the ASGI application; with several workers it must be importable.
+        workers: the number of worker processes.
+        log_level: the least important messages of Uvicorn that are printed.
+        stop_seconds: how long requests that are being answered at the end may take.
     """
     from uvicorn import Config
 
@@ -117,22 +104,14 @@ def serve_with(
 ) -> None:
     """Serve an application by worker processes until Ctrl-C; a worker that dies is replaced.
 
-    Parameters
-    ----------
-    app
-        An importable function that makes the ASGI application; each worker calls it.
-    listener
-        The bound socket.
-    workers
-        The number of worker processes.
-    on_ready
-        Called once, when all workers are ready.
+    Args:
+        app: an importable function that makes the ASGI application; each worker calls it.
+        listener: the bound socket.
+        workers: the number of worker processes.
+        on_ready: called once, when all workers are ready.
 
-    Raises
-    ------
-    RunError
-        A worker died before it was ready, or took too long.
-
+    Raises:
+        RunError: a worker died before it was ready, or took too long.
     """
     from uvicorn.supervisors import Multiprocess
 

@@ -26,13 +26,9 @@ class Sockets:
     def __init__(self, app: ASGIApp, secret: str) -> None:
         """Protect an application.
 
-        Parameters
-        ----------
-        app
-            Prefect's server, or another one whose websockets begin in the same way.
-        secret
-            The ``user:password`` that a first message must have as its ``token``.
-
+        Args:
+            app: Prefect's server, or another one whose websockets begin in the same way.
+            secret: the ``user:password`` that a first message must have as its ``token``.
         """
         self._app = app
         self._secret = secret.encode()

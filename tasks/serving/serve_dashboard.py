@@ -33,20 +33,13 @@ _LOG = logging.getLogger(__name__)
 def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
     """Serve the pages of a data folder until Ctrl-C.
 
-    Parameters
-    ----------
-    data
-        The data folder.
-    port
-        A port from 1 to 65535, or 0 for any free one.
-    open_browser
-        Whether to open the dashboard in a browser.
+    Args:
+        data: the data folder.
+        port: a port from 1 to 65535, or 0 for any free one.
+        open_browser: whether to open the dashboard in a browser.
 
-    Raises
-    ------
-    UsageError
-        The port cannot be used, or the folder is no data folder.
-
+    Raises:
+        UsageError: the port cannot be used, or the folder is no data folder.
     """
     folder = _existing_folder(data)
     if not 0 <= port <= 65535:

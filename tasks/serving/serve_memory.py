@@ -25,26 +25,17 @@ _LOG = logging.getLogger(__name__)
 def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) -> None:
     """Serve until Ctrl-C or SIGTERM.
 
-    Parameters
-    ----------
-    memory
-        The folder of a memory, the folder of a run with one memory, or a model in MLflow.
-    vehicle
-        The vehicle's name.
-    host, port
-        The address to listen on; port 0 takes any free one.
-    workers
-        The number of worker processes.
+    Args:
+        memory: the folder of a memory, the folder of a run with one memory, or a model in MLflow.
+        vehicle: the vehicle's name.
+        host: the address to listen on.
+        port: the port; 0 takes any free one.
+        workers: the number of worker processes.
 
-    Raises
-    ------
-    UsageError
-        The vehicle is unknown, or the address is malformed or not protected.
-    RunError
-        The address cannot be used, or there is no such memory in MLflow.
-    StorageError
-        The memory is missing, damaged, or made for another vehicle.
-
+    Raises:
+        UsageError: the vehicle is unknown, or the address is malformed or not protected.
+        RunError: the address cannot be used, or there is no such memory in MLflow.
+        StorageError: the memory is missing, damaged, or made for another vehicle.
     """
     check_known("vehicle", [vehicle], VEHICLES)
     check_address(host)

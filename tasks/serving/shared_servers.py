@@ -44,22 +44,15 @@ _LOG = logging.getLogger(__name__)
 def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     """Serve until Ctrl-C or SIGTERM.
 
-    Parameters
-    ----------
-    data
-        The data folder; it is made if it does not exist.
-    host
-        The address to listen on.
-    prefect_port, mlflow_port
-        The ports; 0 takes any free one.
+    Args:
+        data: the data folder; it is made if it does not exist.
+        host: the address to listen on.
+        prefect_port: the port of Prefect's server; 0 takes any free one.
+        mlflow_port: the port of MLflow's server.
 
-    Raises
-    ------
-    UsageError
-        The address is malformed or not protected.
-    RunError
-        Servers run already for the folder, a port cannot be used, or a server ended.
-
+    Raises:
+        UsageError: the address is malformed or not protected.
+        RunError: Servers run already for the folder, a port cannot be used, or a server ended.
     """
     check_address(host)
     folder = open_data_folder(data)

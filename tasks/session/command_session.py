@@ -44,7 +44,6 @@ def command_session(
         InUseError: another command uses the data folder.
         UsageError: workers of the scheduler could not reach the Prefect server, or the data folder is in
             object storage and no MLflow server is named.
-
     """
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)

@@ -32,13 +32,9 @@ from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
 def warm_up(cluster: Any, vehicle: str) -> Iterator[None]:
     """Let the workers of a cluster compile the kernels while the context lasts.
 
-    Parameters
-    ----------
-    cluster
-        What ``tasks.fan_out.fan_out.cluster`` yields.
-    vehicle
-        Name of the vehicle to compile for.
-
+    Args:
+        cluster: what ``tasks.fan_out.fan_out.cluster`` yields.
+        vehicle: name of the vehicle to compile for.
     """
     with Client(cluster, set_as_default=False) as client:
         futures = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]

@@ -22,7 +22,6 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
 
     Raises:
         UsageError: one of the names is not among the choices.
-
     """
     for name in names:
         if name not in choices:
@@ -56,7 +55,6 @@ def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> Non
 
     Raises:
         UsageError: an output is an input by whatever name, or lies in a folder that is read.
-
     """
     read = [(path, Path(os.path.realpath(path))) for path in inputs]
     for output in (output for output in outputs if output is not None):

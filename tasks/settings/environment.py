@@ -24,7 +24,6 @@ def environment(**variables: str) -> Iterator[None]:
 
     Args:
         variables: values by name.
-
     """
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)

@@ -162,7 +162,6 @@ def mixture_of(weighted: Sequence[str]) -> Mixture:
 
     Raises:
         UsageError: a name is unknown or given twice, or a weight is not a number above 0.
-
     """
     from planners.memory.hallucination.mixture import METHODS  # imported late: Numba costs half a second
 

@@ -39,7 +39,6 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
 
     Returns:
         [N] positions in ``drawn`` followed by ``gained``, the most useful first.
-
     """
     rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(gained)))
     everything = [*drawn, *gained]

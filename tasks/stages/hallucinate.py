@@ -96,7 +96,6 @@ def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: 
         source: of problems of the class.
         sweeps: the plans that are taught.
         bounds: x_min, y_min, x_max, y_max in metres.
-
     """
     settings, name = chunk.settings, chunk.class_name
     problems: list[MadeProblem] = []
@@ -128,7 +127,6 @@ def problems_of_champion(chunk: Chunk, wanted: AbstractSet[Identity]) -> dict[Id
 
     Returns:
         the problems of each experience that the champion's run has too.
-
     """
     champion, name = champion_run_of(chunk), chunk.class_name
     if champion is None or LEARNED in dict(chunk.settings.hallucination):
@@ -170,7 +168,6 @@ def write_labelled(
 
     Raises:
         RuntimeError: a plan does not solve a problem that was made for it.
-
     """
     problems = [problem for problem, _ in made_problems]
     grids, free = label_problems(problems, sweeps)

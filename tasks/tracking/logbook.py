@@ -50,13 +50,9 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
     It gets the settings as parameters, and tags that say on which machine and from which commit it was made.
     Its stages are child runs; the metrics by which runs are compared are logged on the parent too.
 
-    Parameters
-    ----------
-    data
-        The data folder.
-    settings
-        The settings of the run.
-
+    Args:
+        data: the data folder.
+        settings: the settings of the run.
     """
     tags = {"commit": commit(), "host": platform.node(), "learned": settings.learned}
     tags |= {name: str(getattr(settings, name)) for name in ("vehicle", "preset", "objective", "difficulty")}
@@ -69,13 +65,10 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
 def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Trained]) -> None:
     """Log a child run for each trained encoder: parameters, metrics of each epoch, and its training data.
 
-    Parameters
-    ----------
-    data, settings
-        The data folder and the settings of the run.
-    trained
-        What training left, by chunk.
-
+    Args:
+        data: the data folder.
+        settings: those of the run.
+        trained: what training left, by chunk.
     """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in trained.items():
@@ -96,15 +89,11 @@ def log_memories(
 ) -> None:
     """Log each memory as a model on the child run of its training, with its metrics and curves of recall.
 
-    Parameters
-    ----------
-    data, settings
-        The data folder and the settings of the run.
-    built
-        What building the memories left, by chunk.
-    retrieval
-        The retrieval table of the run, a row for each memory, protocol and recall.
-
+    Args:
+        data: the data folder.
+        settings: those of the run.
+        built: what building the memories left, by chunk.
+        retrieval: the retrieval table of the run, a row for each memory, protocol and recall.
     """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in built.items():
@@ -171,21 +160,15 @@ def log_judgement(
 ) -> None:
     """Log a child run for a judged memory: the verdict, all numbers, and the attempts that it rests on.
 
-    Parameters
-    ----------
-    data, settings
-        The data folder and the settings of the run.
-    memory
-        The name of the memory.
-    verdict
-        The verdict, in the words of the registry.
-    judgement
-        The comparison with the champion; None if there was none.
-    markdown
-        The verdict with its reasons, for people.
-    attempts
-        The attempts of the champion, which are none if there was no champion, and those of the challenger.
-
+    Args:
+        data: the data folder.
+        settings: those of the run.
+        memory: the name of the memory.
+        verdict: the verdict, in the words of the registry.
+        judgement: the comparison with the champion; None if there was none.
+        markdown: the verdict with its reasons, for people.
+        attempts: the attempts of the champion, which are none if there was no champion, and those of the
+            challenger.
     """
     log, run = tracker(data), run_folder(data, settings)
     key = key_of(judged_key(data, settings, memory))
@@ -238,13 +221,10 @@ def _stage(settings: RunSettings, class_name: str, seed: int) -> str:
 def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None:
     """Log a run for the sweep, with a child for each variant: parameters, and metrics of each epoch.
 
-    Parameters
-    ----------
-    data, settings
-        The data folder and the settings of the run.
-    chunks
-        The finished chunks of the sweep, one for each variant.
-
+    Args:
+        data: the data folder.
+        settings: those of the run.
+        chunks: the finished chunks of the sweep, one for each variant.
     """
     log = tracker(data)
     with _child(data, settings, "sweep") as parent:

@@ -143,17 +143,11 @@ def _refuse_too_many_corners(fields: object) -> None:
 def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:
     """Write a memory's archive into a new folder, with the files that MLflow needs to load it as a model.
 
-    Parameters
-    ----------
-    folder
-        The folder to write; it must not exist.
-    archive
-        The memory's folder.
-    vehicle
-        The vehicle's name.
-    model
-        MLflow's description of the model, which this fills.
-
+    Args:
+        folder: the folder to write; it must not exist.
+        archive: the memory's folder.
+        vehicle: the vehicle's name.
+        model: MLflow's description of the model, which this fills.
     """
     save_model(
         folder,

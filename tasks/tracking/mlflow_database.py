@@ -29,13 +29,9 @@ if TYPE_CHECKING:
 def ready_database(data: DataFolder) -> None:
     """Make the database of a data folder if there is none; upgrade it if an older MLflow made it.
 
-    Raises
-    ------
-    RunError
-        A newer MLflow made the database.
-    InUseError
-        Another command is upgrading it.
-
+    Raises:
+        RunError: a newer MLflow made the database.
+        InUseError: another command is upgrading it.
     """
     path = data.mlflow_database
     if not path.exists():

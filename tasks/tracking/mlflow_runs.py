@@ -89,21 +89,14 @@ class Tracker:
     ) -> Iterator[str]:
         """Open the MLflow run of a stage, or make it; it ends as FINISHED, or as FAILED on an error.
 
-        Parameters
-        ----------
-        run_name
-            The name of the run's folder.
-        stage
-            "run" for the parent run, else what the child run is of, such as "train trap".
-        tags
-            Set on the MLflow run.
-        parent
-            The id of the parent run, or None.
+        Args:
+            run_name: the name of the run's folder.
+            stage: "run" for the parent run, else what the child run is of, such as "train trap".
+            tags: set on the MLflow run.
+            parent: the id of the parent run, or None.
 
-        Yields
-        ------
-        The id of the MLflow run.
-
+        Yields:
+            the id of the MLflow run.
         """
         client = self._client
         run_id = self.find(run_name, stage)
@@ -181,21 +174,14 @@ class Tracker:
     def memory(self, run_id: str, name: str, archive: Path, vehicle: str) -> str:
         """Log a memory's archive as a model that the run made.
 
-        Parameters
-        ----------
-        run_id
-            The MLflow run.
-        name
-            The model's name in MLflow.
-        archive
-            The memory's folder.
-        vehicle
-            The vehicle's name.
+        Args:
+            run_id: the MLflow run.
+            name: the model's name in MLflow.
+            archive: the memory's folder.
+            vehicle: the vehicle's name.
 
-        Returns
-        -------
-        The model's id.
-
+        Returns:
+            the model's id.
         """
         from mlflow.entities import LoggedModelOutput
         from mlflow.models.model import Model
@@ -216,15 +202,12 @@ class Tracker:
     def dataset(self, run_id: str, name: str, path: Path, digest: str, context: str) -> None:
         """Log which data a run has used.
 
-        Parameters
-        ----------
-        run_id
-            The MLflow run.
-        name, path, digest
-            The name, the address and the digest of the data.
-        context
-            What the data was used for: "training" or "benchmark".
-
+        Args:
+            run_id: the MLflow run.
+            name: the name of the data.
+            path: where the data lie.
+            digest: of their content.
+            context: what the data was used for: "training" or "benchmark".
         """
         from mlflow.entities import Dataset, DatasetInput, InputTag
 
