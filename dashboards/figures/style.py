@@ -172,6 +172,12 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     return paths
 
 
+def save_picture(figure: Figure, path: Path) -> None:
+    """Save a ``figure`` in the format of the path's ending. Raises StorageError if it cannot be written."""
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, format=path.suffix[1:], dpi=_DPI)
+
+
 def _panels_below_legend(figure: Figure, rows: int, columns: int, entries: Mapping[str, Any]) -> Any:
     """Axes ``[rows, columns]`` below a legend of ``entries``, which adds to the figure's height."""
     widest = max(len(label) for label in entries)

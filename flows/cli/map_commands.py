@@ -84,7 +84,7 @@ def route(
     from tasks.requests.drive_route import drive_route
     from tasks.requests.import_worlds import import_settings
 
-    assistant = Assistant(*options.settings(assist, without_memory="fresh"))
+    assistant = Assistant(options.settings(assist, without_memory="fresh"))
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))
     driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
     write(driven.legs, *driven.summary)

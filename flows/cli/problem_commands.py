@@ -45,7 +45,7 @@ def plan(
     """
     from tasks.requests.assistant import Assistant, plan_one
 
-    assistant = Assistant(*options.settings(assist, improve_seconds))
+    assistant = Assistant(options.settings(assist, improve_seconds))
     attempt, found = plan_one(assistant, problem, out, picture, explain, learn)
     times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
     write(f"{attempt.source}, {times}")

@@ -21,7 +21,6 @@ from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.exchange.problems import read_problems
-from storage.places.files import whole_file
 from storage.places.mirror import folders_here
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
@@ -35,48 +34,29 @@ WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred tha
 
 
 class AssistantSettings(NamedTuple):
-    """How problems are to be solved: the arguments of an ``Assistant``."""
+    """How problems are to be solved."""
 
     planner: str
     assist: str
-    top_k: int
-    memory: str | None  # a folder, or a model in MLflow
-    seed: int
+    top_k: int  # how many plans to recall, at least 1
+    memory: str | None  # a folder of a memory or a run, or a model in MLflow; None for assists without
+    seed: int  # of the search, 0 or more
     vehicle: str = DEFAULT_VEHICLE
-    improve_seconds: float = 0.0
-    recall: str | None = None
+    improve_seconds: float = 0.0  # how long to improve a plan after it is found
+    recall: str | None = None  # None takes the strategy that suits the memory
 
 
 class Assistant:
     """Plans with one vehicle, planner and assist; loads the memory of a class when a problem of it comes."""
 
-    def __init__(
-        self,
-        planner: str,
-        assist: str,
-        top_k: int,
-        memory: str | Path | None,
-        seed: int,
-        vehicle: str = DEFAULT_VEHICLE,
-        improve_seconds: float = 0.0,
-        recall: str | None = None,
-    ) -> None:
+    def __init__(self, settings: AssistantSettings) -> None:
         """Check the settings; memories are loaded later.
-
-        Args:
-            planner: the planner's name.
-            assist: how the memory helps.
-            top_k: how many plans to recall, at least 1.
-            memory: the folder of a memory or a run, or a model in MLflow; None for assists without a memory.
-            seed: seed of the search, 0 or more.
-            vehicle: the vehicle's name.
-            improve_seconds: how long to improve a plan after it is found, in seconds.
-            recall: the strategy of recall; None takes the one that suits the memory.
 
         Raises:
             UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
             StorageError: the memory lies in object storage and cannot be fetched.
         """
+        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall = settings
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
         check_known("vehicle", [vehicle], VEHICLES)
@@ -88,13 +68,10 @@ class Assistant:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:
             raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
-        self.planner, self.assist, self.top_k, self.seed = planner, assist, top_k, seed
-        self.vehicle, self.improve_seconds = vehicle_named(vehicle), improve_seconds
-        needs_memory = assist not in WITHOUT_MEMORY and memory is not None
-        self._address = _local_address(str(memory)) if needs_memory else None
+        self.settings, self.vehicle = settings, vehicle_named(vehicle)
+        self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
         self._memories: dict[str, Memory] = {}
-        self.recall = recall
         self._workspace = Workspace()
 
     def memory_of(self, class_name: str) -> Memory | None:
@@ -116,7 +93,7 @@ class Assistant:
         """
         other = mirrored(to_canonical(problem)[0])
         deadline = perf_counter() + WARM_SECONDS
-        seed = self.seed
+        seed = self.settings.seed
         while True:
             attempts = [self.attempt(other, assist, seed + 1) for assist in (None, UNASSISTED.name)]
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
@@ -126,16 +103,16 @@ class Assistant:
 
     def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:
         """Attempt a canonical problem, with another assist or seed if given; the plan is not checked."""
-        assist = assist or self.assist
+        assist = assist or self.settings.assist
         return solve(
             canonical,
-            self.planner,
+            self.settings.planner,
             assist,
-            self.top_k,
+            self.settings.top_k,
             None if assist in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
-            self.seed if seed is None else seed,
+            self.settings.seed if seed is None else seed,
             vehicle=self.vehicle,
-            strategy=self.recall,
+            strategy=self.settings.recall,
             workspace=self._workspace,
         )
 
@@ -143,8 +120,9 @@ class Assistant:
         """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
         canonical, alignment = to_canonical(problem)
         attempt = self.attempt(canonical)
-        if self.improve_seconds > 0.0:
-            attempt = improved(attempt, canonical, self.improve_seconds, self.vehicle, self._workspace)
+        seconds = self.settings.improve_seconds
+        if seconds > 0.0:
+            attempt = improved(attempt, canonical, seconds, self.vehicle, self._workspace)
         attempt = check_attempt(canonical, attempt, set(), self.vehicle)
         if attempt.length_m is not None:
             attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
@@ -199,11 +177,11 @@ def plan_one(
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
+        from dashboards.figures.style import save_picture
 
-        with whole_file(drawing) as temporary:
-            caption = f"{assistant.planner}, {assistant.assist}: {summary}"
-            figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
-            figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+        caption = f"{assistant.settings.planner}, {assistant.settings.assist}: {summary}"
+        figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
+        save_picture(figure, drawing)
     if explained:
         _explain(assistant, problems[0], attempt, recalled)
     if plan is None:

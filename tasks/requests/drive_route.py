@@ -18,7 +18,6 @@ from planners.world.arrays import Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from storage.exchange.plans import PlanRecord, write_plan
-from storage.places.files import whole_file
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
@@ -48,11 +47,11 @@ class _Solver:
 
     def recalled(self, problem: Problem) -> Attempt:
         """Solve a problem with a canonical goal, with the assistant's own assist."""
-        return self._solved(problem, self.assistant.assist)
+        return self._solved(problem, self.assistant.settings.assist)
 
     def searched(self, problem: Problem) -> Attempt:
         """Solve a problem whose goal is not canonical: the memory has no plans for it."""
-        return self._solved(problem, "none" if self.assistant.assist == "none" else "fresh")
+        return self._solved(problem, "none" if self.assistant.settings.assist == "none" else "fresh")
 
     def _solved(self, problem: Problem, assist: str) -> Attempt:
         attempt = self.assistant.attempt(replace(problem, scale=self.scale), assist)
@@ -150,10 +149,10 @@ def drive_route(
     summary = _summary(route, plan, solver, assistant, scale, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
+        from dashboards.figures.style import save_picture
 
         figure = route_picture(world, route, goals_m, scale, summary[0], assistant.vehicle)
-        with whole_file(drawing) as temporary:
-            figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+        save_picture(figure, drawing)
     return DrivenRoute(_table(route, assistant, scale), summary)
 
 
@@ -182,7 +181,9 @@ def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
     """Raise PlanFaultError if the independent judge refuses the route as one plan."""
     route_faults = faults(route.problem, plan, assistant.vehicle)
     if route_faults:
-        raise PlanFaultError(f"The route over {route.problem.id}, seed {assistant.seed}: {route_faults[0]}")
+        raise PlanFaultError(
+            f"The route over {route.problem.id}, seed {assistant.settings.seed}: {route_faults[0]}"
+        )
 
 
 def _record(
@@ -196,8 +197,8 @@ def _record(
         f"{world.name}-route",
         "solved",
         max(sources, key=SOURCES.index, default="searched"),
-        assistant.planner,
-        assistant.assist,
+        assistant.settings.planner,
+        assistant.settings.assist,
         sum(solver.seconds),
         in_map_frame,
         assistant.vehicle,

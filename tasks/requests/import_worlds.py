@@ -15,7 +15,7 @@ from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.exchange.problems import write_problems
 from storage.fields import LARGEST_SCALE, SMALLEST_SCALE
-from storage.places.files import whole_file, whole_folder
+from storage.places.files import whole_folder
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.fan_out.progress import progress
@@ -200,8 +200,8 @@ def _draw(
     source: Source, settings: ImportSettings, imported_parts: Mapping[Part, Imported], drawing: Path
 ) -> None:
     from dashboards.figures.map_picture import map_picture  # late: few imports draw
+    from dashboards.figures.style import save_picture
 
     cuts: dict[str, Any] = {part: imported.cuts for part, imported in imported_parts.items()}
     figure = map_picture(load_map(source, settings), cuts, settings.scale, settings.vehicle)
-    with whole_file(drawing) as temporary:
-        figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+    save_picture(figure, drawing)

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Final, NamedTuple
 
 from dashboards.figures.pictures import picture
+from dashboards.figures.style import save_picture
 from planners.optimisation.clearance_field import least_clearance
 from planners.optimisation.guesses import straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise
@@ -18,7 +19,6 @@ from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problems import read_problems
-from storage.places.files import whole_file
 from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed
 from tasks.settings.errors import RunError, UsageError
 
@@ -135,10 +135,9 @@ def optimise_one(
         write_plan(out, _record(problem, optimised, planner, seconds, initial.vehicle))
     summary = f"{optimised.status}, {optimised.iterations} iterations, {1000 * seconds:.0f} ms"
     if drawing is not None:
-        with whole_file(drawing) as temporary:
-            caption = f"optimised, {planner}: {summary}"
-            figure = picture(problem, optimised.plan, caption, [guess], initial.vehicle, called="guess")
-            figure.savefig(temporary, format=drawing.suffix[1:], dpi=160)
+        caption = f"optimised, {planner}: {summary}"
+        figure = picture(problem, optimised.plan, caption, [guess], initial.vehicle, called="guess")
+        save_picture(figure, drawing)
     if optimised.plan is None:
         raise RunError(f"No plan for {problem.id or problem_file}: {summary}.")
     clearance = least_clearance(problem, optimised.plan.states, initial.vehicle)

@@ -178,7 +178,7 @@ SOLVE: Final = Job(
 @functools.lru_cache(maxsize=1)
 def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
     """The assistant of this process, which keeps the memories that it has read."""
-    return Assistant(*settings)
+    return Assistant(settings)
 
 
 def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:

@@ -96,7 +96,7 @@ def solve_many(
     """
     if out.suffix != ".parquet":
         raise UsageError(f"{out} does not end in .parquet; rows are written as Parquet.")
-    assistant = Assistant(*settings)  # raises UsageError early
+    assistant = Assistant(settings)  # raises UsageError early
     plan_of_one = None if plans is None else plans / f"{problems.stem}.json"  # named by the id
     check_outputs([problems, *assistant.files], [out, plans, plan_of_one])
     if learn is not None:

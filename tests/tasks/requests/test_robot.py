@@ -19,7 +19,7 @@ from planners.world.vehicles.vehicle import CAR
 from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of
-from tasks.requests.assistant import Assistant
+from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.robot import Answer, RobotPlanner, load_planner
 from tasks.settings.errors import RunError, UsageError
 from tests.storage.samples import box
@@ -40,7 +40,7 @@ def planner(memory: Path) -> RobotPlanner:
 
 
 def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> None:
-    assistant = Assistant("gust", "repair", 5, memory, 1)
+    assistant = Assistant(AssistantSettings("gust", "repair", 5, str(memory), 1))
     for i in range(COUNT):
         attempt, plan = assistant(problem(i))
         answer = planner.plan(problem(i))

@@ -122,7 +122,7 @@ def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_pa
 def test_a_picture_and_a_plan_are_written(run: RunFolder, problems: Path, tmp_path: Path) -> None:
     one = tmp_path / "one.json"
     one.write_text(problems.read_text().splitlines()[0])
-    assistant = Assistant(PLANNER, "closed", 3, run.path, 1, "car-1-trailer")
+    assistant = Assistant(AssistantSettings(PLANNER, "closed", 3, str(run.path), 1, "car-1-trailer"))
     plan_one(assistant, one, tmp_path / "plan.json", tmp_path / "plan.png")
     assert read_plan(tmp_path / "plan.json", CAR_1_TRAILER).plan is not None
     assert (tmp_path / "plan.png").stat().st_size > 10_000

@@ -214,7 +214,7 @@ def test_plan_takes_a_memory_from_mlflow(at_home: dict[str, str], tmp_path: Path
 
     place = tmp_path / "p.json"
     place.write_text(json.dumps(fields_of(EASY.draw(901, 3))))
-    assistant = Assistant("gust", "closed", 12, at_home["alias"], 1)
+    assistant = Assistant(AssistantSettings("gust", "closed", 12, at_home["alias"], 1))
     plan_one(assistant, place, tmp_path / "plan.json", None)
     record = read_plan(tmp_path / "plan.json")
     assert record.source == "recalled"
