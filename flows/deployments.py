@@ -119,9 +119,8 @@ def _command(command: Callable[..., None]) -> Flow[..., None]:
 def _told(function: Callable[..., Any], *options: type) -> str:
     """The docstring of a flow in the form that Prefect reads the descriptions of parameters from."""
     sections = [inspect.getdoc(each) or "" for each in (function, *options)]
-    lines = [line for each in sections for line in each.partition("----------\n")[2].splitlines() if line]
-    args = "".join(f" {line.strip()}" if line.startswith(" ") else f"\n    {line}:" for line in lines)
-    return "\n".join([sections[0].partition("\nParameters\n")[0].strip(), "", f"Args:{args}"])
+    args = [each.partition("Args:\n")[2].rstrip() for each in sections]
+    return "\n".join([sections[0].partition("Args:")[0], "Args:", *filter(None, args)])
 
 
 run = _stage(run_flow)
