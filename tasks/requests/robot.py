@@ -172,8 +172,11 @@ def load_planner(
 
     Args:
         memory: the folder of a memory, the folder of a run with one memory, or a model in MLflow.
-        vehicle, planner, assist, recall: Names; ``recall`` None takes the strategy that suits the memory.
+        vehicle: the vehicle's name.
+        planner: the planner's name.
+        assist: how the memory helps.
         top_k: how many plans to recall, at least 1.
+        recall: the strategy of recall; None takes the one that suits the memory.
         seed: seed of the search.
         judged: whether code that shares nothing with the planners simulates and sweeps each plan again, which
             takes some milliseconds.
