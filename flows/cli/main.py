@@ -15,7 +15,6 @@ from typing import Final
 from cyclopts import App, CycloptsError
 from cyclopts.config import Toml
 
-from flows.cli import dashboard_command as dashboard
 from flows.cli import map_commands as maps
 from flows.cli import problem_commands as problems
 from flows.cli import result_commands as results
@@ -52,7 +51,7 @@ for command in (
     *(stages.report, stages.sweep, stages.experience_curve),
     *(problems.plan, problems.optimise, problems.solve),
     *(maps.import_worlds, maps.route),
-    *(results.verify, results.export, results.compare, dashboard.dashboard),
+    *(results.verify, results.export, results.compare, serving.dashboard),
     *(serving.serve_memory, serving.servers),
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):

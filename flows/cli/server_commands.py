@@ -1,7 +1,8 @@
-"""Commands that serve a memory, or Prefect and MLflow for several people and machines."""
+"""Commands that serve the dashboard, a memory, or Prefect and MLflow for several people and machines."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -52,3 +53,17 @@ def servers(
     from tasks.settings.environment import default_data
 
     task(data or default_data(), host, prefect_port, mlflow_port)
+
+
+def dashboard(*, data: Path | None = None, port: int = 8765, browser: bool = True) -> None:
+    """Serve the dashboard on loopback until Ctrl-C: runs, problems, memories, live planning, comparisons.
+
+    Args:
+        data: Data folder; default $MOTION_MEMORY_DATA or ./data. Nothing in it is changed.
+        port: Port to listen on; 0 takes any free one.
+        browser: Open the dashboard in a browser, if the output is a terminal.
+    """
+    from tasks.serving.serve_dashboard import serve_dashboard
+    from tasks.settings.environment import default_data
+
+    serve_dashboard(data or default_data(), port, browser and sys.stdout.isatty())
