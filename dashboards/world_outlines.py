@@ -12,7 +12,7 @@ from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_size
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
 _CLEAR_M: Final = 2.0  # between two footprints of a plan, so that a small picture stays readable
@@ -39,6 +39,25 @@ def heading_tip(problem: Problem) -> tuple[float, float]:
     """The end of the line that shows the heading at the start of ``problem``, x and y."""
     x, y, heading = problem.start
     return x + HEADING_M * math.cos(heading), y + HEADING_M * math.sin(heading)
+
+
+def speed_tip(problem: Problem) -> tuple[float, float] | None:
+    """Where the vehicle of ``problem`` would be a second after the start, x and y; None if it stands."""
+    if not problem.start_motion or problem.start_motion[0] == 0.0:
+        return None
+    (x, y, heading), speed = problem.start, problem.start_motion[0]
+    return x + speed * math.cos(heading), y + speed * math.sin(heading)
+
+
+def goal_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats | None:
+    """The state ``[1, S]`` of ``vehicle`` in the goal pose of ``problem``; None if any heading will do."""
+    arrival = problem.arrival
+    if arrival is None or arrival.heading is None:
+        return None
+    state = np.zeros((1, state_size(vehicle)))
+    state[0, :3] = *problem.goal, arrival.heading
+    state[0, 5 : 5 + len(arrival.hitches)] = arrival.hitches
+    return state
 
 
 def footprint_spacing_m(vehicle: Vehicle) -> float:

@@ -19,9 +19,11 @@ from dashboards.world_outlines import (
     CheckedPlan,
     checked,
     footprint_spacing_m,
+    goal_state,
     heading_tip,
     outlines,
     shown_states,
+    speed_tip,
 )
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import scene_of
@@ -41,7 +43,10 @@ class Example(NamedTuple):
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
-    """Draw bounds, obstacles and goal of ``problem``, and the ``vehicle`` at its start, in metres."""
+    """Draw bounds, obstacles and goal of ``problem``, and the ``vehicle`` at its start, in metres.
+
+    A goal pose is drawn as an outline of the vehicle, a speed at the start as the way of one second.
+    """
     x_min, y_min, x_max, y_max = problem.bounds
     frame = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min, fill=False, edgecolor=INK, linewidth=1.2)
     axes.add_patch(frame)
@@ -51,10 +56,17 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     pieces.set_clip_path(frame)
     goal = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8, zorder=2)
     axes.add_patch(goal)
+    asked = goal_state(problem, vehicle)
+    if asked is not None:
+        _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
     arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}
     axes.annotate("", heading_tip(problem), problem.start[:2], arrowprops=arrow, zorder=6)
+    tip = speed_tip(problem)
+    if tip is not None:
+        speed = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.4}
+        axes.annotate("", tip, problem.start[:2], arrowprops=speed, zorder=7)
     margin = 0.015 * (x_max - x_min)
     axes.set_xlim(x_min - margin, x_max + margin)
     axes.set_ylim(y_min - margin, y_max + margin)

@@ -8,7 +8,14 @@ from typing import Final
 import numpy as np
 
 from dashboards.web.svg import element, points, tooltip
-from dashboards.world_outlines import CheckedPlan, heading_tip, outlines, shown_states
+from dashboards.world_outlines import (
+    CheckedPlan,
+    goal_state,
+    heading_tip,
+    outlines,
+    shown_states,
+    speed_tip,
+)
 from planners.search.traces import Roads, Trace
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, start_state
@@ -32,6 +39,7 @@ def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
         element("path", d=beyond, class_="beyond"),
         element("rect", **place, class_="frame"),
         element("circle", tooltip("goal"), cx=goal_x, cy=goal_y, r=problem.goal_radius, class_="goal"),
+        *_asked(problem, vehicle),
         *layers,
         _bodies(start_state(problem, vehicle)[np.newaxis], vehicle, "start"),
         element("line", x1=x, y1=y, x2=tip_x, y2=tip_y, class_="heading"),
@@ -46,6 +54,18 @@ def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
         role="img",
         aria_label=f"World of problem {problem.id}",
     )
+
+
+def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
+    """The vehicle in a goal pose, and the way of the first second at the speed of the start."""
+    pose, tip = goal_state(problem, vehicle), speed_tip(problem)
+    (x, y, _), marks = problem.start, []
+    if pose is not None:
+        marks.append(_bodies(pose, vehicle, "goal pose"))
+    if tip is not None:
+        speed = tooltip(f"{problem.start_motion[0]:g} m/s at the start")
+        marks.append(element("line", speed, x1=x, y1=y, x2=tip[0], y2=tip[1], class_="speed"))
+    return marks
 
 
 def answer_layer(plan: Plan, vehicle: Vehicle) -> str:

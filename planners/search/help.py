@@ -18,7 +18,7 @@ from planners.search.guides.guidance import guidance
 from planners.search.outcome import Outcome, work_of
 from planners.search.query import Guide, Query
 from planners.search.repair import REPAIR, free_prefix, repair
-from planners.world.geometry.occupancy import Bits
+from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.problem import Plan
 
 SHARE: Final = 0.06  # of a planner's own work, which help may cost beside it
@@ -32,7 +32,10 @@ def fresh_guide(query: Query, occupied: Bits, stored: Plan | None = None) -> Gui
     ``occupied [64]``: the cells that are not free.
     """
     problem = query.problem
-    around = grid_path(occupied, problem.start[:2], problem.goal, problem.goal_radius, query.workspace)
+    around = grid_path(
+        *(occupied, problem.start[:2], problem.goal, problem.goal_radius, query.workspace),
+        window=window_of(problem),
+    )
     paths = [each for each in (around, None if stored is None else stored.states) if each is not None]
     return guidance(paths) if paths else None
 

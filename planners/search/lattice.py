@@ -18,6 +18,9 @@ from planners.search.rrt import towards_anywhere
 from planners.search.search_loop import attempt
 from planners.search.structures import tree as trees
 from planners.search.structures.cost_to_go import (
+    BOTTOM,
+    LEFT,
+    PER_M,
     CostToGo,
     allocate_cost_to_go,
     fill_cost_to_go,
@@ -35,16 +38,16 @@ from planners.search.structures.frontier import (
 )
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.geometry.occupancy import drawing_of
-from planners.world.goal import metres_to, reaches
+from planners.world.geometry.occupancy import drawing_of, window_of
+from planners.world.goal import MOST_SPEED, RADIUS, X, Y, metres_to, reaches
 from planners.world.jit import inlined, lean
-from planners.world.problem import BOUNDS
+from planners.world.problem import is_canonical
 from planners.world.trigonometry import sincos, wrapped
 from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
-SPEEDS: Final = (1.0, 0.5, -1.0)  # shares of the largest speed; below 0 of the largest backwards
+SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
 LOOK_AHEAD_M: Final = 2.0  # from here to there the distance to go tells whether the heading is right
 
 
@@ -54,11 +57,12 @@ class Lattice(NamedTuple):
     steps: int = 5  # of a primitive
     speeds: int = 1  # how many of ``SPEEDS`` there are primitives for
     turn: float = 1.0  # the ``SHARES`` are multiplied by this
-    cell_m: float = 1.0  # side of a cell
+    cell: float = 1.0  # side of a cell, in those of the problem's window
     headings: int = 24  # cells of headings
     paces: int = 4  # cells of speeds
     greed: float = 2.0  # weight of the time to go; with 1 driving times are shorter and searches longer
     heading_s: float = 0.4  # time to go for each unit of 1 - cos of the angle to turn by
+    late_s: float = 1.0  # time to go for each metre by which braking for the goal comes too late
 
 
 class LatticeSettings(NamedTuple):
@@ -66,9 +70,15 @@ class LatticeSettings(NamedTuple):
 
     levels: tuple[Lattice, ...] = (
         Lattice(),
-        Lattice(steps=4, speeds=3, cell_m=0.5, headings=32),
-        Lattice(steps=3, speeds=3, cell_m=0.25, headings=48),
+        Lattice(steps=4, speeds=3, cell=0.5, headings=32),
+        Lattice(steps=3, speeds=3, cell=0.25, headings=48),
     )  # one after another, each when the one before has nothing left to drive or has taken too long
+    anywhere: tuple[Lattice, ...] = (
+        Lattice(),
+        Lattice(speeds=4),
+        Lattice(steps=4, speeds=4, cell=0.5, headings=32),
+        Lattice(steps=3, speeds=4, cell=0.25, headings=48),
+    )  # the same for problems that are not canonical; where a speed is asked at the goal, without the first
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
 
@@ -86,23 +96,53 @@ def _controls(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> 
 
 
 @inlined
-def _key(state: State, search: int, lattice: Lattice, vehicle: Vehicle) -> int:
-    """The cell of a state: ten bits each for row and column, seven for the heading, three for the speed."""
-    row = int((state[1] - BOUNDS[1]) / lattice.cell_m) & 1023
-    column = int((state[0] - BOUNDS[0]) / lattice.cell_m) & 1023
+def _key(state: State, search: int, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> int:
+    """The cell of a state, and the search, twenty bits.
+
+    There are sixteen bits each for row and column (ten of them beside each other, the others in front of the
+    search), seven for the heading and three for the speed.
+    """
+    row = int((state[1] - go.frame[BOTTOM]) * go.frame[PER_M] / lattice.cell)
+    column = int((state[0] - go.frame[LEFT]) * go.frame[PER_M] / lattice.cell)
     heading = int((wrapped(state[2]) + math.pi) * (lattice.headings / (2.0 * math.pi))) & 127
     share = (state[3] - vehicle.min_speed) / (vehicle.max_speed - vehicle.min_speed)
     pace = min(int(share * lattice.paces), lattice.paces - 1)
-    return (((search << 10 | row) << 10 | column) << 7 | heading) << 3 | pace
+    far = (row >> 10 & 63) << 6 | (column >> 10 & 63)
+    key = (far << 20 | (search & 0xFFFFF)) << 10 | (row & 1023)
+    return ((key << 10 | (column & 1023)) << 7 | heading) << 3 | pace
 
 
 @inlined
-def _seconds_to_go(state: State, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> float:
+def _seconds_to_stop(
+    speed: float, metres: float, room: float, most: float, late_s: float, vehicle: Vehicle
+) -> float:
+    """The least time over a distance, or up to ``room`` metres more, from one speed to at most another.
+
+    Who is too fast for that brakes, and has to come back: ``late_s`` for each metre.
+    """
+    acceleration = control_limits(vehicle)[0]
+    braking = (speed * speed - most * most) / (2.0 * acceleration)
+    metres = min(max(braking, metres), metres + room)
+    squares = speed * speed + 2.0 * acceleration * metres
+    end = min(most, math.sqrt(squares))
+    if braking > metres:
+        return (speed - most) / acceleration + late_s * (braking - metres)
+    peak = min(math.sqrt(0.5 * (squares + end * end)), vehicle.max_speed)
+    changing = (2.0 * peak * peak - speed * speed - end * end) / (2.0 * acceleration)
+    return (2.0 * peak - speed - end) / acceleration + max(metres - changing, 0.0) / vehicle.max_speed
+
+
+@inlined
+def _seconds_to_go(state: State, goal: Floats, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> float:
     """The estimated driving time to the goal: the distance at full speed, getting to it, and turning."""
     metres = metres_to_go(state[0], state[1], go)
     sin, cos = sincos(state[2])
     ahead = metres_to_go(state[0] + LOOK_AHEAD_M * cos, state[1] + LOOK_AHEAD_M * sin, go)
     turn = min(max(1.0 - (metres - ahead) / LOOK_AHEAD_M, 0.0), 2.0)  # 1 - cos of the angle to turn by
+    if goal[MOST_SPEED] < vehicle.max_speed:
+        most = max(goal[MOST_SPEED], 0.0)
+        seconds = _seconds_to_stop(state[3], metres, goal[RADIUS], most, lattice.late_s, vehicle)
+        return float(seconds + lattice.heading_s * turn)
     missing = vehicle.max_speed - state[3]
     acceleration = control_limits(vehicle)[0]
     slow = missing * missing / (2.0 * acceleration * vehicle.max_speed)
@@ -111,7 +151,13 @@ def _seconds_to_go(state: State, go: CostToGo, lattice: Lattice, vehicle: Vehicl
 
 @lean
 def open_vertex(
-    tree: trees.Tree, vertex: int, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
+    tree: trees.Tree,
+    vertex: int,
+    goal: Floats,
+    frontier: Frontier,
+    go: CostToGo,
+    lattice: Lattice,
+    vehicle: Vehicle,
 ) -> None:
     """Let all primitives from a vertex wait. Each is checked for collisions when it is driven."""
     for motion in range(len(SHARES) * lattice.speeds):
@@ -119,23 +165,22 @@ def open_vertex(
         for _ in range(lattice.steps):
             control_1, control_2 = _controls(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
-        if not was_reached(frontier, _key(state, frontier.counts[1], lattice, vehicle)):
+        if not was_reached(frontier, _key(state, frontier.counts[1], go, lattice, vehicle)):
             spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
-            push(
-                frontier, spent + lattice.greed * _seconds_to_go(state, go, lattice, vehicle), vertex, motion
-            )
+            left = _seconds_to_go(state, goal, go, lattice, vehicle)
+            push(frontier, spent + lattice.greed * left, vertex, motion)
 
 
 @lean
 def begin_lattice(
-    tree: trees.Tree, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
+    tree: trees.Tree, goal: Floats, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
 ) -> None:
     """Begin a search from the vertices that the tree has: its root, or a drive that is given."""
     clear_frontier(frontier)
     last = tree.counts[trees.SIZE] - 1
-    open_vertex(tree, last, frontier, go, lattice, vehicle)
+    open_vertex(tree, last, goal, frontier, go, lattice, vehicle)
     for vertex in range(0, last, lattice.steps):
-        open_vertex(tree, vertex, frontier, go, lattice, vehicle)
+        open_vertex(tree, vertex, goal, frontier, go, lattice, vehicle)
 
 
 @lean
@@ -186,10 +231,10 @@ def grow_lattice(
         if counts[trees.GOAL_VERTEX] >= 0:
             return
         if last >= 0:
-            key = _key(load(tree.states, last, vehicle), frontier.counts[1], lattice, vehicle)
+            key = _key(load(tree.states, last, vehicle), frontier.counts[1], go, lattice, vehicle)
             if not was_reached(frontier, key):
                 reach(frontier, key)
-                open_vertex(tree, last, frontier, go, lattice, vehicle)
+                open_vertex(tree, last, goal, frontier, go, lattice, vehicle)
 
 
 def _varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
@@ -201,22 +246,26 @@ def _varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
-    """Plan from the problem's start to its goal disc. A guide is not looked at."""
+    """Plan from the problem's start to its goal. A guide is not looked at."""
     go = query.workspace.buffers(allocate_cost_to_go)
     frontier = query.workspace.buffers(allocate_frontier)
     vehicle, scene = query.vehicle, query.scene
     improving = math.isfinite(query.limits.bound_s)
-    level = settings.levels[0]
+    levels = settings.levels if is_canonical(query.problem) else settings.anywhere
+    arrival = query.problem.arrival
+    if arrival is not None and arrival.most_speed < vehicle.max_speed:
+        levels = levels[1:]
+    level = levels[0]
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
         nonlocal level
         if trial == 0:
             occupied = drawing_of(query.problem, query.workspace).occupied
-            fill_cost_to_go(occupied, goal[0], goal[1], goal[2], go)
-        level = settings.levels[min(trial // 2, len(settings.levels) - 1)]
+            fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+        level = levels[min(trial // 2, len(levels) - 1)]
         if improving:
             level = _varied(level, settings.improving_greed, query)
-        begin_lattice(tree, frontier, go, level, vehicle)
+        begin_lattice(tree, goal, frontier, go, level, vehicle)
 
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
         grow_lattice(tree, goal, until, frontier, go, level, vehicle, scene)

@@ -24,6 +24,7 @@ class Status(StrEnum):
     TIME_SPENT = "time-spent"
     START_BLOCKED = "start-blocked"
     GOAL_BLOCKED = "goal-blocked"
+    INFEASIBLE = "infeasible"  # it is certain that no drive leads to the goal
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from planners.search.query import Query
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
-from planners.world.geometry.occupancy import Bits
+from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import RADIUS, X, Y, goal_of, place
 from planners.world.jit import jit, lean
 from planners.world.problem import Plan
@@ -148,7 +148,7 @@ def repair(
     problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
     reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
-    goal = goal_of(problem)
+    goal, window = goal_of(problem), window_of(problem)
     at = len(drive.states)  # the reference state from which to look for a free part
     beyond_m = settings.rejoin_beyond_m
     checks = expansions = nodes = 0
@@ -163,7 +163,7 @@ def repair(
         if not to_goal:
             disc = place(float(reference[at, 0]), float(reference[at, 1]), settings.rejoin_radius_m)
         target, radius = (float(disc[X]), float(disc[Y])), float(disc[RADIUS])
-        around = grid_path(occupied, (x, y), target, radius, workspace)
+        around = grid_path(occupied, (x, y), target, radius, workspace, window)
         straight = float(np.hypot(target[0] - x, target[1] - y)) - radius
         if around is None or metres_along(around, x, y) > straight + settings.detour_m:
             break

@@ -11,6 +11,7 @@ import numpy as np
 from planners.search.outcome import Outcome, Status, work_of
 from planners.search.query import Query
 from planners.search.structures import tree as trees
+from planners.search.structures.unreachable import is_unreachable
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, point_is_free, state_is_free
 from planners.world.goal import goal_of, reaches
@@ -52,7 +53,8 @@ def attempt(
     within ``restart_after`` expansions, is given up for a new one, the next trial, which may grow twice as
     long: that cuts the tails of a search with random choices (Luby, Sinclair and Zuckerman 1993). Every
     second trial explores, if that is given: where the one planner fails for long the other need not (a
-    portfolio, Gomes and Selman 2001). What the query tries beside the search may end it with a plan.
+    portfolio, Gomes and Selman 2001). What the query tries beside the search may end it with a plan. Before
+    the second trial the search ends if it is certain that no drive leads to the goal.
 
     Args:
         query: the problem and its limits.
@@ -93,6 +95,9 @@ def attempt(
         while status is Status.BUDGET_SPENT and counts[trees.EXPANSIONS] < limits.expansions:
             if counts[trees.EXPANSIONS] >= restart_at or counts[trees.SIZE] >= limits.nodes:
                 trial += 1
+                if trial == 1 and is_unreachable(problem, scene, vehicle, query.workspace):
+                    status = Status.INFEASIBLE
+                    break
                 restart_at = int(counts[trees.EXPANSIONS]) + restart_after * 2**trial
                 trees.prune(tree, len(first), scene.bounds)
                 extend_tree = explore if explore is not None and trial % 2 else grow

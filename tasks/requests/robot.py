@@ -25,7 +25,7 @@ from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.checked_problem import checked_problem
-from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Plan, Problem
+from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
@@ -95,6 +95,8 @@ class RobotPlanner:
         goal_radius: float = GOAL_RADIUS,
         bounds: Bounds = BOUNDS,
         scale: float = 1.0,
+        start_motion: tuple[float, ...] = (),
+        arrival: Arrival | None = None,
     ) -> Answer:
         """Plan for a problem that is in arrays already; otherwise like ``plan``.
 
@@ -105,9 +107,13 @@ class RobotPlanner:
                 another.
             polygon_starts: ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i +
                 1]]``.
-            goal_radius: Metres.
+            goal_radius: metres: how far from the goal the plan may end.
             bounds: x_min, y_min, x_max, y_max in metres.
             scale: Metres of these lengths in one metre of the memory's problems.
+            start_motion: the vehicle's state at the start behind the pose: speed (m/s), then steering angle
+                (rad) or turn rate (rad/s), then hitch angles (rad). What is missing is 0.
+            arrival: what is asked at the goal besides the place: heading, speeds, hitch angles, with
+                tolerances.
 
         Raises:
             ValueError: a polygon is none, or the problem is impossible.
@@ -118,6 +124,8 @@ class RobotPlanner:
             *(start, goal, goal_radius, bounds, points, polygon_starts),
             vehicle=self.memory.vehicle,
             scale=scale,
+            start_motion=start_motion,
+            arrival=arrival,
         )
         return self._planned(problem, began)
 

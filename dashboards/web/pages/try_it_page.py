@@ -66,7 +66,7 @@ def try_it(data: DataReader, params: Parameters) -> Page:
             menu("planner", "Planner", tuple(PLANNERS), planner),
             menu("assist", "Use of memory", ASSISTS, assist),
         ],
-        "world": fields_of(problem),
+        "world": fields_of(problem, vehicle),
         "start": _at_start(problem, vehicle),
         "names": names,
         "another": params.also(problem=None, index=index + 1),
@@ -79,7 +79,7 @@ def check_world(data: DataReader, params: Parameters, content: Any) -> dict[str,
     """A world of one's own in ``content``, checked and in its own frame, as the editor takes it."""
     vehicle = data.vehicle(data.run(params.run))
     problem = _problem(content, vehicle)
-    return {"world": fields_of(problem), "start": _at_start(problem, vehicle)}
+    return {"world": fields_of(problem, vehicle), "start": _at_start(problem, vehicle)}
 
 
 def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, Any]:

@@ -46,7 +46,7 @@ const draw = (focus = false) => {
   svg.replaceChildren();
   const flipped = make("g", { transform: "scale(1 -1)" }, svg);
   make("rect", { x: xMin, y: yMin, width: xMax - xMin, height: yMax - yMin, class: "bounds" }, flipped);
-  make("circle", { cx: world.goal[0], cy: world.goal[1], r: world.goal_radius, class: "goal" }, flipped);
+  make("circle", { cx: world.goal[0], cy: world.goal[1], r: world.goal_radius ?? world.goal_tolerance?.[0] ?? 2, class: "goal" }, flipped);
   things.forEach((thing, i) => {
     const group = make("g", { class: `obstacle${i === chosen ? " chosen" : ""}`, "data-thing": i }, flipped);
     for (const polygon of thing) make("polygon", { points: written(polygon) }, group);

@@ -12,7 +12,7 @@ import numpy as np
 
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.world.arrays import Floats, Floats32, Integers
-from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, draw_piece
+from planners.world.geometry.occupancy import ALL_CELLS, CANONICAL_WINDOW, GRID, Bits, draw_piece
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS
 from planners.world.workspace import Workspace
@@ -44,7 +44,7 @@ def _draw_sweeps(sweeps: PlanSweeps, corners: Floats, words: Bits, spans: Floats
                 inside &= BOUNDS[0] < x < BOUNDS[2] and BOUNDS[1] < y < BOUNDS[3]
                 corners[k, 0] = x
                 corners[k, 1] = y
-            row_0, row_1 = draw_piece(corners, 0, 4, words, spans)
+            row_0, row_1 = draw_piece(corners, 0, 4, words, spans, CANONICAL_WINDOW)
             for row in range(row_0, row_1 + 1):
                 masks[i, row] |= words[row]
         if not inside:

@@ -1,7 +1,8 @@
 """The shortest path over the occupancy grid, by breadth-first search on 64 cells at a time.
 
-A cell is free if its whole 1 m square is. So a path between the centres of free cells keeps half a metre of
-clearance, a little more than half the car's width. It ignores how a vehicle moves.
+A cell is free if its whole square is. In the canonical window these are of 1 m, so a path between the centres
+of free cells keeps half a metre of clearance, a little more than half the car's width. It ignores how a
+vehicle moves.
 """
 
 from __future__ import annotations
@@ -11,13 +12,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats, Point
-from planners.world.geometry.occupancy import CELL, GRID, Bits
+from planners.world.geometry.occupancy import CANONICAL_WINDOW, GRID, Bits, Window
 from planners.world.jit import inlined, lean
-from planners.world.problem import BOUNDS
 from planners.world.workspace import Workspace
 
-_LEFT: Final = BOUNDS[0]
-_BOTTOM: Final = BOUNDS[1]
 _STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))  # column, row
 _ONE: Final = np.uint64(1)
 _NONE: Final = np.uint64(0)
@@ -52,16 +50,20 @@ def _is_set(rows: Bits, column: int, row: int) -> bool:
 
 
 @lean
-def _first_wave(goal_x: float, goal_y: float, radius: float, free: Bits, wave: Bits) -> None:
+def _first_wave(goal_x: float, goal_y: float, radius: float, window: Window, free: Bits, wave: Bits) -> None:
     wave.fill(_NONE)
-    reach = int(radius / CELL) + 1
-    column = int((goal_x - _LEFT) // CELL)
-    row = int((goal_y - _BOTTOM) // CELL)
+    left, bottom, cell = window
+    reach = int(radius / cell) + 1
+    column = int((goal_x - left) // cell)
+    row = int((goal_y - bottom) // cell)
     for r in range(max(row - reach, 0), min(row + reach, GRID - 1) + 1):
         for c in range(max(column - reach, 0), min(column + reach, GRID - 1) + 1):
-            dx = _LEFT + (c + 0.5) * CELL - goal_x
-            dy = _BOTTOM + (r + 0.5) * CELL - goal_y
-            if dx * dx + dy * dy <= radius * radius and _is_set(free, c, r):
+            dx = left + (c + 0.5) * cell - goal_x
+            dy = bottom + (r + 0.5) * cell - goal_y
+            inside = dx * dx + dy * dy <= radius * radius or (
+                2.0 * radius < cell and r == row and c == column
+            )
+            if inside and _is_set(free, c, r):
                 wave[r + 1] |= _ONE << np.uint64(c)
 
 
@@ -88,7 +90,14 @@ def _next_wave(last: Bits, free: Bits, fresh: Bits, wave: Bits) -> bool:
 
 @lean
 def flood_from_goal(
-    occupied: Bits, start_x: float, start_y: float, goal_x: float, goal_y: float, radius: float, flood: Flood
+    occupied: Bits,
+    start_x: float,
+    start_y: float,
+    goal_x: float,
+    goal_y: float,
+    radius: float,
+    window: Window,
+    flood: Flood,
 ) -> int:
     """Fill ``flood.path`` with the centres of free cells from the start to the goal disc.
 
@@ -99,11 +108,11 @@ def flood_from_goal(
     free = flood.free
     for r in range(GRID):
         free[r + 1] = ~occupied[r]
-    _first_wave(goal_x, goal_y, radius, free, waves[0])
+    _first_wave(goal_x, goal_y, radius, window, free, waves[0])
     for r in range(GRID + 2):
         flood.fresh[r] = free[r] & ~waves[0, r]
-    column = int((start_x - _LEFT) // CELL)
-    row = int((start_y - _BOTTOM) // CELL)
+    column = int((start_x - window.left) // window.cell_m)
+    row = int((start_y - window.bottom) // window.cell_m)
     inside = 0 <= row < GRID and 0 <= column < GRID
     apart = 0 if inside and _is_set(free, column, row) else 1  # cells from the start's where it may begin
     wave = 0
@@ -111,19 +120,19 @@ def flood_from_goal(
         for r in range(max(row - apart, 0), min(row + apart, GRID - 1) + 1):
             for c in range(column - apart, column + apart + 1):
                 if _is_set(waves[wave], c, r):
-                    return _trace(waves, free, wave, c, r, flood.path)
+                    return _trace(waves, free, wave, c, r, window, flood.path)
         if not _next_wave(waves[wave], free, flood.fresh, waves[wave + 1]):
             return 0
         wave += 1
 
 
 @lean
-def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, path: Floats) -> int:
+def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, window: Window, path: Floats) -> int:
     """Fill in the path from a cell of a wave down to the first wave, straight steps before diagonal ones."""
     filled = 0
     while True:
-        path[filled, 0] = _LEFT + (column + 0.5) * CELL
-        path[filled, 1] = _BOTTOM + (row + 0.5) * CELL
+        path[filled, 0] = window.left + (column + 0.5) * window.cell_m
+        path[filled, 1] = window.bottom + (row + 0.5) * window.cell_m
         filled += 1
         if wave == 0:
             return filled
@@ -138,7 +147,12 @@ def _trace(waves: Bits, free: Bits, wave: int, column: int, row: int, path: Floa
 
 
 def grid_path(
-    occupied: Bits, start: Point, goal: Point, radius: float, workspace: Workspace | None = None
+    occupied: Bits,
+    start: Point,
+    goal: Point,
+    radius: float,
+    workspace: Workspace | None = None,
+    window: Window = CANONICAL_WINDOW,
 ) -> Floats | None:
     """Find the shortest path over a problem's free cells from a point to a disc.
 
@@ -148,10 +162,11 @@ def grid_path(
         goal: x, y of the disc's centre in metres.
         radius: of the disc, in metres.
         workspace: the caller's buffers; by default new ones.
+        window: in which the cells lie.
 
     Returns:
         The centres ``[M, 2]`` of the cells along the path, in metres; None if there is no path.
     """
     flood = (workspace or Workspace()).buffers(allocate_flood)
-    count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, flood)
+    count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, window, flood)
     return flood.path[:count].copy() if count else None

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib.text import Annotation, Text
 from shapely import Polygon, affinity, box
 
 from dashboards.figures.pictures import Example, draw_plan, draw_recalled, gallery, picture

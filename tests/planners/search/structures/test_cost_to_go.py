@@ -16,7 +16,7 @@ from planners.search.structures.cost_to_go import (
     fill_cost_to_go,
     metres_to_go,
 )
-from planners.world.geometry.occupancy import CELL, GRID, bits_of
+from planners.world.geometry.occupancy import CANONICAL_WINDOW, CELL, GRID, Window, bits_of
 from planners.world.problem import BOUNDS
 
 GO = allocate_cost_to_go()
@@ -52,7 +52,7 @@ def by_scipy(grid, sources):
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.6), st.floats(-6, 56), st.floats(-6, 56), st.floats(0, 4))
 def test_costs_are_those_of_a_search_by_scipy(seed, share, x, y, radius):
     grid = np.random.default_rng(seed).random((GRID, GRID)) < share
-    fill_cost_to_go(bits_of(grid.astype(np.uint8)), x, y, radius, GO)
+    fill_cost_to_go(bits_of(grid.astype(np.uint8)), x, y, radius, CANONICAL_WINDOW, GO)
     centres = BOUNDS[0] + (np.arange(GRID) + 0.5) * CELL
     sources = np.hypot(centres[None, :] - x, centres[:, None] - y) <= radius
     sources[int((y - BOUNDS[1]) / CELL), int((x - BOUNDS[0]) / CELL)] = True
@@ -61,11 +61,21 @@ def test_costs_are_those_of_a_search_by_scipy(seed, share, x, y, radius):
 
 @given(st.floats(-7, 57), st.floats(-7, 57))
 def test_in_the_open_the_cost_is_nearly_the_distance(x, y):
-    fill_cost_to_go(bits_of(np.zeros((GRID, GRID), np.uint8)), 50.0, 50.0, 2.0, GO)
+    fill_cost_to_go(bits_of(np.zeros((GRID, GRID), np.uint8)), 50.0, 50.0, 2.0, CANONICAL_WINDOW, GO)
     distance = max(np.hypot(x - 50.0, y - 50.0) - 2.0, 0.0)
     assert distance - 1.5 <= metres_to_go(x, y, GO) <= 1.09 * distance + 1.5
 
 
 def test_a_step_in_the_open_costs_its_length():
-    assert STRAIGHT * METRES == CELL
-    assert abs(DIAGONAL * METRES - CELL * 2**0.5) < 0.02
+    fill_cost_to_go(bits_of(np.zeros((GRID, GRID), np.uint8)), 50.0, 50.0, 2.0, CANONICAL_WINDOW, GO)
+    assert STRAIGHT * GO.frame[METRES] == CELL
+    assert abs(DIAGONAL * GO.frame[METRES] - CELL * 2**0.5) < 0.02
+
+
+@given(st.floats(-200, 200), st.floats(-200, 200), st.floats(0.1, 3.0))
+def test_beyond_the_window_the_way_to_it_is_estimated(x, y, cell):
+    window = Window(-32.0 * cell, -32.0 * cell, cell)
+    fill_cost_to_go(bits_of(np.zeros((GRID, GRID), np.uint8)), 0.0, 0.0, 2.0, window, GO)
+    distance = max(np.hypot(x, y) - 2.0, 0.0)
+    off = 3.0 + 1.5 * cell  # of the border, and of the cells
+    assert distance - off <= metres_to_go(x, y, GO) <= 1.42 * distance + off

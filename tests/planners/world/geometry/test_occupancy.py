@@ -6,6 +6,7 @@ from hypothesis import given, settings
 
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.occupancy import (
+    CANONICAL_WINDOW,
     GRID,
     allocate_drawing,
     bits_of,
@@ -72,7 +73,7 @@ def test_the_kernel_equals_its_python_function(seed: int) -> None:
     drawings = []
     for draw_it in (draw, draw.py_func):  # type: ignore[attr-defined]
         drawing = allocate_drawing(len(obstacles.piece_starts))
-        draw_it(obstacles.vertices, obstacles.piece_starts, BOUNDS, drawing)
+        draw_it(obstacles.vertices, obstacles.piece_starts, BOUNDS, CANONICAL_WINDOW, drawing)
         drawings.append(drawing.occupied.copy())
     assert (drawings[0] == drawings[1]).all()
     grid = draw_occupancy(obstacles.vertices, obstacles.piece_starts, np.array(BOUNDS))

@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+
+from planners.maps.questions import DISTANCES_M, question_in
+from planners.world.classes.problem_classes import problem_class
+from planners.world.problem_faults import problem_fault
+from planners.world.vehicles.vehicle import VEHICLES
+from tests.planners.world.strategies import seeds
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+@settings(max_examples=10)
+@given(seed=seeds)
+def test_a_question_makes_sense_and_is_always_the_same(name: str, seed: int) -> None:
+    vehicle = VEHICLES[name]
+    world = problem_class("trap", vehicle=vehicle).draw(seed, 0)
+    for pose in (False, True):
+        asked = question_in(world, 7, seed, vehicle, pose)
+        again = question_in(world, 7, seed, vehicle, pose)
+        assert asked is not None
+        assert again is not None
+        assert (asked.start, asked.goal, asked.start_motion) == (again.start, again.goal, again.start_motion)
+        assert problem_fault(asked, vehicle) is None
+        assert DISTANCES_M[0] <= math.dist(asked.start[:2], asked.goal) <= DISTANCES_M[1]
+        assert (asked.arrival is not None) == pose
