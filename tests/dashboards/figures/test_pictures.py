@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,13 +15,14 @@ from shapely import Polygon, affinity, box
 
 from dashboards.figures.pictures import Example, draw_plan, draw_recalled, gallery, picture
 from dashboards.figures.style import save
-from dashboards.world_outlines import CheckedPlan, checked, footprint_spacing_m
+from dashboards.world_outlines import CheckedPlan, checked, footprint_spacing_m, goal_state, speed_tip
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
+    Arrival,
     Plan,
     Problem,
     obstacles_of,
@@ -111,6 +113,22 @@ def test_every_body_is_drawn_and_every_trailer_hangs_on_the_body_before(vehicle:
 def test_a_gallery_shows_every_example(count: int, straight: Plan) -> None:
     figure = gallery([Example(problem(WALL), [straight], None, f"caption {i}") for i in range(count)])
     assert sum(text.startswith("caption") for text in texts(figure)) == count
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES.values())
+def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle) -> None:
+    plain = problem()
+    asked = replace(plain, start_motion=(2.0,), arrival=Arrival(1.0, 0.1))
+    drawn = [picture(each, None, "", vehicle=vehicle) for each in (plain, asked)]
+    bodies, arrows = (
+        [len(figure.findobj(kind)) for figure in drawn] for kind in (PolyCollection, Annotation)
+    )
+    assert bodies[1] == bodies[0] + 1
+    assert arrows[1] == arrows[0] + 1
+    state = goal_state(asked, vehicle)
+    assert state is not None
+    assert state[0, :3] == pytest.approx((*CANONICAL_GOAL, 1.0))
+    assert speed_tip(asked) == pytest.approx((math.sqrt(2.0), math.sqrt(2.0)))
 
 
 def test_a_plan_of_one_state_can_be_drawn() -> None:

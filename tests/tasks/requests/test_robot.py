@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from planners.world.authority.authority import faults
-from planners.world.problem import obstacles_of
+from planners.world.problem import BOUNDS, Arrival, obstacles_of
 from planners.world.vehicles.vehicle import CAR
 from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
@@ -57,6 +58,25 @@ def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> 
         assert answer.plan is not None
         assert np.array_equal(answer.plan.states, plan.states)
         assert faults(problem(i), answer.plan, CAR) == []
+
+
+def test_any_question_may_be_asked_in_arrays_and_in_json(planner: RobotPlanner) -> None:
+    nothing, none = np.empty((0, 2)), np.zeros(1, np.int64)
+    arrival = Arrival(0.5, 1.5, 0.0, 3.0)
+    answer = planner.plan_arrays(
+        *((20.0, 10.0, -2.0), (5.0, 20.0), nothing, none), start_motion=(2.0, -0.3), arrival=arrival
+    )
+    assert answer.plan is not None
+    assert answer.source == "searched"
+    assert answer.plan.states[0] == pytest.approx((20.0, 10.0, -2.0, 2.0, -0.3))
+    assert abs(math.remainder(answer.plan.states[-1, 2] - 0.5, math.tau)) <= 1.5
+    fields = {"start": [20, 10, -2], "goal": [5, 20, 0.5], "bounds": list(BOUNDS), "obstacles": []}
+    asked = {"start_speed": 2, "start_steering": -0.3, "goal_tolerance": [2, 1.5], "goal_speed": [0, 3]}
+    again = planner.plan(fields | asked)
+    assert again.plan is not None
+    assert np.array_equal(again.plan.states, answer.plan.states)
+    with pytest.raises(ValueError, match="start speed is 9"):
+        planner.plan(fields | {"start_speed": 9})
 
 
 def same(one: Answer, other: Answer) -> bool:
