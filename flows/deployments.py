@@ -9,9 +9,13 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import fields
+from functools import reduce
+from operator import or_
 from pathlib import Path
-from typing import Any, Final, get_type_hints
+from types import UnionType
+from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
+from annotated_types import Ge
 from prefect import Flow
 
 from flows.benchmark import benchmark as benchmark_flow
@@ -37,12 +41,24 @@ _ABOUT: Final = ("preset", "classes", "worlds", "problem", "path", "planner")  #
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, _KEYWORD, annotation=annotation, default=default)
+    bounded = _at_least(0 if name == "seed" else 1, annotation)
+    return inspect.Parameter(name, _KEYWORD, annotation=bounded, default=default)
+
+
+def _at_least(least: int, annotation: Any) -> Any:
+    """A type whose whole numbers have a lower bound; on the command line the settings refuse less."""
+    if annotation is int:
+        return Annotated[int, Ge(least)]
+    if get_origin(annotation) is list:
+        return list[_at_least(least, *get_args(annotation))]  # type: ignore[misc]  # made when it runs
+    if get_origin(annotation) is UnionType:
+        return reduce(or_, [_at_least(least, each) for each in get_args(annotation)])
+    return annotation
 
 
 def _options_of(kind: type) -> list[inspect.Parameter]:
     """The fields of a class of options as parameters."""
-    types = get_type_hints(kind, include_extras=True)
+    types = get_type_hints(kind)
     return [_parameter(each.name, types[each.name], each.default) for each in fields(kind)]
 
 
@@ -95,7 +111,7 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
 
 def _command(command: Callable[..., None]) -> Flow[..., None]:
     """A command for one's own problems or maps as a flow; its options are parameters one by one."""
-    types = get_type_hints(command, include_extras=True)
+    types = get_type_hints(command)
     own: list[inspect.Parameter] = []
     groups: dict[str, list[inspect.Parameter]] = {}  # options that the command takes as one value
     for each in inspect.signature(command).parameters.values():
@@ -120,7 +136,7 @@ def _told(function: Callable[..., Any], *options: type) -> str:
     """The docstring of a flow in the form that Prefect reads the descriptions of parameters from."""
     sections = [inspect.getdoc(each) or "" for each in (function, *options)]
     args = [each.partition("Args:\n")[2].rstrip() for each in sections]
-    return "\n".join([sections[0].partition("Args:")[0], "Args:", *filter(None, args)])
+    return "\n".join([sections[0].partition("Args:")[0].rstrip(), "", "Args:", *filter(None, args)])
 
 
 run = _stage(run_flow)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from annotated_types import Ge
 from cyclopts import Parameter
 
 from flows.cli.choices import (
@@ -17,8 +16,6 @@ from flows.cli.choices import (
     ObjectiveName,
     PresetName,
 )
-
-Count = Annotated[int, Ge(1)]
 
 _LEARNING: Final = (
     "patience", "learning_rate", "origin_weight", "margin", "semi_hard", "channels", "hidden", "dimensions",
@@ -75,27 +72,27 @@ class Options:
     worlds: Annotated[list[Path] | None, Parameter(negative=())] = None
     difficulty: Difficulty = "standard"
     vehicle: str = "car"
-    seed: Annotated[int, Ge(0)] = 1
+    seed: int = 1
     objective: ObjectiveName | None = None
     data: Path | None = None
-    workers: Count | None = None
+    workers: int | None = None
     scheduler: str | None = None
     strict: Annotated[bool, Parameter(negative=())] = False
     continual: ContinualName | None = None
-    experiences: Count | None = None
-    candidates: Count | None = None
-    problems_per_experience: Count | None = None
-    test_problems: Count | None = None
-    epochs: Count | None = None
-    training_seeds: Count | None = None
-    patience: Count | None = None
+    experiences: int | None = None
+    candidates: int | None = None
+    problems_per_experience: int | None = None
+    test_problems: int | None = None
+    epochs: int | None = None
+    training_seeds: int | None = None
+    patience: int | None = None
     learning_rate: float | None = None
     origin_weight: float | None = None
     margin: float | None = None
     semi_hard: Annotated[bool | None, Parameter(negative=())] = None
-    channels: Annotated[list[Count] | None, Parameter(consume_multiple=True, negative=())] = None
-    hidden: Annotated[list[Count] | None, Parameter(consume_multiple=True, negative=())] = None
-    dimensions: Count | None = None
+    channels: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
+    hidden: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None
+    dimensions: int | None = None
     network: NetworkName | None = None
     learned: str | None = None
     hallucination: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None
