@@ -25,14 +25,15 @@ def export(run: Path, *, format: str, out: Path) -> None:
     """Write the attempts of a run in a format of other tools.
 
     Args:
-        run: Folder of the run, in the data folder's runs.
+        run: Folder of the run, or its name if it is in $MOTION_MEMORY_DATA or ./data.
         format: ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv
             (.csv).
         out: The file or folder to write.
     """
     from tasks.reports.export import export_run
+    from tasks.settings.environment import run_named
 
-    export_run(run, format, out)
+    export_run(run_named(run), format, out)
     write(f"exported {out}")
 
 
@@ -40,13 +41,14 @@ def compare(*runs: Path, out: Path | None = None, measure: bool = False, problem
     """Compare runs with the first one, paired by problem: solved, driving, work, and times if measured.
 
     Args:
-        runs: Two or more folders of runs, in the data folder's runs.
+        runs: Two or more folders of runs, or names of runs in $MOTION_MEMORY_DATA or ./data.
         out: A file that the comparison is also written to: .md, .json or .csv.
         measure: Measure the memories of both runs in turn, instead of going by what each has measured alone.
         problems: How many test problems of a class to measure; default 300.
     """
     from tasks.reports.compare import compare as task
+    from tasks.settings.environment import run_named
 
-    write(*task(runs, out, measure, problems).told())
+    write(*task([run_named(run) for run in runs], out, measure, problems).told())
     if out is not None:
         write(f"compared {out}")

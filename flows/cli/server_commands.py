@@ -22,16 +22,17 @@ def serve_memory(
     """Answer problems over HTTP, in MLflow's protocol, with ranked and checked plans of a memory.
 
     Args:
-        memory: Folder of a memory, or of a run with one, or a model in MLflow: models:/name/1,
-            models:/name@alias, …
+        memory: Folder of a memory, or of a run with one, or its name in $MOTION_MEMORY_DATA or ./data; or a
+            model in MLflow: models:/name/1, models:/name@alias, …
         vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
         host: Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
         port: Port to listen on; 0 takes any free one.
         workers: Worker processes.
     """
     from tasks.serving.serve_memory import serve_memory as task
+    from tasks.settings.environment import memory_named
 
-    task(memory, vehicle, host, port, worker_count(workers))
+    task(memory_named(memory), vehicle, host, port, worker_count(workers))
 
 
 def servers(

@@ -22,8 +22,8 @@ class SolveOptions:
         planner: What searches where no recalled plan will do.
         top_k: How many plans to recall.
         recall: How to recall them; default: by the size of the memory.
-        memory: Folder of a run or of one memory, or a model in MLflow: models:/name/1, models:/name@alias,
-            runs:/…
+        memory: Folder of a run or of one memory, the name of a run in $MOTION_MEMORY_DATA or ./data, or a
+            model in MLflow: models:/name/1, models:/name@alias, runs:/…
         vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
         seed: Everything random follows from it.
     """
@@ -44,12 +44,13 @@ class SolveOptions:
         ``improve_seconds``: how long to improve each plan.
         """
         from tasks.requests.assistant import AssistantSettings
+        from tasks.settings.environment import memory_named
 
         return AssistantSettings(
             self.planner,
             assist or (without_memory if self.memory is None else "repair"),
             self.top_k,
-            self.memory,
+            None if self.memory is None else memory_named(self.memory),
             self.seed,
             self.vehicle,
             improve_seconds,

@@ -13,6 +13,17 @@ def default_data() -> Path:
     return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
 
 
+def run_named(name: str | Path) -> Path:
+    """A folder as it is given; or, if there is none, the run of that name in the default data folder."""
+    given, run = Path(name), default_data() / "runs" / name
+    return run if len(given.parts) == 1 and not given.exists() and run.is_dir() else given
+
+
+def memory_named(address: str) -> str:
+    """The address of a memory as it is given; or the folder of the run of that name."""
+    return address if ":" in address else str(run_named(address))
+
+
 def default_scheduler() -> str | None:
     """The Dask scheduler that $MOTION_MEMORY_SCHEDULER names; without one a command has its own workers."""
     return os.environ.get("MOTION_MEMORY_SCHEDULER") or None
