@@ -4,7 +4,7 @@ Recall hands out the free plan that drives shortest, so a set of plans is worth 
 counted in the candidates' own problems, each by the plans of the others: that a plan fits its own problem
 says nothing about it, and a plan that fits no other problem is kept last. Where no plan is free, a problem
 costs what its own plan takes and ``MISSED_S`` more. So both count: to be free in many problems, and to be
-quick.
+quick. A problem may have several candidates, plans of its own that compete; at most one of them is kept.
 
 A plan takes off only a share of what it could save, so that a new problem finds several good plans. The kept
 plans are in the order of the greedy choice, so the first of them are a good choice of fewer. (The savings are
@@ -32,33 +32,49 @@ LEFT: Final = 0.35  # share of a saving that is left to other plans; 0.1 to 0.5:
 
 
 def curate(candidates: Sequence[Experience], count: int, vehicle: Vehicle = CAR) -> Integers:
-    """Return the numbers ``[count]`` of the candidates to keep, best first, or all if there are no more."""
-    if count >= len(candidates):
-        return np.arange(len(candidates), dtype=np.int32)
+    """Choose which candidates to keep, at most one of each problem.
+
+    Args:
+        candidates: solved problems with plans.
+        count: how many to keep.
+        vehicle: who drives.
+
+    Returns:
+        The numbers ``[count]`` of the candidates to keep, the most useful first; if there are no more
+        problems than ``count``, the first candidate of each problem, as they come.
+    """
+    numbers: dict[str, int] = {}
+    owners = np.array([numbers.setdefault(each.problem.id, len(numbers)) for each in candidates], np.int32)
+    _, first = np.unique(owners, return_index=True)
+    if count >= len(numbers):
+        return first.astype(np.int32)
     sweeps = sweep_plans([candidate.plan for candidate in candidates], vehicle)
-    labels = label_problems([each.problem for each in candidates[:PROBLEMS]], sweeps).free
-    np.fill_diagonal(labels, False)
+    labels = label_problems([candidates[i].problem for i in first[:PROBLEMS]], sweeps).free
+    labels &= owners != np.arange(len(labels))[:, np.newaxis]
     durations = np.array([each.plan.duration_s for each in candidates])
-    return choose(labels, durations, durations[: len(labels)] + MISSED_S, count)
+    quickest = np.full(len(numbers), np.inf)
+    np.minimum.at(quickest, owners, durations)
+    return choose(labels, durations, quickest[: len(labels)] + MISSED_S, count, owners)
 
 
-def choose(labels: Flags, durations: Floats, without: Floats, count: int) -> Integers:
-    """Choose some of N plans greedily.
+def choose(labels: Flags, durations: Floats, without: Floats, count: int, owners: Integers) -> Integers:
+    """Choose some of N plans greedily, at most one of each owner.
 
     Args:
         labels: ``[M, N]`` which plans are free in which problem.
         durations: ``[N]`` driving times of the plans, in seconds.
         without: ``[M]`` what a problem costs without any plan, in seconds.
         count: how many plans to choose.
+        owners: ``[N]`` which problem each plan was made for.
 
     Returns:
         Their numbers ``[count]`` in the order of the choice.
 
     Raises:
-        ValueError: There are fewer than ``count`` plans, or the arrays are of different plans or problems.
+        ValueError: There are fewer than ``count`` owners, or the arrays are of different plans or problems.
     """
     plans = len(durations)
-    if labels.shape != (len(without), plans) or not 0 <= count <= plans:
+    if labels.shape != (len(without), plans) or not 0 <= count <= len(set(owners.tolist())):
         raise ValueError(f"{count} of {plans} plans cannot be chosen by labels {list(labels.shape)}")
     free = np.ascontiguousarray(labels.T)
     costs = without.copy()
@@ -69,7 +85,7 @@ def choose(labels: Flags, durations: Floats, without: Floats, count: int) -> Int
         best = order[step] = _most_useful(free, durations, costs, bounds, eligible)
         saves = free[best] & (durations[best] < costs)
         costs[saves] -= (1.0 - LEFT) * (costs[saves] - durations[best])
-        eligible[best] = False
+        eligible[owners == owners[best]] = False
     return order
 
 

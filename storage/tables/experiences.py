@@ -29,7 +29,7 @@ def write_experiences(
     path: Path,
     experiences: Sequence[Experience],
     *,
-    planner: str,
+    planners: Sequence[str],
     seeds: Sequence[int],
     planning_seconds: Sequence[float],
     key: str = "",
@@ -37,14 +37,14 @@ def write_experiences(
 ) -> None:
     """Write ``experiences`` of a ``vehicle``, one a row.
 
-    ``planner``: that found them. ``seeds``, ``planning_seconds``: of its searches, one a row. ``key``: what
+    ``planners``, ``seeds``, ``planning_seconds``: of the searches that found them, one a row. ``key``: what
     they were made from.
     """
     plans = [experience.plan for experience in experiences]
     columns = {
         **problem_columns([experience.problem for experience in experiences]),
         **_plan_columns(plans),
-        "planner": [planner] * len(plans),
+        "planner": list(planners),
         "seed": list(seeds),
         "planning_seconds": list(planning_seconds),
     }
@@ -114,10 +114,13 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
 
 
 def copy_experiences(source: Path, path: Path, key: str) -> int:
-    """Write the experiences in the file ``source`` to ``path`` under another ``key``, and return how many."""
+    """Write the experiences in the file ``source`` to ``path`` under another ``key``.
+
+    Returns of how many problems they are.
+    """
     table = read_table(source, EXPERIENCES)
     write_table(path, table, key)
-    return int(table.num_rows)
+    return len(table["id"].unique())
 
 
 def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:

@@ -56,7 +56,7 @@ def add_gained(
     write_experiences(
         folder / f"{_digest(marks)}.parquet",
         experiences,
-        planner=planner,
+        planners=[planner] * len(experiences),
         seeds=seeds,
         planning_seconds=planning_seconds,
         vehicle=vehicle,

@@ -1,4 +1,7 @@
-"""Collect: draw problems of a class, solve them, polish and check the plans: candidates to choose from."""
+"""Collect: draw problems of a class, solve them, polish and check the plans: candidates to choose from.
+
+A problem gives several candidates: some are quicker, others fit more problems. Curation chooses among all.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,18 @@ from tasks.settings.run_settings import RunSettings
 SMALLEST_CHUNK: Final = 25
 LARGEST_CHUNK: Final = 100  # a second of work
 PATIENCE: Final = 2  # problems tried for each wanted candidate, once as many are solved as must be kept
-MARGIN_M: Final = 0.4  # of polished plans: tighter ones fit fewer problems (docs/optimisation.md)
 GIVE_UP: Final = 20  # problems tried for each wanted experience; a class this hard is no class to remember
+
+
+class Variant(NamedTuple):
+    """How one of the candidates of a problem is made."""
+
+    planner: str | None  # None: the run's collector
+    margin_m: float  # of the polished plan
+
+
+# a quick plan, one that is as good as quick and fits more problems, and one that often takes another way
+VARIANTS: Final = (Variant(None, 0.4), Variant(None, 0.8), Variant("follow", 0.8))  # docs/optimisation.md
 
 
 class Collected(NamedTuple):
@@ -49,47 +62,59 @@ def collect_chunk(chunk: Chunk) -> Collected:
         if shard_is_done(theirs, chunk.key):
             return Collected(copy_experiences(theirs, shard, chunk.key), tried)
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
-    planner, seed, vehicle = chunk.settings.collector, chunk.settings.seed, chunk.vehicle
     workspace = Workspace()
-    experiences, seconds = [], []
-    for index in range(chunk.first, chunk.last):
-        problem = source.problem("collect", index)
-        attempt = solve(problem, planner, seed=seed, vehicle=vehicle, workspace=workspace)
-        if not chunk.settings.as_published:
-            attempt = _polished(problem, attempt, vehicle, workspace)
-        if attempt.plan is not None:
-            check_attempt(problem, attempt, set(), vehicle)
-            experiences.append(Experience(problem, attempt.plan, vehicle))
-            seconds.append(attempt.planning_seconds)
+    problems = (source.problem("collect", index) for index in range(chunk.first, chunk.last))
+    found = [_candidates(problem, chunk.settings, chunk.vehicle, workspace) for problem in problems]
+    made = [each for some in found for each in some]
     write_experiences(
         shard,
-        experiences,
-        planner=planner,
-        seeds=[seed] * len(experiences),
-        planning_seconds=seconds,
+        [experience for experience, _ in made],
+        planners=[attempt.planner for _, attempt in made],
+        seeds=[attempt.seed for _, attempt in made],
+        planning_seconds=[attempt.planning_seconds for _, attempt in made],
         key=chunk.key,
-        vehicle=vehicle,
+        vehicle=chunk.vehicle,
     )
-    return Collected(len(experiences), tried)
+    return Collected(sum(map(bool, found)), tried)
 
 
-def _polished(problem: Problem, attempt: Attempt, vehicle: Vehicle, workspace: Workspace) -> Attempt:
-    """The attempt with its plan, if it has one, as quick as small changes make it."""
-    if attempt.plan is None:
-        return attempt
-    plan = polish(problem, attempt.plan, vehicle, scene_of(problem), workspace, margin_m=MARGIN_M).plan
-    return (
-        attempt
-        if plan is None
-        else replace(attempt, plan=plan, length_m=plan.length_m, duration_s=plan.duration_s)
-    )
+def _variants(settings: RunSettings) -> Sequence[Variant]:
+    """The variants that a run makes: only the first where nothing is chosen or plans stay as found."""
+    chosen = settings.wanted > settings.experiences and not settings.as_published
+    return VARIANTS if chosen else VARIANTS[:1]
+
+
+def _candidates(
+    problem: Problem, settings: RunSettings, vehicle: Vehicle, workspace: Workspace
+) -> list[tuple[Experience, Attempt]]:
+    """Solve a problem and make one plan of each variant, or none if the collector finds none."""
+    attempts: dict[str, Attempt] = {}
+    made: list[tuple[Experience, Attempt]] = []
+    for planner, margin_m in _variants(settings):
+        name = planner or settings.collector
+        if name not in attempts:
+            attempts[name] = solve(problem, name, seed=settings.seed, vehicle=vehicle, workspace=workspace)
+        attempt = attempts[name]
+        if attempt.plan is None:
+            if not made:
+                break
+            continue
+        plan = attempt.plan
+        if not settings.as_published:
+            scene = scene_of(problem)
+            plan = polish(problem, plan, vehicle, scene, workspace, margin_m=margin_m).plan or plan
+        attempt = replace(attempt, plan=plan, length_m=plan.length_m, duration_s=plan.duration_s)
+        check_attempt(problem, attempt, set(), vehicle)
+        made.append((Experience(problem, plan, vehicle), attempt))
+    return made
 
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     """As many problems as are needed to solve enough of them, judging by the chunks that are done."""
     source = source_of(data, settings, name)
     size = max(SMALLEST_CHUNK, min(LARGEST_CHUNK, settings.wanted // 10))
-    inputs = [settings.seed, settings.collector, settings.as_published, *source_key(settings, name)]
+    made = [settings.seed, settings.collector, settings.as_published, len(_variants(settings))]
+    inputs = [*made, *source_key(settings, name)]
     results: list[Collected] = []
     while True:
         cut = Cut(_problems_to_try(settings, name, source, size, results), size, inputs)

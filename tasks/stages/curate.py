@@ -40,13 +40,16 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
     Returns:
         [N] positions in ``drawn`` followed by ``gained``, the most useful first.
     """
-    rows = _alternating(range(min(len(drawn), settings.wanted)), range(len(drawn), len(drawn) + len(gained)))
+    ours = _by_problem(drawn, 0)[: settings.wanted]
+    rows = _alternating(ours, _by_problem(gained, len(drawn)))
     everything = [*drawn, *gained]
     candidates = [everything[row] for row in rows]
     kept = curate(candidates, settings.taught, vehicle_named(settings.vehicle)).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
-        others = sorted(set(range(len(candidates))) - set(kept))
-        kept += others[: settings.experiences - len(kept)]
+        taken = {candidates[i].problem.id for i in kept}
+        others = {each.problem.id: i for i, each in reversed([*enumerate(candidates)])}
+        joining = sorted(i for identity, i in others.items() if identity not in taken)
+        kept += joining[: settings.experiences - len(kept)]
     return [rows[i] for i in kept]
 
 
@@ -67,10 +70,18 @@ def _gained_of(chunk: Chunk) -> list[Experience]:
     return read_experiences(shard, chunk.vehicle)
 
 
-def _alternating(ours: Sequence[int], theirs: Sequence[int]) -> list[int]:
-    """The first of ours, the first of theirs, the second of ours …, so that curation looks at both."""
+def _by_problem(experiences: Sequence[Experience], first: int) -> list[list[int]]:
+    """The positions of the experiences, counted from ``first``, those of one problem together."""
+    rows: dict[str, list[int]] = {}
+    for row, each in enumerate(experiences, first):
+        rows.setdefault(each.problem.id, []).append(row)
+    return [*rows.values()]
+
+
+def _alternating(ours: Sequence[list[int]], theirs: Sequence[list[int]]) -> list[int]:
+    """The rows of our first problem, of their first, of our second …, so that curation looks at both."""
     pairs = zip_longest(ours, theirs)
-    return [row for pair in pairs for row in pair if row is not None]
+    return [row for pair in pairs for rows in pair for row in rows or ()]
 
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:

@@ -35,7 +35,7 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, pa.Table]:
     write_experiences(
         folder / "experiences",
         [Experience(problem, plan(4 + i)) for i, problem in enumerate(PROBLEMS)],
-        planner="rrt",
+        planners=["rrt"] * 3,
         seeds=[0, 1, 2],
         planning_seconds=[0.1, 0.2, 0.3],
     )

@@ -22,9 +22,10 @@ OTHERS = [vehicle for vehicle in VEHICLES.values() if vehicle != CAR]
 
 
 def store(path: Path, found: list[Experience], key: str = "k", vehicle: Vehicle = CAR) -> None:
-    times = [0.5] * len(found)
+    planners, times = ["rrt"] * len(found), [0.5] * len(found)
+    seeds = range(len(found))
     write_experiences(
-        path, found, planner="rrt", seeds=range(len(found)), planning_seconds=times, key=key, vehicle=vehicle
+        path, found, planners=planners, seeds=seeds, planning_seconds=times, key=key, vehicle=vehicle
     )
 
 

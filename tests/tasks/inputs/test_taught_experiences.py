@@ -73,7 +73,9 @@ def test_plans_are_recalled_that_no_encoder_was_taught(run: RunFolder) -> None:
 @pytest.mark.parametrize("name", CLASSES)
 def test_those_that_are_taught_were_chosen_and_no_experience_is_kept_twice(run: RunFolder, name: str) -> None:
     shards = run.shards("candidates", name)
-    candidates = [each for shard in shards for each in read_experiences(shard)][: EXPERIENCES + 2]
+    made = [each for shard in shards for each in read_experiences(shard)]
+    wanted = [*dict.fromkeys(each.problem.id for each in made)][: SETTINGS.wanted]
+    candidates = [each for each in made if each.problem.id in wanted]
     kept = [each.problem.id for each in read_experiences(run.experiences(name))]
     assert len(set(kept)) == EXPERIENCES
     chosen = [candidates[i].problem.id for i in curate(candidates, TAUGHT)]

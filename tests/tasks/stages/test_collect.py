@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from tasks.fan_out.chunk import run_folder
 from tasks.settings.errors import RunError
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.collect import MARGIN_M
+from tasks.stages.collect import VARIANTS
 from tests.tasks.in_process import collect
 
 PLAIN = replace(
@@ -52,10 +53,24 @@ def test_the_order_of_work_changes_nothing(tmp_path: Path, plain: list) -> None:
 
 
 def test_kept_plans_are_polished(plain: list) -> None:
+    most = max(margin_m for _, margin_m in VARIANTS)
     for each in plain:
-        again = polish(each.problem, each.plan, CAR, scene_of(each.problem), Workspace(), margin_m=MARGIN_M)
+        again = polish(each.problem, each.plan, CAR, scene_of(each.problem), Workspace(), margin_m=most)
         assert again.plan is not None
         assert again.plan.duration_s >= each.plan.duration_s - 0.3 - 1e-9
+
+
+def test_a_problem_gives_a_candidate_of_each_variant_and_at_most_one_is_kept(
+    tmp_path: Path, plain: list
+) -> None:
+    assert len({each.problem.id for each in plain}) == len(plain)
+    collect(str(tmp_path), PLAIN)
+    shards = run_folder(str(tmp_path), PLAIN).shards("candidates", "random")
+    made = [each for shard in shards for each in read_experiences(shard)]
+    counts = Counter(each.problem.id for each in made)
+    assert max(counts.values()) == len(VARIANTS)
+    assert len(counts) >= PLAIN.candidates
+    assert all(faults(each.problem, each.plan) == [] for each in made)
 
 
 def test_without_more_candidates_the_first_are_kept(tmp_path: Path) -> None:
