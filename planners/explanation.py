@@ -10,6 +10,8 @@ import numpy as np
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
+from planners.search.help import PATIENCE
+from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
 from planners.solve import Attempt, least_blocked
 from planners.world.arrays import Flags
@@ -84,6 +86,8 @@ def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dic
         return {i: "answer" for i, states in recalled.items() if np.array_equal(states, answer)}
     use = attempt.assist.removeprefix("random-")
     if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
+        return {}
+    if attempt.source != "repaired" and work_of(attempt.collision_checks, attempt.expansions) < PATIENCE:
         return {}
     best, _ = least_blocked(memory, attempt.recalled, view)
     return {best: "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}

@@ -5,7 +5,7 @@ Planning time is measured once, around everything between receiving a problem an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from time import perf_counter
@@ -17,11 +17,12 @@ from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
 from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
+from planners.search.guides.detour import SECOND_LOOK, is_detour
 from planners.search.guides.guidance import published_guidance
-from planners.search.help import Help, fresh_guide
+from planners.search.help import PATIENCE, Help, fresh_guide
 from planners.search.outcome import Status
 from planners.search.query import Limits, Query
-from planners.search.registry import HEAD_STARTS, PLANNERS
+from planners.search.registry import PLANNERS
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
@@ -74,6 +75,23 @@ _PARTS = tuple(
 )
 
 
+def help_with(
+    query: Query,
+    memory: Memory,
+    recalled: Sequence[int],
+    view: View,
+    rng: Callable[[], np.random.Generator],
+    *,
+    repairs: bool,
+) -> Help | None:
+    """Help with a query by the recalled plan that shares the fewest cells with obstacles, if there is one."""
+    stored, cells = least_blocked(memory, recalled, view)
+    if stored < 0:
+        return None
+    plan = turned(memory.plans[stored], query.problem.start[2])
+    return Help(query, plan, cells, view.bits, rng, repairs=repairs)
+
+
 def least_blocked(memory: Memory, recalled: Sequence[int], view: View) -> tuple[int, int]:
     """Find the recalled plan that shares the fewest cells with obstacles, and how many these are.
 
@@ -104,7 +122,8 @@ def solve(
     Memories hold plans for canonical problems, so for others nothing is recalled.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
-    drives shortest, else search.
+    drives shortest, else search. A free plan that is a long detour is the answer only if a short search finds
+    no quicker one.
     ``open``: the same, and where none is free, a search along the least blocked of the recalled plans helps
     the planner. ``repair``: the same, and the blocked segments of that plan may be planned anew before.
     ``published-open``: the paper's open box, where the search samples near the states of all recalled plans.
@@ -157,47 +176,46 @@ def solve(
     work = np.array([recalled.checks, 0, 0])  # collision checks, expansions, nodes
     if memory is not None and recalled.free >= 0:
         answer, source = turned(memory.plans[recalled.free], problem.start[2]), "recalled"
-    else:
+    if answer is None or (strategy != "centroid" and is_detour(answer, planner, view, vehicle)):
+        given = limits or Limits()
+        helps = memory is not None and use in ("open", "repair") and bool(recalled.plans) and answer is None
+        helper: Help | None = None
+        rng = partial(generator, seed, "help", problem.id, planner)
+
+        def beside(spent: int) -> Plan | None:
+            nonlocal helper
+            if helper is None and spent >= PATIENCE and memory is not None:
+                helper = help_with(query, memory, recalled.plans, view, rng, repairs=use == "repair")
+            return None if helper is None else helper.beside(spent)
+
         query = Query(
             *(problem, generator(seed, "search", problem.id, planner), view.scene, view.workspace),
-            limits=limits or Limits(),
+            limits=given if answer is None else replace(given, expansions=min(given.expansions, SECOND_LOOK)),
             vehicle=vehicle,
+            occupied=view.drawn,
+            beside=beside if helps else None,
         )
-        helper = None
-        if memory is not None and use == "published-open" and recalled.plans:
+        if use == "fresh":
+            query = replace(query, guide=fresh_guide(query, view.bits))
+            view.lap("guide")
+        elif use == "published-open" and memory is not None and recalled.plans:
             plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
             query = replace(query, guide=published_guidance(plans))
             view.lap("guide")
-        elif memory is not None and use in ("open", "repair") and recalled.plans:
-            stored, cells = least_blocked(memory, recalled.plans, view)
-            if stored >= 0:
-                plan = turned(memory.plans[stored], problem.start[2])
-                rng = partial(generator, seed, "help", problem.id, planner)
-                helper = Help(query, plan, cells, view.bits, rng, repairs=use == "repair")
-                query = replace(query, beside=helper.beside)
-                view.lap("check")
-                head_start = HEAD_STARTS[planner]
-                if helper.promises_repair and cells <= head_start.cells:
-                    answer, source = helper.repaired(), "repaired"
-                    view.lap("repair")
-                if answer is None:
-                    answer, source = helper.guided(head_start.work), "searched"
-        elif use == "fresh":
-            query = replace(query, guide=fresh_guide(query, view.bits))
-            view.lap("guide")
-        if answer is None:
-            searched = PLANNERS[planner](query)
-            answer, status, source = searched.plan, searched.status, "searched"
-            if helper is not None and answer is not None and helper.is_repair(answer):
-                source = "repaired"
-            work += searched.collision_checks, searched.expansions, searched.nodes
-            view.seconds["roadmap"] = searched.roadmap_seconds
-            view.lap("search")
-            view.seconds["search"] -= searched.roadmap_seconds
-        elif source == "searched":
-            view.lap("search")
+        searched = PLANNERS[planner](query)
+        work += searched.collision_checks, searched.expansions, searched.nodes
+        view.seconds["roadmap"] = searched.roadmap_seconds
+        view.lap("search")
+        view.seconds["search"] -= searched.roadmap_seconds
         if helper is not None:
             work += helper.cost()
+            view.seconds["repair"] = helper.repair_seconds
+            view.seconds["search"] -= helper.repair_seconds
+        if searched.plan is not None and (answer is None or searched.plan.duration_s < answer.duration_s):
+            repaired = helper is not None and helper.is_repair(searched.plan)
+            answer, source = searched.plan, "repaired" if repaired else "searched"
+        elif answer is None:
+            status = searched.status
     planning_seconds = perf_counter() - view.began
 
     return Attempt(

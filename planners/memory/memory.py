@@ -76,6 +76,11 @@ class Memory:
         return np.array([plan.duration_s for plan in self.plans], np.float32)
 
     @functools.cached_property
+    def by_time(self) -> Integers:
+        """All plans ``[N]``, the quickest to drive first."""
+        return np.argsort(self.durations, kind="stable").astype(np.int32)
+
+    @functools.cached_property
     def heading(self) -> float | None:
         """The heading (radians) that all stored plans begin with; None if they do not agree."""
         headings = self.sweeps.first_poses[:, 2]

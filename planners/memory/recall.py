@@ -5,9 +5,12 @@
 | encoder | the readout that the encoder was trained with, and blocked cells | the first k |
 | centroid | the distance of the embedding to each plan's centroid | the first k |
 | mask | blocked cells | the first k |
-| hybrid | the encoder picks some hundred, blocked cells rank these | all of these |
-| exhaustive | blocked cells | all N |
+| hybrid | the encoder picks some hundred, blocked cells rank these | those of these that may be free |
+| exhaustive | blocked cells | all that may be free |
 | random | nobody | k picked blindly |
+
+By cells, the plans that are likely to be free are tried, the quickest first, and then some that may be free.
+To check all others in vain would cost a planner that is soon done more than the few that are free would save.
 
 In a large memory ``hybrid`` and ``exhaustive`` try the first thousand plans before the others. If any plan is
 free, one of these mostly is, so the time to find it does not grow with the memory.
@@ -20,7 +23,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.memory.memory import Memory
-from planners.memory.plans.cell_masks import rank_by_cells
+from planners.memory.plans.cell_masks import rank_by_cells, rank_to_try
 from planners.memory.plans.free import ends_of, first_fitting, first_fitting_drawn
 from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
@@ -37,7 +40,8 @@ TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
 CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the others mostly are, too
 CHECKED_DRAWN: Final = 32  # plans checked from the drawing; if all are blocked, a planner will need the scene
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
-LIKELY_CELLS: Final = 16  # blocked cells: of plans with more, one in a hundred is free
+LIKELY_CELLS: Final = 16  # blocked cells: where a plan with more is free, one with fewer mostly is, too
+POSSIBLE_CELLS: Final = 24  # blocked cells: on curves at hard only such plans are free in 9 % of problems
 
 
 class Recalled(NamedTuple):
@@ -88,7 +92,10 @@ def recall(
         if early.free >= 0:
             return early
         spent = early.checks
-    worth = likely = count  # how many of the ranked plans may be returned, and how many are likely to be free
+    worth = likely = (
+        count  # how many of the ranked plans may be returned, and how many are tried by driving time
+    )
+    tries: Integers | None = None
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "encoder":
@@ -101,13 +108,12 @@ def recall(
     else:
         narrowed = strategy == "hybrid" and candidates < count
         among = by_encoder(memory, view, candidates, never_none=True) if narrowed else None
-        order, ends = by_cells(memory, view, among)
+        order, ends, tries = by_cells(memory, view, among)
         worth = int(ends[WORTH_CELLS])
         if strategy == "mask":
-            order = order[: min(k, worth)]
-        else:
-            likely = int(ends[LIKELY_CELLS])
-    tries = shortest_first(memory, order, likely)
+            order, tries = order[: min(k, worth)], None
+    if tries is None:
+        tries = shortest_first(memory, order, likely)
     view.lap("recall")
     free, checks = first_check(memory, view, tries, as_stored)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
@@ -117,7 +123,7 @@ def among_the_first(memory: Memory, view: View, k: int) -> Recalled:
     """Recall from the first plans of a large memory, by blocked cells, for a problem of their heading."""
     ranking = rank_by_cells(memory.masks[:TRIED_EARLY], view.bits, view.workspace)
     order = ranking.order[: min(CHECKED_EARLY, int(ranking.ends[WORTH_CELLS]))]
-    tries = shortest_first(memory, order, int(ranking.ends[LIKELY_CELLS]))
+    tries = shortest_first(memory, order[: int(ranking.ends[LIKELY_CELLS])], len(order))
     view.lap("recall")
     free, checks = first_check(memory, view, tries, as_stored=True)
     return Recalled(_with(free, order[:k].tolist(), k), free, checks)
@@ -194,15 +200,23 @@ def by_centroids(memory: Memory, view: View, k: int) -> Integers:
     return best_plans(vectors @ embedding + biases, k)
 
 
-def by_cells(memory: Memory, view: View, among: Integers | None = None) -> tuple[Integers, Integers]:
+def by_cells(
+    memory: Memory, view: View, among: Integers | None = None
+) -> tuple[Integers, Integers, Integers]:
     """Rank all plans, or those ``among [n]``, the least blocked first.
 
-    Returns the plans in this order, and how many of them have at most 0, 1, ... blocked cells.
+    Returns the plans in this order, how many of them have at most 0, 1, ... blocked cells, and which of them
+    to check, in order.
     """
-    masks = memory.masks if among is None else memory.masks[among]
-    ranking = rank_by_cells(masks, view.bits, view.workspace)
-    order = ranking.order if among is None else among[ranking.order]
-    return order, ranking.ends
+    if among is None:
+        masks, by_time = memory.masks, memory.by_time
+    else:
+        masks = memory.masks[among]
+        by_time = np.argsort(memory.durations[among], kind="stable").astype(np.int32)
+    ranking, tries = rank_to_try(masks, view.bits, by_time, LIKELY_CELLS, POSSIBLE_CELLS, view.workspace)
+    if among is None:
+        return ranking.order, ranking.ends, tries
+    return among[ranking.order], ranking.ends, among[tries]
 
 
 def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) -> tuple[int, int]:
@@ -211,7 +225,7 @@ def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) ->
     ``as_stored`` says that the problem begins with the heading of the stored plans; else plans are turned.
     """
     plan, checks = -1, 0
-    if as_stored:
+    if as_stored and len(order):
         head, order = order[:CHECKED_DRAWN], order[CHECKED_DRAWN:]
         plan, checks = first_fitting_drawn(head, memory.sweeps, memory.masks, view.drawing, view.problem)
         view.lap("check")

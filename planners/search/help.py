@@ -21,8 +21,8 @@ from planners.search.repair import REPAIR, free_prefix, repair
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.problem import Plan
 
-SHARE: Final = 0.06  # of a planner's own work, which help may cost beside it
-PATIENCE: Final = 4_000  # of a planner's own work before there is help beside it: most searches end before
+SHARE: Final = 0.04  # of a planner's own work, which help may cost beside it
+PATIENCE: Final = round(REPAIR.work / SHARE)  # of a planner's own work before there is help beside it
 PROMISING_CELLS: Final = 22  # blocked cells: to repair a plan with more mostly costs more than to search
 
 
@@ -41,7 +41,7 @@ def fresh_guide(query: Query, occupied: Bits, stored: Plan | None = None) -> Gui
 
 
 class Help:
-    """Repair of a stored plan and a search along it, before a planner's own search and beside it.
+    """Repair of a stored plan, and then a search along it, beside a planner's own search.
 
     Nothing is made before it is needed.
     """
@@ -67,9 +67,10 @@ class Help:
             repairs: whether the plan may be repaired.
         """
         self._query, self._stored, self._occupied, self._rng = query, stored, occupied, rng
-        self.promises_repair = repairs and blocked_cells <= PROMISING_CELLS
+        self._promises_repair = repairs and blocked_cells <= PROMISING_CELLS
         self._drive: Plan | None = None
         self._begun = False
+        self._due = PATIENCE  # work of the planner at which help goes on: seldom, because each time costs
         self._checks = 0
         self._repair: Outcome | None = None
         self._search: GuidedSearch | None = None
@@ -103,11 +104,12 @@ class Help:
 
     def beside(self, work: int) -> Plan | None:
         """Help a little more, when the planner's own search has cost ``work``: first repair, then search."""
-        if work < PATIENCE:
+        if work < self._due:
             return None
+        self._due = work + PATIENCE
+        if self._promises_repair and self._repair is None:
+            return self.repaired()
         allowance = int(SHARE * work)
-        if self.promises_repair and self._repair is None:
-            return self.repaired() if allowance >= REPAIR.work else None
         if self._repair is not None:
             allowance -= work_of(self._repair.collision_checks, self._repair.expansions)
         return self.guided(allowance)
@@ -115,6 +117,11 @@ class Help:
     def is_repair(self, plan: Plan) -> bool:
         """Whether a plan is what the repair made."""
         return self._repair is not None and self._repair.plan is plan
+
+    @property
+    def repair_seconds(self) -> float:
+        """How long the repair took."""
+        return 0.0 if self._repair is None else self._repair.search_seconds
 
     def cost(self) -> tuple[int, int, int]:
         """Collision checks, expansions and nodes of all this."""

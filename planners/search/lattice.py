@@ -260,7 +260,9 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
         nonlocal level
         if trial == 0:
-            occupied = drawing_of(query.problem, query.workspace).occupied
+            occupied = query.occupied
+            if occupied is None:
+                occupied = drawing_of(query.problem, query.workspace).occupied
             fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
         level = levels[min(trial // 2, len(levels) - 1)]
         if improving:

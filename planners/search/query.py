@@ -11,6 +11,7 @@ import numpy as np
 
 from planners.world.arrays import Floats, Integers
 from planners.world.geometry.collision import Scene
+from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
@@ -55,5 +56,6 @@ class Query:
     limits: Limits = field(default_factory=Limits)
     vehicle: Vehicle = CAR
     prefix: Plan | None = None  # a free drive from the problem's start, from which the search goes on
+    occupied: Bits | None = None  # [64] the cells that are not free, if they are drawn
     # what else is tried while the search goes on: told of its work so far, it may return a plan that ends it
     beside: Callable[[int], Plan | None] | None = None

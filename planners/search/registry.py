@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,22 +23,6 @@ PLANNERS: dict[str, Callable[[Query], Outcome]] = {
     "gust": partial(gust, settings=GustSettings()),
     "follow": partial(follow, settings=FollowSettings()),
     "lattice": partial(lattice, settings=LatticeSettings()),
-}
-
-
-class HeadStart(NamedTuple):
-    """What help may do before a planner's own search begins, by how long that takes."""
-
-    cells: int  # a plan with more blocked cells than this is not repaired yet
-    work: int  # of a search along it
-
-
-# RRT's own search takes five times as much as a guided one, that of the others not twice as much.
-HEAD_STARTS: dict[str, HeadStart] = {
-    "rrt": HeadStart(22, 2_000),
-    "gust": HeadStart(4, 0),
-    "follow": HeadStart(4, 0),
-    "lattice": HeadStart(4, 0),
 }
 
 

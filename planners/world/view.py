@@ -39,6 +39,11 @@ class View:
         return self._drawing
 
     @property
+    def drawn(self) -> Bits | None:
+        """The cells ``[64]`` that are not free, as bits, if they were drawn for something else already."""
+        return None if self._drawing is None else self._drawing.occupied
+
+    @property
     def bits(self) -> Bits:
         """The cells ``[64]`` that are not free, as bits."""
         return self.drawing.occupied

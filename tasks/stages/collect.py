@@ -64,7 +64,7 @@ def collect_chunk(chunk: Chunk) -> Collected:
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
     workspace = Workspace()
     problems = (source.problem("collect", index) for index in range(chunk.first, chunk.last))
-    found = [_candidates(problem, chunk.settings, chunk.vehicle, workspace) for problem in problems]
+    found = [candidates_of(problem, chunk.settings, chunk.vehicle, workspace) for problem in problems]
     made = [each for some in found for each in some]
     write_experiences(
         shard,
@@ -84,7 +84,7 @@ def _variants(settings: RunSettings) -> Sequence[Variant]:
     return VARIANTS if chosen else VARIANTS[:1]
 
 
-def _candidates(
+def candidates_of(
     problem: Problem, settings: RunSettings, vehicle: Vehicle, workspace: Workspace
 ) -> list[tuple[Experience, Attempt]]:
     """Solve a problem and make one plan of each variant, or none if the collector finds none."""

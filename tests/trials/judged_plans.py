@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -35,6 +36,7 @@ from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import VEHICLES
 from storage.places.files import whole_file
+from tests.planners.early_help import early_help
 from tests.planners.memories import memory_of
 
 EXPERIENCES: Final = 100  # problems that a memory is made of
@@ -76,7 +78,8 @@ def attempts(seed: int, index: int) -> Iterator[tuple[Problem, str, str, Attempt
     vehicle, known = VEHICLES[name], memory(seed, name, problem.class_name)
     for planner, assist, each in product(PLANNERS, ASSISTS, range(SEEDS)):
         given = None if assist in WITHOUT_MEMORY else known
-        attempt = solve(problem, planner, assist, TOP_K, given, each, LIMITS, vehicle)
+        with early_help() if each else nullcontext():
+            attempt = solve(problem, planner, assist, TOP_K, given, each, LIMITS, vehicle)
         yield problem, name, attempt.source or "", attempt
         if each == 0 and (planner, assist) == IMPROVED[index // len(KINDS) % len(IMPROVED)]:
             yield problem, name, "improved", improved(attempt, problem, IMPROVE_SECONDS, vehicle)

@@ -19,6 +19,7 @@ from planners.world.workspace import Workspace
 
 ROUNDING_M = 1e-6  # boxes are drawn larger by this, so that rounding never loses a cell
 MOST_CELLS = 511  # a plan sweeps some 200; with more blocked cells plans count as equally blocked
+POSSIBLE_FOR_EACH_LIKELY = 3  # plans to check in all for each that is likely to be free
 PROVEN = 10.0  # score of a plan without a blocked cell: it is free, whatever an encoder says
 _PAIRS = np.uint64(0x5555555555555555)
 _NIBBLES = np.uint64(0x3333333333333333)
@@ -85,6 +86,11 @@ def allocate_ranking(count: int) -> Ranking:
     return Ranking(np.empty(count, np.int32), np.empty(count, np.int32), np.empty(MOST_CELLS + 2, np.int32))
 
 
+def allocate_tries(count: int) -> Integers:
+    """A buffer for the numbers of at most ``count`` plans."""
+    return np.empty(count, np.int32)
+
+
 @inlined
 def blocked_cells(masks: Bits, i: int, occupied: Bits) -> int:
     """Count the cells of plan ``i`` that are not free, at most MOST_CELLS: also if it leaves the window."""
@@ -124,6 +130,55 @@ def rank_by_cells(masks: Bits, occupied: Bits, workspace: Workspace | None = Non
     ranking = (workspace or Workspace()).buffers(allocate_ranking, len(masks))
     _rank(masks, occupied, ranking)
     return ranking
+
+
+@lean
+def _rank_to_try(
+    masks: Bits,
+    occupied: Bits,
+    by_time: Integers,
+    likely: int,
+    possible: int,
+    ranking: Ranking,
+    tries: Integers,
+) -> int:
+    _rank(masks, occupied, ranking)
+    few = ranking.ends[likely]
+    most = min(ranking.ends[possible], POSSIBLE_FOR_EACH_LIKELY * few)
+    filled = 0
+    for i in by_time:
+        if ranking.cells[i] <= likely:
+            tries[filled] = i
+            filled += 1
+    for filled in range(few, most):
+        tries[filled] = ranking.order[filled]
+    return int(most)
+
+
+def rank_to_try(
+    masks: Bits, occupied: Bits, by_time: Integers, likely: int, possible: int, workspace: Workspace
+) -> tuple[Ranking, Integers]:
+    """Rank N plans by how many of their swept cells are not free, and choose which to check, in what order.
+
+    Plans with at most ``likely`` blocked cells come first, the quickest to drive first. Then come some of
+    those with at most ``possible``, the least blocked first: few where few are likely to be free, because
+    then the memory is one of other problems.
+
+    Args:
+        masks: ``[N, 64]`` the cells that each plan sweeps.
+        occupied: ``[64]`` the cells that are not free.
+        by_time: ``[N]`` the plans, the quickest to drive first.
+        likely: blocked cells.
+        possible: blocked cells.
+        workspace: the caller's buffers, which the next ranking of N plans overwrites.
+
+    Returns:
+        The ranking, and the plans to check ``[n]``.
+    """
+    ranking = workspace.buffers(allocate_ranking, len(masks))
+    tries = workspace.buffers(allocate_tries, len(masks))
+    count = _rank_to_try(masks, occupied, by_time, likely, possible, ranking, tries)
+    return ranking, tries[:count]
 
 
 def _cell_scores() -> Floats32:

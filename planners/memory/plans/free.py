@@ -188,6 +188,10 @@ def _first_fitting_drawn(
 ) -> tuple[int, int]:
     narrow = bounds[0] > BOUNDS[0] or bounds[1] > BOUNDS[1] or bounds[2] < BOUNDS[2] or bounds[3] < BOUNDS[3]
     checks = 0
+    pieces = piece_starts.shape[0] - 1
+    blocking = (
+        0  # the piece that the last blocked plan met, which is tried first: it mostly meets others, too
+    )
     for i in order:
         begins, cos, sin = turn_to_start(sweeps, i, ends)
         if not (begins and sin == 0.0 and _ends_at_goal(sweeps, i, cos, sin, ends)):
@@ -196,9 +200,10 @@ def _first_fitting_drawn(
         last_box = sweeps.starts[i + 1]
         outside = masks[i, 0] == ALL_CELLS  # the plan leaves the window, so its cells say nothing
         free = not (outside or narrow) or _inside(sweeps.boxes, first_box, last_box, bounds)
-        for p in range(piece_starts.shape[0] - 1):
+        for turn in range(pieces):
             if not free:
                 break
+            p = blocking if turn == 0 else turn - 1 if turn <= blocking else turn
             near = outside
             for row in range(drawing.rows[p, 0], drawing.rows[p, 1] + 1):
                 near |= masks[i, row] & drawing.pieces[p, row] != np.uint64(0)
@@ -207,7 +212,9 @@ def _first_fitting_drawn(
                     sweeps.boxes, first_box, last_box, vertices, piece_starts[p], piece_starts[p + 1], edges
                 )
                 checks += tried
-                free = not meets
+                if meets:
+                    free = False
+                    blocking = p
         if free:
             return i, checks
     return -1, checks

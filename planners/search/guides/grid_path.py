@@ -7,6 +7,7 @@ vehicle moves.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from planners.world.arrays import Floats, Point
 from planners.world.geometry.occupancy import CANONICAL_WINDOW, GRID, Bits, Window
 from planners.world.jit import inlined, lean
+from planners.world.trigonometry import length
 from planners.world.workspace import Workspace
 
 _STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1))  # column, row
@@ -170,3 +172,28 @@ def grid_path(
     flood = (workspace or Workspace()).buffers(allocate_flood)
     count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, window, flood)
     return flood.path[:count].copy() if count else None
+
+
+@lean
+def _metres(path: Floats, count: int) -> float:
+    metres = 0.0
+    for i in range(1, count):
+        metres += length(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
+    return metres
+
+
+def grid_metres(
+    occupied: Bits,
+    start: Point,
+    goal: Point,
+    radius: float,
+    workspace: Workspace | None = None,
+    window: Window = CANONICAL_WINDOW,
+) -> float:
+    """Find how long the shortest path over a problem's free cells is, in metres; infinite if there is none.
+
+    The arguments are those of ``grid_path``.
+    """
+    flood = (workspace or Workspace()).buffers(allocate_flood)
+    count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, window, flood)
+    return float(_metres(flood.path, count)) if count else math.inf

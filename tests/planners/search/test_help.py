@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from planners.search.help import PATIENCE, SHARE
 from planners.search.outcome import work_of
 from planners.search.query import Limits
-from planners.search.registry import HEAD_STARTS, PLANNERS, plan
+from planners.search.registry import PLANNERS, plan
 from planners.search.repair import REPAIR
 from planners.solve import solve
 from planners.world.authority.authority import faults
@@ -44,7 +44,7 @@ def test_no_memory_makes_a_planner_work_much_more_or_fail(assist, planner, of, s
     helped = solve(problem, planner, assist, 4, memory_from(of), seed, limits)
     assert helped.solved or not alone.solved
     checking = 4 * LONGEST_PLAN  # of the plans that are recalled
-    budgets = HEAD_STARTS[planner].work + REPAIR.work + LONGEST_PLAN + OVERSHOOT
+    budgets = REPAIR.work + LONGEST_PLAN + OVERSHOOT
     assert work(helped) <= (1 + SHARE) * work(alone) + checking + budgets
     if helped.plan is not None:
         assert faults(problem, helped.plan) == []

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from planners.search.guides.grid_path import grid_path
+from planners.search.guides.grid_path import grid_metres, grid_path
 from planners.world.geometry.occupancy import CELL, GRID, drawing_of, occupancy_of
 from planners.world.problem import BOUNDS
 from planners.world.vehicles.vehicle import CAR
@@ -46,8 +46,13 @@ def test_a_path_is_as_short_as_scipys_or_there_is_none(seed, count):
     problem = strewn(seed, count)
     path, fewest = path_of(problem), steps_by_scipy(problem)
     assert (path is None) == np.isinf(fewest)
-    if path is not None:
+    occupied = drawing_of(problem).occupied
+    metres = grid_metres(occupied, problem.start[:2], problem.goal, problem.goal_radius)
+    if path is None:
+        assert np.isinf(metres)
+    else:
         assert len(path) == fewest + 1
+        np.testing.assert_allclose(metres, np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 @given(seed=st.integers(0, 10**6), count=st.integers(0, 60))
