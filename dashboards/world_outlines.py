@@ -12,7 +12,7 @@ from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_size, trailers_of
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
 _CLEAR_M: Final = 2.0  # between two footprints of a plan, so that a small picture stays readable
@@ -62,9 +62,9 @@ def goal_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats | None:
 
 def footprint_spacing_m(vehicle: Vehicle) -> float:
     """The distance along a plan from one footprint of ``vehicle`` to the next, in whole metres."""
-    length = vehicle.front + vehicle.rear
-    if isinstance(vehicle, CarWithTrailers):
-        length = vehicle.front + sum(vehicle.hitch_lengths) + vehicle.trailer_rear
+    trailers = trailers_of(vehicle)
+    rear = trailers[-1].rear if trailers else vehicle.rear
+    length = vehicle.front + sum(trailer.hitch_length for trailer in trailers) + rear
     return float(math.ceil(length + _CLEAR_M))
 
 
@@ -82,12 +82,13 @@ def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[Floats, Floats]:
     """Corners ``[n, 4, 2]`` of the bodies at ``states [T, S]``, and ends ``[m, 2, 2]`` of their tow bars."""
     corners = footprints(states, vehicle)
     bodies = corners.reshape(-1, 4, 2)
-    if not isinstance(vehicle, CarWithTrailers):
+    trailers = trailers_of(vehicle)
+    if not trailers:
         return bodies, np.empty((0, 2, 2))
-    trailers = corners[:, 1:]
-    fronts = trailers[:, :, 1:3].mean(axis=2)
-    along = trailers[:, :, 1] - trailers[:, :, 0]
+    towed = corners[:, 1:]
+    fronts = towed[:, :, 1:3].mean(axis=2)
+    along = towed[:, :, 1] - towed[:, :, 0]
     along /= np.linalg.norm(along, axis=2, keepdims=True)
-    lengths = np.array(vehicle.hitch_lengths) - vehicle.trailer_front
+    lengths = np.array([trailer.hitch_length - trailer.front for trailer in trailers])
     hitches = fronts + lengths[:, np.newaxis] * along
     return bodies, np.stack([fronts, hitches], axis=2).reshape(-1, 2, 2)

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.exchange import problems as problem_files
+from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 
 
 def read_problems(path: str | Path, *, vehicle: str = "car") -> list[Problem]:
@@ -15,12 +15,12 @@ def read_problems(path: str | Path, *, vehicle: str = "car") -> list[Problem]:
 
     Args:
         path: a .json, .jsonl or .parquet file.
-        vehicle: the name of the vehicle that must have room at each start.
+        vehicle: what must have room at each start: a name, or the path of a vehicle's .yaml file.
 
     Raises:
         StorageError: The file is missing, or a problem is malformed or impossible; names line and id.
     """
-    return problem_files.read_problems(Path(path), vehicle_named(vehicle))
+    return problem_files.read_problems(Path(path), said_vehicle(vehicle))
 
 
 def read_worlds(
@@ -29,7 +29,7 @@ def read_worlds(
     part: Literal["train", "test"] = "train",
     count: int | None = None,
     vehicle: str = "car",
-    scale: float = 1.0,
+    scale: float | None = None,
     resolution: float | None = None,
     seed: int = 1,
 ) -> list[Problem]:
@@ -39,8 +39,8 @@ def read_worlds(
         path: a folder of worlds, or a map: .map, .yaml (ROS), .npy or .npz.
         part: of a map, some blocks are for training and the others for testing; of worlds, every second.
         count: how many problems to make at most; by default 1,000 of a map and all of worlds.
-        vehicle: the name of the vehicle that must have room at each start.
-        scale: metres of the map in a metre of the memory's problems.
+        vehicle: what must have room at each start: a name, or the path of a vehicle's .yaml file.
+        scale: metres of the map in a metre of the memory's problems; by default as many as the vehicle has.
         resolution: metres of a cell, for a map that does not say.
         seed: decides where problems are cut from a map.
 
@@ -50,8 +50,13 @@ def read_worlds(
     from storage.worlds.importing import ImportSettings, import_part  # late: a robot need not have SciPy
     from storage.worlds.sources import source_at
 
+    driven = said_vehicle(vehicle)
     settings = ImportSettings(
-        vehicle=vehicle_named(vehicle), count=count, seed=seed, scale=scale, resolution=resolution
+        vehicle=driven,
+        count=count,
+        seed=seed,
+        scale=scale_for_vehicle(scale, driven),
+        resolution=resolution,
     )
     return import_part(source_at(Path(path)), part, settings).problems
 
@@ -79,7 +84,7 @@ def solve_many(
         planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
         assist: how the memory helps; by default repair with a memory, none without.
         top_k: how many plans to recall, at least 1.
-        vehicle: its name.
+        vehicle: its name, or the path of its .yaml file.
         seed: everything random follows from it.
         plans: a folder for the plans, one file each; by default none are written.
 

@@ -96,7 +96,7 @@ def load(
     Args:
         memory: the folder of a memory, the folder of a run with one memory, or the address of a model in
             MLflow, such as ``models:/motion-memory-trap@champion``.
-        vehicle: its name.
+        vehicle: its name, or the path of its .yaml file.
         planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
         assist: how the memory helps: closed, open or repair.
         top_k: how many plans to recall, at least 1.

@@ -22,7 +22,7 @@ from dashboards.web.notices import MissingError, NoticeError
 from planners.memory.memory import Memory
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_run
@@ -30,6 +30,7 @@ from storage.places.files import read_json, read_text
 from storage.places.run_folder import NAME, RunFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.imported_problems import read_imported
+from storage.vehicles.vehicle_files import said_vehicle
 
 Stamp = tuple[tuple[str, int, int], ...]
 Value = TypeVar("Value")
@@ -101,7 +102,7 @@ class DataReader:
     def vehicle(self, run: RunFolder) -> Vehicle:
         """The vehicle of a ``run``."""
         try:
-            return vehicle_named(str(self.settings(run).get("vehicle", "car")))
+            return said_vehicle(str(self.settings(run).get("vehicle", "car")))
         except ValueError as error:
             raise StorageError(f"{run.settings}: {error}") from None
 

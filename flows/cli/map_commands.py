@@ -39,8 +39,8 @@ def import_worlds(
         part: train, test, validation, or both of the first two.
         problems: Problems of each part; default 1,000 of a map, all of worlds.
         seed: Decides where problems are cut from a map.
-        vehicle: Vehicle that must have room to start: car, differential-drive, car-1-trailer or
-            car-2-trailers.
+        vehicle: Vehicle that must have room to start: car, differential-drive, car-1-trailer, car-2-trailers,
+            or the .yaml file of another.
         strict: Stop at a bad world instead of skipping it.
         picture: Where to draw the map with its problems, .png, .svg or .pdf.
         reading: How a map is read.

@@ -72,7 +72,7 @@ def optimise(
         planner: Begin with the plan of this planner; default follow.
         straight: Begin with a straight line from start to goal.
         clearance_weight: Weight of the distance to obstacles against the duration of the plan.
-        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
         out: Where to write the plan, .json.
         picture: Where to draw the guess and the plan, .png, .svg or .pdf.

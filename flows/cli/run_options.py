@@ -34,7 +34,7 @@ class Options:
         classes: Generated problem classes; default all of them, or none if --worlds is given.
         worlds: A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
         difficulty: Difficulty of the generated classes.
-        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
         objective: What the encoder is trained for; default labels, triplet by the paper's method.
         data: Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.

@@ -24,7 +24,7 @@ def serve_memory(
     Args:
         memory: Folder of a memory, or of a run with one, or its name in $MOTION_MEMORY_DATA or ./data; or a
             model in MLflow: models:/name/1, models:/name@alias, …
-        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         host: Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
         port: Port to listen on; 0 takes any free one.
         workers: Worker processes.

@@ -24,7 +24,7 @@ class SolveOptions:
         recall: How to recall them; default: by the size of the memory.
         memory: Folder of a run or of one memory, the name of a run in $MOTION_MEMORY_DATA or ./data, or a
             model in MLflow: models:/name/1, models:/name@alias, runs:/…
-        vehicle: car, differential-drive, car-1-trailer or car-2-trailers.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
     """
 
@@ -44,6 +44,7 @@ class SolveOptions:
         ``improve_seconds``: how long to improve each plan.
         """
         from tasks.requests.assistant import AssistantSettings
+        from tasks.settings.checks import checked_vehicle
         from tasks.settings.environment import memory_named
 
         return AssistantSettings(
@@ -52,7 +53,7 @@ class SolveOptions:
             self.top_k,
             None if self.memory is None else memory_named(self.memory),
             self.seed,
-            self.vehicle,
+            checked_vehicle(self.vehicle),
             improve_seconds,
             self.recall,
         )
@@ -65,13 +66,13 @@ class MapOptions:
 
     Args:
         scale: Metres of the map in a canonical metre, as in the memory: 2 for a robot twice as large, with
-            goals twice as far away.
+            goals twice as far away. Default: that of the vehicle, 1 for those without a file.
         resolution: Metres in a cell of a .map or NumPy map; default 1.
         unknown: What unknown cells of the map count as.
         tolerance: Metres that outlines of obstacles may move to have fewer pieces; 0 keeps them exact.
     """
 
-    scale: float = 1.0
+    scale: float | None = None
     resolution: float | None = None
     unknown: UnknownCells = "occupied"
     tolerance: float = 0.0

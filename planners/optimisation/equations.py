@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_size
+from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
 
 SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
 SHY_OF_JACK_KNIFE = 1e-3  # rad: the solver may pass a limit by its tolerance
@@ -32,12 +32,11 @@ def slopes(state: ca.SX, controls: ca.SX, vehicle: Vehicle) -> ca.SX:
     heading, speed, turn = state[2], state[3], state[4]
     turning = [turn if isinstance(vehicle, DifferentialDrive) else speed * ca.tan(turn) / vehicle.wheelbase]
     hitches = []
-    if isinstance(vehicle, CarWithTrailers):
-        pull = speed
-        for i, length in enumerate(vehicle.hitch_lengths):
-            turning.append(pull * ca.sin(state[5 + i]) / length)
-            hitches.append(turning[i] - turning[i + 1])
-            pull *= ca.cos(state[5 + i])
+    pull = speed
+    for i, trailer in enumerate(trailers_of(vehicle)):
+        turning.append(pull * ca.sin(state[5 + i]) / trailer.hitch_length)
+        hitches.append(turning[i] - turning[i + 1])
+        pull *= ca.cos(state[5 + i])
     return ca.vertcat(
         speed * ca.cos(heading), speed * ca.sin(heading), turning[0], controls[0], controls[1], *hitches
     )
@@ -49,11 +48,15 @@ def step_of(vehicle: Vehicle) -> ca.Function:
     Nothing is clamped.
     """
     state, controls, h = ca.SX.sym("state", state_size(vehicle)), ca.SX.sym("controls", 2), ca.SX.sym("h")
-    k1 = slopes(state, controls, vehicle)
-    k2 = slopes(state + 0.5 * h * k1, controls, vehicle)
-    k3 = slopes(state + 0.5 * h * k2, controls, vehicle)
-    k4 = slopes(state + h * k3, controls, vehicle)
-    return ca.Function("step", [state, controls, h], [state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)])
+    begin, rates = state, controls
+    if vehicle.first_order:  # speed and steering change at once
+        begin = ca.vertcat(state[:3], state[3:5] + h * controls, state[5:])
+        rates = ca.SX.zeros(2)
+    k1 = slopes(begin, rates, vehicle)
+    k2 = slopes(begin + 0.5 * h * k1, rates, vehicle)
+    k3 = slopes(begin + 0.5 * h * k2, rates, vehicle)
+    k4 = slopes(begin + h * k3, rates, vehicle)
+    return ca.Function("step", [state, controls, h], [begin + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)])
 
 
 def limits_of(vehicle: Vehicle) -> VehicleLimits:
@@ -62,9 +65,7 @@ def limits_of(vehicle: Vehicle) -> VehicleLimits:
         turn, turn_control = vehicle.max_turn_rate, vehicle.max_turn_acceleration
     else:
         turn, turn_control = vehicle.max_steering, vehicle.max_steering_rate
-    hitches = []
-    if isinstance(vehicle, CarWithTrailers):
-        hitches = [vehicle.max_hitch - SHY_OF_JACK_KNIFE] * len(vehicle.hitch_lengths)
+    hitches = [trailer.max_hitch - SHY_OF_JACK_KNIFE for trailer in trailers_of(vehicle)]
     controls = np.array([vehicle.max_acceleration, turn_control])
     return VehicleLimits(
         np.array([-np.inf] * 3 + [vehicle.min_speed, -turn] + [-hitch for hitch in hitches]),
@@ -82,23 +83,29 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     """
     state = ca.SX.sym("state", state_size(vehicle))
     x, y, heading = state[0], state[1], state[2]
-    speed = _absolute(state[3]) + vehicle.max_acceleration * vehicle.dt
     if isinstance(vehicle, DifferentialDrive):
-        turn = _absolute(state[4]) + vehicle.max_turn_acceleration * vehicle.dt
+        most, change = vehicle.max_turn_rate, vehicle.max_turn_acceleration
     else:
-        sharpest = _absolute(state[4]) + vehicle.max_steering_rate * vehicle.dt
+        most, change = vehicle.max_steering, vehicle.max_steering_rate
+    speed = _absolute(state[3]) + vehicle.max_acceleration * vehicle.dt
+    sharpest = _absolute(state[4]) + change * vehicle.dt
+    if vehicle.first_order:  # which may be at its limits within a step
+        speed, sharpest = ca.SX(max(vehicle.max_speed, -vehicle.min_speed)), ca.SX(most)
+    if isinstance(vehicle, DifferentialDrive):
+        turn = sharpest
+    else:
         turn = speed * ca.tan(sharpest) / vehicle.wheelbase
     body = (vehicle.front, vehicle.rear, vehicle.width)
     rows = [_row(x, y, heading, body, speed, turn, vehicle.dt, a_body)]
-    if isinstance(vehicle, CarWithTrailers):
-        trailer = (vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width)
-        for hitch, length in zip(ca.vertsplit(state[5:]), vehicle.hitch_lengths, strict=True):
-            heading -= hitch
-            x -= length * ca.cos(heading)
-            y -= length * ca.sin(heading)
-            widest = _absolute(hitch) + vehicle.dt * (turn + speed / length)
-            turn = speed * ca.sin(ca.fmin(widest, 0.5 * math.pi)) / length
-            rows.append(_row(x, y, heading, trailer, speed, turn, vehicle.dt, a_body))
+    for i, trailer in enumerate(trailers_of(vehicle)):
+        hitch, length = state[5 + i], trailer.hitch_length
+        heading -= hitch
+        x -= length * ca.cos(heading)
+        y -= length * ca.sin(heading)
+        widest = _absolute(hitch) + vehicle.dt * (turn + speed / length)
+        turn = speed * ca.sin(ca.fmin(widest, 0.5 * math.pi)) / length
+        body = (trailer.front, trailer.rear, trailer.width)
+        rows.append(_row(x, y, heading, body, speed, turn, vehicle.dt, a_body))
     return ca.Function("discs", [state], [ca.horzcat(*part) for part in zip(*rows, strict=True)])
 
 

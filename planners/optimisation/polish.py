@@ -19,7 +19,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle, state_size
+from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
@@ -125,7 +125,7 @@ def _polished(
             best = steps
             model.best_states[: steps + 1] = model.states[: steps + 1]
             model.best_controls[:steps] = model.controls[:steps]
-    widest = vehicle.max_hitch if isinstance(vehicle, CarWithTrailers) else math.inf
+    widest = min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
     circles = circles_around(scene)
     used = 0
     for strength, range_m, least_gain in STAGES:

@@ -237,6 +237,20 @@ def grow_lattice(
                 open_vertex(tree, last, goal, frontier, go, lattice, vehicle)
 
 
+def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
+    """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
+
+    Speeds are told apart more finely if two primitives one after another would not get from one to the next.
+    """
+    seconds = 2.0 / vehicle.max_speed
+    faster = 2.0 * seconds * control_limits(vehicle)[0]
+    paces = lattice.paces
+    while faster * paces < vehicle.max_speed - vehicle.min_speed and paces < 8:
+        paces += 1
+    steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
+    return lattice._replace(steps=max(steps, 1), paces=paces)
+
+
 def _varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
     """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
     bits = query.rng.bit_generator
@@ -264,7 +278,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             if occupied is None:
                 occupied = drawing_of(query.problem, query.workspace).occupied
             fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
-        level = levels[min(trial // 2, len(levels) - 1)]
+        level = paced(levels[min(trial // 2, len(levels) - 1)], vehicle)
         if improving:
             level = _varied(level, settings.improving_greed, query)
         begin_lattice(tree, goal, frontier, go, level, vehicle)

@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 import numba
 from numba.core import types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, UserWideCacheLocator
-from numba.extending import overload
+from numba.extending import overload, typeof_impl
 
 _SOURCES = Path(__file__).parents[1]
 
@@ -82,6 +82,14 @@ def lean(function: Callable[_P, _R]) -> Callable[_P, _R]:
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Compile a small ``lean`` kernel into its callers, because a call would cost more than its work."""
     return _compiled(function, _INLINED)
+
+
+def unseen(kind: type) -> None:
+    """Let kernels take values of a kind, a tuple, as part of their arguments without seeing what they hold.
+
+    So settings that differ in such values alone run the same compiled code.
+    """
+    typeof_impl.register(kind)(lambda _value, _context: types.none)
 
 
 _implementations: dict[Callable[..., Any], dict[type, Callable[..., Any]]] = {}

@@ -120,8 +120,12 @@ def is_canonical(problem: Problem) -> bool:
 
 
 def start_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats:
-    """Return the state ``[S]`` at the start: unless the problem says more, at rest and all straight."""
+    """Return the state ``[S]`` at the start: unless the problem says more, at rest and all straight.
+
+    A vehicle that cannot be at rest begins with its least speed.
+    """
     state = np.zeros(state_size(vehicle))
     state[:3] = problem.start
+    state[3] = max(vehicle.min_speed, 0.0)
     state[3 : 3 + len(problem.start_motion)] = problem.start_motion
     return state

@@ -20,7 +20,7 @@ from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_names
+from planners.world.vehicles.vehicle import CAR, Vehicle, state_names, trailers_of
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
 MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
@@ -99,8 +99,9 @@ def _arrival_fault(arrival: Arrival | None, vehicle: Vehicle) -> str | None:
         return (
             f"goal has {angles} hitch angles and {tolerances} tolerances; expected {trailers} each, or none"
         )
-    for hitch, allowed in zip(arrival.hitches, arrival.hitch_tolerances, strict=True):
-        most = _limits("hitch", vehicle)[1]
+    asked_hitches = zip(arrival.hitches, arrival.hitch_tolerances, strict=True)
+    for (hitch, allowed), trailer in zip(asked_hitches, trailers_of(vehicle), strict=bool(arrival.hitches)):
+        most = trailer.max_hitch
         if not (abs(hitch) <= most and allowed > 0.0):
             return (
                 f"goal hitch is {hitch:g} within {allowed:g} rad; expected up to {most:g}, within more than 0"
@@ -112,8 +113,9 @@ def _limits(name: str, vehicle: Vehicle) -> tuple[float, float]:
     """The least and the greatest value of a variable of the vehicle's state."""
     if name == "speed":
         return vehicle.min_speed, vehicle.max_speed
-    if name.startswith("hitch") and isinstance(vehicle, CarWithTrailers):
-        return -vehicle.max_hitch, vehicle.max_hitch
+    if name.startswith("hitch_"):
+        most = trailers_of(vehicle)[int(name.removeprefix("hitch_")) - 1].max_hitch
+        return -most, most
     most = turn_limit(vehicle)
     return -most, most
 

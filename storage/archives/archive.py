@@ -23,7 +23,7 @@ from storage.errors import StorageError
 from storage.fields import parse_json
 from storage.places.files import local_text, whole_folder
 from storage.places.mirror import fetch_folder
-from storage.recorded_vehicle import fields_of, refuse_another
+from storage.vehicles.recorded_vehicle import fields_of, refuse_another
 
 VERSION: Final = 2  # one more whenever an older program could no longer read an archive
 LARGEST_HEADER_BYTES: Final = 1 << 24

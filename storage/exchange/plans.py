@@ -14,9 +14,10 @@ from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
-from storage.fields import check_fields, number_of, scale_of, short, text_of
+from storage.fields import check_fields, number_of, short, text_of
 from storage.places.files import read_json, write_json
-from storage.recorded_vehicle import other_vehicle
+from storage.vehicles.recorded_vehicle import record_of, refuse_another
+from storage.vehicles.vehicle_files import scale_for_vehicle
 
 FIELDS: Final = (
     "problem_id", "status", "source", "planner", "assist", "vehicle", "scale", "dt", "states", "controls",
@@ -54,7 +55,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
                 name: getattr(record, name)
                 for name in ("problem_id", "status", "source", "planner", "assist")
             },
-            "vehicle": name_of(record.vehicle),
+            "vehicle": record_of(record.vehicle),
             **scale,
             "dt": None if plan is None else plan.dt,
             "states": [] if plan is None else plan.states.tolist(),
@@ -78,9 +79,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         if not isinstance(fields, dict):
             raise ValueError(f"holds {short(fields)}, expected the object of a plan")
         check_fields(list(fields), FIELDS)
-        made_for = text_of(fields.get("vehicle", name_of(CAR)), "vehicle")  # files were once of the car alone
-        if made_for != name_of(vehicle):
-            raise other_vehicle(path, made_for, vehicle)
+        refuse_another(path, fields.get("vehicle", name_of(CAR)), vehicle)  # once files were of the car alone
         return _record(fields, vehicle)
     except KeyError as error:
         raise StorageError(f"{path} has no field {error}; is it a plan?") from None
@@ -89,7 +88,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
 
 
 def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
-    scale = scale_of(fields.get("scale"))
+    scale = scale_for_vehicle(fields.get("scale"), vehicle)
     states, controls = _rows(fields["states"], "states"), _rows(fields["controls"], "controls")
     plan = None
     if len(states):

@@ -23,8 +23,9 @@ from storage.exchange.problem_files import (
     raw_slice,
 )
 from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
-from storage.fields import number_of, scale_of, short, text_of
+from storage.fields import number_of, short, text_of
 from storage.places.files import whole_file, write_json
+from storage.vehicles.vehicle_files import scale_for_vehicle
 
 UNKNOWN_CLASS: Final = "unknown"
 _REQUIRED: Final = ("start", "goal", "bounds", "obstacles")
@@ -118,7 +119,7 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")
     start, bounds = numbers_of(fields, "start", 3), numbers_of(fields, "bounds", 4)
     goal = goal_of(fields)
-    scale = scale_of(fields.get("scale"))
+    scale = scale_for_vehicle(fields.get("scale"), vehicle)
     polygons = fields["obstacles"]
     if not isinstance(polygons, list):
         raise ValueError("obstacles must be a list of polygons, each a list of [x, y]")

@@ -33,6 +33,7 @@ def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float,
     """
     names = state_names(vehicle)[3:]
     motion = dict.fromkeys(names, 0.0)
+    motion["speed"] = max(vehicle.scale * vehicle.min_speed, 0.0)  # as slow as it can be
     for field, name in STARTS.items():
         if fields.get(field) is None:
             continue

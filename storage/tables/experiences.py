@@ -16,10 +16,10 @@ from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 from storage.errors import StorageError
 from storage.fields import parse_json, short
-from storage.recorded_vehicle import fields_of, refuse_another
 from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import metadata_of, read_table, sound, write_table
+from storage.vehicles.recorded_vehicle import fields_of, refuse_another, vehicle_recorded
 
 _CONTROL = 2
 _VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
@@ -129,6 +129,14 @@ def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
         "controls": list_column([plan.controls for plan in plans], np.float64),
         "dt": [plan.dt for plan in plans],
     }
+
+
+def vehicle_of_experiences(path: Path) -> Vehicle:
+    """The vehicle of the experiences in the file at ``path``. Raises StorageError if it does not say one."""
+    vehicle = vehicle_recorded(_recorded(path))
+    if vehicle is None:
+        raise StorageError(f"{path} does not say which vehicle its plans are of; move it elsewhere.")
+    return vehicle
 
 
 def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:

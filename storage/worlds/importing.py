@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -144,6 +144,8 @@ def _worlds(source: Source, part: Part, settings: ImportSettings, progress: Prog
     for number, file in enumerate(files, start=1):
         try:
             for where, item in _worlds_of(file, source, part, settings):
+                if isinstance(item, Problem) and settings.vehicle.scale != 1.0:
+                    item = replace(item, scale=settings.vehicle.scale)  # worlds are drawn in canonical metres
                 fault = problem_fault(item, settings.vehicle) if isinstance(item, Problem) else None
                 yield where, item if fault is None else f"cannot be planned in: {fault}"
         except (ValueError, StorageError) as error:

@@ -11,21 +11,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from planners.maps.occupancy_map import Cells, OccupancyMap
-from storage.fields import check_fields
-from storage.places.files import read_text
-from storage.worlds.limits import check_file, check_resolution
+from storage.worlds.limits import check_resolution
 from storage.worlds.picture_files import Picture, read_picture
+from storage.yaml_text import yaml_fields, yaml_number
 
-LARGEST_YAML: Final = 16_384  # bytes
-MOST_BRACKETS: Final = 64  # a map has one list; the parser takes the square of the number of unclosed ones
+MOST_BRACKETS: Final = 64  # a map has one list
 MODES: Final = ("trinary", "scale", "raw")
 FARTHEST_ORIGIN_M: Final = 1e8  # beyond any grid of the earth
-_BROKEN: Final = (
-    yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RecursionError,
-)  # fmt: skip
 _REQUIRED: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 _FIELDS: Final = (*_REQUIRED, "negate", "mode")  # of map_server
 
@@ -36,12 +29,12 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
     Raises ValueError, the end of a sentence, or StorageError with what is wrong with the file or its picture.
     """
     fields = _fields(file)
-    resolution = _number(fields["resolution"], "resolution")
+    resolution = yaml_number(fields["resolution"], "resolution")
     check_resolution(resolution)
     origin = fields["origin"]
     if not isinstance(origin, list) or len(origin) != 3:
         raise ValueError("has no origin [x, y, yaw] in metres and radians")
-    x, y, yaw = (_number(value, "origin") for value in origin)
+    x, y, yaw = (yaml_number(value, "origin") for value in origin)
     if not all(math.isfinite(value) and abs(value) <= FARTHEST_ORIGIN_M for value in (x, y, yaw)):
         raise ValueError("has an origin that is not finite or not on earth; expected [x, y, yaw]")
     picture = read_picture(_picture_file(file, fields["image"]), ("PNG", "PPM"))
@@ -81,22 +74,7 @@ def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
 
 
 def _fields(file: Path) -> Mapping[str, Any]:
-    check_file(file, LARGEST_YAML, "is it the YAML of a map?")
-    text = read_text(file)
-    if text.count("[") + text.count("{") > MOST_BRACKETS:
-        raise ValueError("has more lists in it than any map")
-    try:  # an alias stands for what was written before: a few lines of them could fill memory
-        aliases = any(
-            isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)
-        )
-        node = None if aliases else yaml.compose(text, Loader=yaml.SafeLoader)
-        fields = None if aliases else yaml.safe_load(text)
-    except _BROKEN as error:
-        reason = str(error).partition("\n")[0][:100]
-        raise ValueError(f"is not YAML ({reason})") from None
-    if not isinstance(fields, Mapping) or not isinstance(node, yaml.MappingNode):
-        raise ValueError(f"is not the YAML of a map; expected {', '.join(_REQUIRED)}")
-    check_fields([key.value for key, _ in node.value], _FIELDS)
+    fields = yaml_fields(file, "map", _FIELDS, MOST_BRACKETS)
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"lacks {missing[0]}; expected {', '.join(_REQUIRED)}")
@@ -120,17 +98,7 @@ def _picture_file(file: Path, image: object) -> Path:
 
 
 def _share(value: object, what: str) -> float:
-    share = _number(value, what)
+    share = yaml_number(value, what)
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"has {what} {share:g}; expected a share from 0 to 1")
     return share
-
-
-def _number(value: object, what: str) -> float:
-    """A number; YAML 1.1 reads 5e-2 as text."""
-    try:
-        if isinstance(value, bool):
-            raise ValueError
-        return float(value)  # type: ignore[arg-type]  # what is no number raises TypeError
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"has {str(value)[:20]!r} as its {what}, expected a number") from None

@@ -16,8 +16,8 @@ from dashboards.verdicts.promotion import (
     judgement_markdown,
     judgement_tables,
 )
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.champions.new_experience import RetrainingRun
 from tasks.champions.promote import promote
 from tasks.fan_out.chunk import run_folder
@@ -92,14 +92,14 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     champion = run.champions.get(memory)
     judgement = None if champion is None else judge(*attempts)
     verdict = _verdict(judgement, approve)
-    load_memory(folder.memory(memory), vehicle_named(settings.vehicle))  # raises StorageError if damaged
+    load_memory(folder.memory(memory), said_vehicle(settings.vehicle))  # raises StorageError if damaged
     (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
     markdown = _markdown(run, memory, judgement)
     benchmark = usefulness(attempts.challenger)
     tags = {
         "memory": memory,
-        "vehicle": settings.vehicle,
+        "vehicle": settings.vehicle_label,
         "run": settings.run_name,
         "learned": settings.learned,
         "retraining": number_of(settings.retraining),
@@ -110,7 +110,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     if judgement is not None:
         figures = {name: f"{getattr(judgement, name):.6f}" for name in ("sooner_s", "low_s", "high_s")}
         tags |= figures | {"why": judgement.why}
-    name = registered_name(memory, settings.vehicle)
+    name = registered_name(memory, settings.vehicle_label)
     version = registry.register(name, run_id, model_id, key_of(settings.run_name, key), tags, markdown)
     log_judgement(data, settings, memory, verdict, judgement, markdown, attempts)
     summary = _summary(version, champion, verdict, judgement)

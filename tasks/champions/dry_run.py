@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Final
 
 from dashboards.cells import CellTable
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.mirror import fetch, local_place
 from storage.tables.experiences import read_experiences
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.champions.new_experience import PendingRetraining, pending_retraining
 from tasks.inputs.champion_run import champion_run
 from tasks.inputs.taught_experiences import taught_experiences
@@ -77,7 +77,7 @@ def _changes(
     Returns the number of plans that the champion's run does not have, the numbers of their shards, and the
     number of all shards.
     """
-    vehicle, size = vehicle_named(settings.vehicle), plans_at_once(settings)
+    vehicle, size = said_vehicle(settings.vehicle), plans_at_once(settings)
     shard_count = -(-settings.taught // size)
     old_run = champion_run(str(folder.path), pending.champions[name].tag("run"))
     try:

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory, save_memory
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
 from storage.tables.gained_experiences import read_gained, snapshot_ids
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs.gained_on_the_job import with_gained
 from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version, registered_name
@@ -62,7 +62,7 @@ def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Regi
     """
     champions, last_judged, seen_snapshots = {}, {}, {}
     for memory in settings.memory_names:
-        name = registered_name(memory, settings.vehicle)
+        name = registered_name(memory, settings.vehicle_label)
         champion = registry.aliased(name)
         if champion is None:
             continue
@@ -71,8 +71,8 @@ def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Regi
         last_judged[memory] = judged[-1] if judged else champion
         seen_snapshots[memory] = {version.tag("learned") for version in judged}
     without_champion = [memory for memory in settings.memory_names if memory not in champions]
-    gained_folder = folder.gained(settings.vehicle)
-    all_gained = read_gained(gained_folder, vehicle_named(settings.vehicle))
+    gained_folder = folder.gained(settings.vehicle_label)
+    all_gained = read_gained(gained_folder, said_vehicle(settings.vehicle))
     gained = {
         name: [experience for experience in all_gained if experience.problem.class_name == name]
         for name in settings.class_names
@@ -125,7 +125,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
         RunError: the registry cannot be reached.
     """
     for memory in settings.memory_names:
-        _note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle)))
+        _note_verdict(registry, registry.aliased(registered_name(memory, settings.vehicle_label)))
     pending = pending_retraining(folder, settings, registry)
     runs = []
     if pending.first_run is not None:
@@ -153,7 +153,7 @@ def _challenger_run(
     }
     number = _next_number(registry)
     run_settings = with_gained(run_settings, folder.path, f"retrain-{number:04d}")
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle = said_vehicle(settings.vehicle)
     with scratch_folder() as scratch:
         archives = {}
         for name, version in champions.items():

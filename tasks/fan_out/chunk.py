@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import open_data_folder
 from storage.places.files import write_json
 from storage.places.run_folder import RunFolder, Table
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.keys import key_of
 from tasks.settings.run_settings import RunSettings
 
@@ -56,7 +57,7 @@ class Chunk:
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle of the run."""
-        return vehicle_named(self.settings.vehicle)
+        return said_vehicle(self.settings.vehicle)
 
     @property
     def result(self) -> Path:

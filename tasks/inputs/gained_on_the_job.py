@@ -10,10 +10,11 @@ from typing import Final, NamedTuple
 from planners.memory.plans.experience import Experience
 from planners.solve import Attempt
 from planners.world.problem import Problem, is_canonical
-from planners.world.vehicles.vehicle import Vehicle, name_of, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import open_data_folder
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import add_gained, take_snapshot
+from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.run_settings import RunSettings
 
 NEW: Final = ("searched", "repaired")  # sources of plans that no memory had
@@ -44,7 +45,7 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
     ]
     if new:
         add_gained(
-            open_data_folder(data).gained(name_of(vehicle)),
+            open_data_folder(data).gained(label_of(vehicle)),
             [experience for experience, _ in new],
             planner=new[0][1].planner,
             seeds=[attempt.seed for _, attempt in new],
@@ -65,6 +66,6 @@ def with_gained(settings: RunSettings, data: Path, name: str) -> RunSettings:
     Raises:
         StorageError: nothing was learned for the vehicle.
     """
-    folder = open_data_folder(data).gained(settings.vehicle)
-    snapshot = take_snapshot(folder, checked_name(name), vehicle_named(settings.vehicle))
+    folder = open_data_folder(data).gained(settings.vehicle_label)
+    snapshot = take_snapshot(folder, checked_name(name), said_vehicle(settings.vehicle))
     return replace(settings, learned=snapshot)

@@ -12,10 +12,10 @@ import numpy as np
 
 from planners.world.classes.problem_classes import ProblemClass, problem_class
 from planners.world.problem import Obstacles, Problem
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.mirror import fetch
 from storage.places.run_folder import RunFolder
 from storage.tables.imported_problems import read_imported
+from storage.vehicles.vehicle_files import said_vehicle
 from storage.worlds.sources import Part, source_at
 from tasks.fan_out.chunk import run_folder
 from tasks.settings.errors import RunError
@@ -84,7 +84,7 @@ def _problems(path: Path, _changed: int) -> tuple[Problem, ...]:
 def source_of(data: str, settings: RunSettings, class_name: str) -> Source:
     """The problems of a class of the run; its worlds must have been read (``tasks.stages.read_worlds``)."""
     if class_name in settings.classes:
-        vehicle = vehicle_named(settings.vehicle)
+        vehicle = said_vehicle(settings.vehicle)
         return Generated(problem_class(class_name, settings.difficulty, vehicle), settings.seed)
     return Worlds(run_folder(data, settings), class_name)
 

@@ -10,9 +10,9 @@ from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.occupancy import Bits
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import source_of
 from tasks.settings.run_settings import RunSettings
@@ -22,7 +22,7 @@ READ_OUT_PROBLEMS: Final = 2_000  # a class; twice as many find no more (docs/st
 
 def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list[Experience]:
     """The first experiences of each class of a memory: problems are hallucinated and labelled for these."""
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle = said_vehicle(settings.vehicle)
     return [
         experience
         for each in settings.classes_of(name)
@@ -32,7 +32,7 @@ def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list
 
 def taught_masks(run: RunFolder, settings: RunSettings, name: str) -> Bits:
     """The cells ``[N, 64]`` that the plans of a memory sweep, those that encoders are taught."""
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle = said_vehicle(settings.vehicle)
     plans = [experience.plan for experience in taught_experiences(run, settings, name)]
     return masks_of(sweep_plans(plans, vehicle))
 

@@ -10,10 +10,10 @@ import pandas as pd
 from planners.memory.memory import Memory
 from planners.memory.recall import default_recall
 from planners.solve import WITHOUT_MEMORY
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.side_by_side import Contestant, MemoryOfRun, side_by_side
 from tasks.fan_out.chunk import Chunk
 from tasks.fan_out.progress import progress
@@ -103,7 +103,7 @@ def _memories(first: RunSettings, other: RunSettings, name: str) -> list[str]:
 
 
 def _memory(run: MeasuredRun, name: str) -> Memory:
-    return load_memory(run.folder.memory(name), vehicle_named(run.settings.vehicle))
+    return load_memory(run.folder.memory(name), said_vehicle(run.settings.vehicle))
 
 
 def _contestants(

@@ -17,16 +17,16 @@ from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.exchange.problems import read_problems
 from storage.places.mirror import folders_here
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed
+from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -59,7 +59,7 @@ class Assistant:
         planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall = settings
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
-        check_known("vehicle", [vehicle], VEHICLES)
+        vehicle = checked_vehicle(vehicle)
         check_known("recall", [] if recall is None else [recall], RECALLS)
         if top_k < 1:
             raise UsageError(f"Top k is {top_k}: give 1 or more.")
@@ -68,7 +68,7 @@ class Assistant:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:
             raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
-        self.settings, self.vehicle = settings, vehicle_named(vehicle)
+        self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
         self._memories: dict[str, Memory] = {}

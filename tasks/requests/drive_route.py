@@ -17,6 +17,7 @@ from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import name_of
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
@@ -112,6 +113,10 @@ def drive_route(
     goals_m = [(x, y) for x, y in (_numbers_of(goal, 2, "--to", "x,y in metres") for goal in goals)]
     if not goals_m:
         raise UsageError("No goal. Give --to x,y, once or several times.")
+    if assistant.vehicle.min_speed >= 0.0:
+        raise UsageError(
+            f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
+        )
     source = source_at(path, map_format)
     if not source.is_map:
         raise UsageError(f"{path} holds worlds; a route needs a map: .map, .yaml (ROS), .npy or .npz.")

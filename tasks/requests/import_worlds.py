@@ -11,21 +11,27 @@ from typing import Any, Final, Literal, get_args
 
 from dashboards.cells import CellTable
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.exchange.problems import write_problems
-from storage.fields import LARGEST_SCALE, SMALLEST_SCALE
 from storage.places.files import whole_folder
+from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.fan_out.progress import progress
-from tasks.settings.checks import check_count, check_known, check_outputs, check_picture, check_seed
+from tasks.settings.checks import (
+    check_count,
+    check_known,
+    check_outputs,
+    check_picture,
+    check_seed,
+    checked_vehicle,
+)
 from tasks.settings.errors import RunError, UsageError
 
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
 SHOWN_SKIPPED: Final = 20
-ONLY_OF_MAPS: Final = {"scale": 1.0, "tolerance_m": 0.0, "seed": 1}  # options with their defaults
+ONLY_OF_MAPS: Final = {"tolerance_m": 0.0, "seed": 1}  # options with their defaults
 
 HEADINGS: Final = ("class", "part", "problems", "skipped", "pieces", "a problem", "seconds")
 
@@ -40,7 +46,7 @@ def import_settings(
     strict: bool = False,
     problems: int | None = None,
     *,
-    scale: float,
+    scale: float | None,
     resolution: float | None,
     unknown: str,
     tolerance: float,
@@ -60,19 +66,19 @@ def import_settings(
     Raises:
         UsageError: an option is out of range or its name is unknown.
     """
-    check_known("vehicle", [vehicle], VEHICLES)
     check_known("meaning of unknown cells", [unknown], get_args(Unknown))
     if problems is not None:
         check_count("problems", problems)
     check_seed(seed)
-    if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
-        raise UsageError(
-            f"Scale is {scale:g}: give {SMALLEST_SCALE:g} to {LARGEST_SCALE:g} metres a canonical metre."
-        )
+    driven = said_vehicle(checked_vehicle(vehicle))
+    try:
+        scale = scale_for_vehicle(scale, driven)
+    except ValueError as error:
+        raise UsageError(f"{str(error).capitalize()}.") from None
     if not 0.0 <= tolerance < math.inf:
         raise UsageError(f"Tolerance is {tolerance:g}: give 0 or more metres.")
     return ImportSettings(
-        vehicle_named(vehicle),
+        driven,
         strict,
         problems,
         seed,
@@ -159,6 +165,7 @@ def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | Non
             raise UsageError(f"--resolution is not for {source.path}: its YAML file gives it.")
         return
     given = [name for name, default in ONLY_OF_MAPS.items() if getattr(settings, name) != default]
+    given += ["scale"] * (settings.scale != settings.vehicle.scale)
     given += ["resolution"] * (settings.resolution is not None) + ["picture"] * (drawing is not None)
     if given:
         option = given[0].removesuffix("_m")

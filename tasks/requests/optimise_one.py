@@ -16,10 +16,11 @@ from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise
 from planners.search.registry import PLANNERS, plan
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
-from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problems import read_problems
-from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed
+from storage.vehicles.vehicle_files import said_vehicle
+from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
@@ -93,9 +94,9 @@ def initial_guess(
     if len(given) > 1:
         raise UsageError(f"{' and '.join(given)} are given; give one of them.")
     check_known("planner", [planner] if planner else [], tuple(PLANNERS))
-    check_known("vehicle", [vehicle], VEHICLES)
+    vehicle = checked_vehicle(vehicle)
     check_seed(seed)
-    return InitialGuess(plan_file, planner or (None if given else "follow"), vehicle_named(vehicle), seed)
+    return InitialGuess(plan_file, planner or (None if given else "follow"), said_vehicle(vehicle), seed)
 
 
 def optimise_one(

@@ -26,16 +26,16 @@ from planners.world.alignment import from_canonical, scaled, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.checked_problem import checked_problem
 from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from planners.world.workspace import Workspace
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
+from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.registry.memory_at import memory_at
-from tasks.settings.checks import check_known
+from tasks.settings.checks import check_known, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
 
@@ -94,7 +94,7 @@ class RobotPlanner:
         polygon_starts: Indices | Integers,
         goal_radius: float = GOAL_RADIUS,
         bounds: Bounds = BOUNDS,
-        scale: float = 1.0,
+        scale: float | None = None,
         start_motion: tuple[float, ...] = (),
         arrival: Arrival | None = None,
     ) -> Answer:
@@ -109,7 +109,8 @@ class RobotPlanner:
                 1]]``.
             goal_radius: metres: how far from the goal the plan may end.
             bounds: x_min, y_min, x_max, y_max in metres.
-            scale: Metres of these lengths in one metre of the memory's problems.
+            scale: Metres of these lengths in one metre of the memory's problems; None: as many as of its
+                vehicle.
             start_motion: the vehicle's state at the start behind the pose: speed (m/s), then steering angle
                 (rad) or turn rate (rad/s), then hitch angles (rad). What is missing is 0.
             arrival: what is asked at the goal besides the place: heading, speeds, hitch angles, with
@@ -123,7 +124,7 @@ class RobotPlanner:
         problem = checked_problem(
             *(start, goal, goal_radius, bounds, points, polygon_starts),
             vehicle=self.memory.vehicle,
-            scale=scale,
+            scale=scale_for_vehicle(scale, self.memory.vehicle),
             start_motion=start_motion,
             arrival=arrival,
         )
@@ -195,14 +196,14 @@ def load_planner(
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
     """
-    check_known("vehicle", [vehicle], VEHICLES)
+    vehicle = checked_vehicle(vehicle)
     check_known("planner", [planner], PLANNERS)
     check_known("assist", [assist], ASSISTS)
     check_known("recall", [] if recall is None else [recall], RECALLS)
     if top_k < 1:
         raise UsageError(f"Top k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
-        archive = load_memory(folder, vehicle_named(vehicle))  # mapped files outlive their names
+        archive = load_memory(folder, said_vehicle(vehicle))  # mapped files outlive their names
     strategy = recall or default_recall(archive)
     compile_assists(archive.vehicle, planner, [strategy])
     try:

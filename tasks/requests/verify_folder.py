@@ -23,7 +23,7 @@ from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import occupancy_of, pack
 from planners.world.randomness import generator
-from planners.world.vehicles.vehicle import VEHICLES, Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.encoders import load_encoder
 from storage.archives.hallucinators import load_hallucinator
@@ -33,10 +33,11 @@ from storage.places.data_folder import open_data_folder
 from storage.places.mirror import is_there
 from storage.places.run_folder import RunFolder, Table
 from storage.tables.attempts import read_attempts
-from storage.tables.experiences import read_experiences
+from storage.tables.experiences import read_experiences, vehicle_of_experiences
 from storage.tables.gained_experiences import gained_shards
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled
 from storage.tables.recalls import read_recalls
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.attempt_rows import same_outcome
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.inputs.problem_sources import held_back, source_of
@@ -70,8 +71,8 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
     """
     data = open_data_folder(folder)
     checks = [check for run in data.runs() for check in _checks(data.place, run, sample)]
-    for name, vehicle in VEHICLES.items():
-        checks += [partial(_experiences, path, vehicle) for path in gained_shards(data.gained(name))]
+    for gained in data.gained_folders():
+        checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in gained_shards(gained)]
     if not checks:
         raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
     checked: Counter[str] = Counter()
@@ -101,7 +102,7 @@ def _run(check: Check) -> Findings:
 
 def _checks(data: str, run: RunFolder, sample: float) -> Iterator[Check]:
     settings = recorded_settings(run)
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle = said_vehicle(settings.vehicle)
     for name in settings.memory_names:
         shards = [path for table in COLLECTED for path in run.shards(table, name)]
         for path in (run.experiences(name), *shards):
@@ -124,7 +125,8 @@ def _checks(data: str, run: RunFolder, sample: float) -> Iterator[Check]:
             yield partial(_attempts, data, settings, run, name, path, sample)
 
 
-def _experiences(path: Path, vehicle: Vehicle) -> Findings:
+def _experiences(path: Path, vehicle: Vehicle | None) -> Findings:
+    vehicle = vehicle or vehicle_of_experiences(path)
     experiences = read_experiences(path, vehicle)
     wrong = [
         f"{path}: plan of {experience.problem.id}: {fault}"
@@ -138,7 +140,7 @@ def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) 
     problems, labelled = read_hallucinated_problems(path), read_labelled([path])
     free = labelled.free
     experiences = taught_experiences(run, settings, name)
-    sweeps = sweep_plans([each.plan for each in experiences], vehicle_named(settings.vehicle))
+    sweeps = sweep_plans([each.plan for each in experiences], said_vehicle(settings.vehicle))
     origin = labelled.plan_index  # [problems] the plan that each was made for, or negative
     rows = np.arange(len(origin))
     solved = (origin < 0) | free[rows, np.maximum(origin, 0)]
@@ -200,7 +202,7 @@ def _attempts(
 ) -> Findings:
     rows = _records(read_attempts(path))
     problem_source = held_back if path.is_relative_to(run.judged) else source_of
-    source, vehicle = problem_source(data, settings, name), vehicle_named(settings.vehicle)
+    source, vehicle = problem_source(data, settings, name), said_vehicle(settings.vehicle)
     solved = [row for row in rows if row["solved"]]
     wrong = [
         f"{path}: the authority did not accept a plan for {row['problem_id']}"

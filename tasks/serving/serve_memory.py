@@ -10,14 +10,14 @@ import os
 from pathlib import Path
 
 from planners.memory.memory import Memory
-from planners.world.vehicles.vehicle import VEHICLES, vehicle_named
 from storage.archives.memories import load_memory
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.registry.memory_at import memory_at
 from tasks.servers.access import access, auth, auth_environment, check_address, hosts
 from tasks.servers.guard import Guard
 from tasks.servers.listening import address_of, bound, end_with_parent, serve_with
 from tasks.servers.prefect_server import ENVIRONMENT
-from tasks.settings.checks import check_known
+from tasks.settings.checks import checked_vehicle
 
 _LOG = logging.getLogger(__name__)
 
@@ -37,12 +37,12 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
         RunError: the address cannot be used, or there is no such memory in MLflow.
         StorageError: the memory is missing, damaged, or made for another vehicle.
     """
-    check_known("vehicle", [vehicle], VEHICLES)
+    vehicle = checked_vehicle(vehicle)
     check_address(host)
     for name, value in (ENVIRONMENT | auth_environment()).items():
         os.environ.setdefault(name, value)
     with memory_at(memory) as folder, bound(host, port) as listener:
-        archive = load_memory(folder, vehicle_named(vehicle))  # refused here, not by each worker
+        archive = load_memory(folder, said_vehicle(vehicle))  # refused here, not by each worker
 
         def log_addresses() -> None:
             plans = f"{len(archive.plans)} plans of class {archive.class_name}, {vehicle}"

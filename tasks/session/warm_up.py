@@ -21,8 +21,9 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import Vehicle, vehicle_named
+from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import EMPTY, compile_assists
 from tasks.fan_out.fan_out import Client
 from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
@@ -37,7 +38,7 @@ def warm_up(cluster: Any, vehicle: str) -> Iterator[None]:
         vehicle: name of the vehicle to compile for.
     """
     with Client(cluster, set_as_default=False) as client:
-        futures = [client.submit(group, vehicle_named(vehicle), pure=False) for group in GROUPS]
+        futures = [client.submit(group, said_vehicle(vehicle), pure=False) for group in GROUPS]
         yield
         client.cancel(futures)
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from storage.errors import StorageError
+from storage.vehicles.vehicle_files import text_of_vehicle
 from tasks.settings.errors import UsageError
 
 PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
@@ -26,6 +28,22 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
     for name in names:
         if name not in choices:
             raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(choices)}.")
+
+
+def checked_vehicle(given: str) -> str:
+    """What says all of a vehicle, wherever it is read (``storage.vehicles.vehicle_files.said_vehicle``).
+
+    Args:
+        given: the name of a built-in vehicle, the path of a vehicle's YAML file, or what this function gave.
+
+    Raises:
+        UsageError: there is no such vehicle, or its file is wrong; the message is one line.
+
+    """
+    try:
+        return text_of_vehicle(given)
+    except StorageError as error:
+        raise UsageError(str(error)) from None
 
 
 def check_count(what: str, count: int) -> None:

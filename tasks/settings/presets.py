@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, get_args
 
-from planners.world.vehicles.vehicle import VEHICLES
-from tasks.settings.checks import check_count, check_known, check_seed
+from tasks.settings.checks import check_count, check_known, check_seed, checked_vehicle
 from tasks.settings.encoder_training import Learning
 from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import (
@@ -110,7 +109,7 @@ def for_preset(
     check_known("planner", measured, PLANNERS)
     check_known("difficulty", [difficulty], DIFFICULTIES)
     check_known("objective", [objective], get_args(Objective))
-    check_known("vehicle", [vehicle], VEHICLES)
+    vehicle = checked_vehicle(vehicle)
     check_known("continual improvement", [continual or base.continual], CONTINUAL)
     check_seed(seed)
     if not generated and not worlds:

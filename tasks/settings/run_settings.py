@@ -8,7 +8,9 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
+from planners.world.vehicles.vehicle import name_of
 from storage.tables.earlier_versions import RENAMED
+from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.settings.encoder_training import Learning
 from tasks.settings.retraining_settings import Retraining
 
@@ -97,7 +99,7 @@ class RunSettings:
     epochs: int
     combined: bool  # also one memory for all classes together
     strict: bool = False  # a bad world stops the run instead of being skipped
-    vehicle: str = DEFAULT_VEHICLE  # its name (``planners.world.vehicles.vehicle``)
+    vehicle: str = DEFAULT_VEHICLE  # its name, or all of it (``storage.vehicles.vehicle_files``)
     learning: Learning = field(default_factory=Learning)  # how encoders are trained
     hallucination: Mixture = DEFAULT_MIXTURE  # how problems are made around a plan
     candidates: int = 0  # solved problems of a class to choose experiences from; few: the first are kept
@@ -151,6 +153,16 @@ class RunSettings:
         return self.experiences > self.taught
 
     @property
+    def vehicle_name(self) -> str:
+        """The name of its vehicle."""
+        return name_of(said_vehicle(self.vehicle))
+
+    @property
+    def vehicle_label(self) -> str:
+        """A word that tells its vehicle from all others."""
+        return label_of(said_vehicle(self.vehicle))
+
+    @property
     def digest(self) -> str:
         """Eight hexadecimal digits that tell settings with different results apart."""
         values = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
@@ -170,7 +182,7 @@ class RunSettings:
 
         It names the vehicle unless that is the car, like ``laptop-labels-car-1-trailer-81d5c2e7``.
         """
-        vehicle = [] if self.vehicle == DEFAULT_VEHICLE else [self.vehicle]
+        vehicle = [] if self.vehicle == DEFAULT_VEHICLE else [self.vehicle_name]
         return "-".join([self.preset, self.objective, *vehicle, self.digest])
 
     def to_json(self) -> str:

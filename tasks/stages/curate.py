@@ -8,10 +8,10 @@ from typing import Final
 
 from planners.memory.curation import curate
 from planners.memory.plans.experience import Experience
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.places.data_folder import open_data_folder
 from storage.tables.experiences import merge_experiences, read_experiences
 from storage.tables.gained_experiences import extract_class, snapshot_path
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import held_back, source_of
@@ -44,7 +44,7 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
     rows = _alternating(ours, _by_problem(gained, len(drawn)))
     everything = [*drawn, *gained]
     candidates = [everything[row] for row in rows]
-    kept = curate(candidates, settings.taught, vehicle_named(settings.vehicle)).tolist()
+    kept = curate(candidates, settings.taught, said_vehicle(settings.vehicle)).tolist()
     if settings.grown:  # the others join these: which ones hardly matters
         taken = {candidates[i].problem.id for i in kept}
         others = {each.problem.id: i for i, each in reversed([*enumerate(candidates)])}
@@ -64,7 +64,7 @@ def _gained_of(chunk: Chunk) -> list[Experience]:
         for source in sources
         for i in range(source.count("test", settings.test_problems))
     }
-    snapshot = snapshot_path(open_data_folder(chunk.data).gained(settings.vehicle), settings.learned)
+    snapshot = snapshot_path(open_data_folder(chunk.data).gained(settings.vehicle_label), settings.learned)
     shard = chunk.shard("learned")
     extract_class(snapshot, name, tested, shard, chunk.key)
     return read_experiences(shard, chunk.vehicle)

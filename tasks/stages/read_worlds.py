@@ -35,10 +35,11 @@ def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
     source = source_at(next(Path(path) for path in settings.worlds if world_class(path) == chunk.class_name))
     counts = {"collect": CUT_FROM_MAP * settings.wanted, "test": settings.test_problems}
     skipped: list[str] = []
+    whole = (chunk.vehicle, settings.strict)
     for purpose, part in PARTS.items():
         count = counts[purpose] if source.is_map else None
         imported = import_part(
-            source, part, ImportSettings(chunk.vehicle, settings.strict, count, settings.seed)
+            source, part, ImportSettings(*whole, count, settings.seed, chunk.vehicle.scale)
         )
         if not imported.problems:
             raise RunError(f"{source.path} holds no usable problem of part {part} ({imported.explained()}).")

@@ -25,11 +25,11 @@ from planners.memory.memory import Memory, scale_fault
 from planners.memory.ranked_plans import ranked_plans
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of, problem_of
 from storage.fields import parse_json
+from storage.vehicles.vehicle_files import said_vehicle
 
 CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
@@ -65,7 +65,7 @@ class MemoryModel(PythonModel):
 
     def open(self, archive: Path, vehicle: str) -> None:
         """Load and check an archive that need not be in MLflow, for the vehicle of this name."""
-        self.vehicle = vehicle_named(vehicle)
+        self.vehicle = said_vehicle(vehicle)
         self.memory: Memory = load_memory(archive, self.vehicle)
 
     def predict(

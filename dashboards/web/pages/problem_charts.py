@@ -14,7 +14,7 @@ from dashboards.web.world_svg import answer_layer, recalled_layer, roadmap_layer
 from dashboards.world_outlines import CheckedPlan
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
-from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle, state_names
+from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_names, trailers_of
 
 _SIZE: Final = 640.0  # pixels
 _LEGEND: Final = (
@@ -63,10 +63,10 @@ def drive_chart(plan: Plan, vehicle: Vehicle) -> Chart:
         ("Speed", "speed, m/s", [Line("speed", times, plan.states[:, 3], SERIES[0])]),
         (*steering, [Line(state_names(vehicle)[4], times, degrees[:, 4], SERIES[3])]),
     ]
-    if isinstance(vehicle, CarWithTrailers):
+    if trailers_of(vehicle):
         hitches = [
             Line(f"hitch {i + 1}", times, degrees[:, 5 + i], SERIES[i % len(SERIES)])
-            for i in range(len(vehicle.hitch_lengths))
+            for i in range(len(trailers_of(vehicle)))
         ]
         curves.append(("Hitch angles", "hitch angle, °", hitches))
     drawings = [

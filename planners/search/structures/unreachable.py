@@ -159,6 +159,8 @@ def is_unreachable(problem: Problem, scene: Scene, vehicle: Vehicle, workspace: 
         vehicle: what is to be driven.
         workspace: the caller's buffers.
     """
+    if vehicle.about.outline:  # no disc is known to lie inside a body that does not fill its box
+        return False
     radius = 0.5 * min(vehicle.width, vehicle.front + vehicle.rear) - SLACK_M
     ahead = min(
         max(radius - vehicle.rear, 0.0), vehicle.front - radius

@@ -44,7 +44,8 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     found = []
     if plan.dt != vehicle.dt:
         found.append(f"Time step: {plan.dt} s; the vehicle's is {vehicle.dt} s.")
-    motion = [*problem.start_motion, *[0.0] * (size - 3 - len(problem.start_motion))]
+    still = [max(vehicle.min_speed, 0.0), *[0.0] * (size - 4)]  # as slow as it can be, and straight
+    motion = [*problem.start_motion, *still[len(problem.start_motion) :]]
     offset = np.abs(states[0] - [*problem.start, *motion]).max()
     if offset > TOLERANCE:
         how = f"with motion {motion}" if any(motion) else "at rest, all straight"
@@ -110,12 +111,9 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
     A box around the footprints of a run of steps is tried first, and halved while it meets something; a
     single step is then judged by continuous collision.
     """
-    name, half_length, half_width, centres, along, bend = body
+    name, polygon, centres, along, bend = body
     across = np.column_stack((-along[:, 1], along[:, 0]))
-    corners = np.stack(
-        [centres + u * half_length * along + w * half_width * across for u in (-1, 1) for w in (-1, 1)],
-        axis=1,
-    )
+    corners = np.stack([centres + u * along + w * across for u, w in polygon], axis=1)
     slack = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))[:, None, None]
     low, high = problem.bounds[:2], problem.bounds[2:]
     outside = ((corners - slack < low) | (corners + slack > high)).any(axis=(1, 2))
@@ -133,8 +131,7 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
                 runs += [(middle, last), (first, middle)]
             continue
         wider = bend[first] if last > first else 0.0
-        box = fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
-        footprint = fcl.CollisionObject(box, _pose(centres[first], along[first]))
+        footprint = fcl.CollisionObject(_shape(polygon, wider), _pose(centres[first], along[first]))
         end = _pose(centres[last], along[last])
         around = _box_around(corners[first : last + 1], centres[last] - centres[first], wider)
         for other in _near(manager, around):
@@ -157,15 +154,31 @@ def _faces(corners: int) -> Integers:
     return np.array(faces, np.int32)
 
 
+def _shape(polygon: Floats, wider: float) -> fcl.Box | fcl.Convex:
+    """FCL's shape of a convex polygon ``[n, 2]`` whose every side is moved ``wider`` metres outwards."""
+    half_length, half_width = polygon.max(axis=0)
+    if len(polygon) == 4 and (np.abs(polygon) == (half_length, half_width)).all():
+        return fcl.Box(2.0 * (half_length + wider), 2.0 * (half_width + wider), _HEIGHT)
+    sides = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.column_stack((sides[:, 1], -sides[:, 0])) / np.hypot(*sides.T)[:, None]
+    before = np.roll(normals, 1, axis=0)  # of the side that ends in a corner
+    spread = 1.0 + (normals * before).sum(axis=1, keepdims=True)
+    return _convex(polygon + wider * (normals + before) / spread)
+
+
 def prism(polygon: Floats) -> fcl.CollisionObject:
     """FCL's body for a convex polygon ``[n, 2]``."""
+    return fcl.CollisionObject(_convex(polygon))
+
+
+def _convex(polygon: Floats) -> fcl.Convex:
     n = len(polygon)
     vertices = np.zeros((2 * n, 3))
     vertices[:n, :2] = polygon
     vertices[n:, :2] = polygon
     vertices[:n, 2] = -0.5 * _HEIGHT
     vertices[n:, 2] = 0.5 * _HEIGHT
-    return fcl.CollisionObject(fcl.Convex(vertices, n + 2, _faces(n)))
+    return fcl.Convex(vertices, n + 2, _faces(n))
 
 
 @functools.lru_cache(maxsize=1)  # many plans are judged in one problem
@@ -185,7 +198,7 @@ def _pose(centre: Floats, along: Floats) -> fcl.Transform:
 
 
 def _box_around(corners: Floats, way: Floats, slack: float) -> fcl.CollisionObject:
-    """A box around footprints' ``corners [T, 4, 2]`` along the ``way [2]`` from the first to the last."""
+    """A box around footprints' ``corners [T, n, 2]`` along the ``way [2]`` from the first to the last."""
     length = math.hypot(*way)
     along = way / length if length > 0.0 else np.array([1.0, 0.0])
     axes = np.array([along, (-along[1], along[0])])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle
+from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle, trailers_of
 
 
 class Limit(NamedTuple):
@@ -26,12 +26,11 @@ class Limit(NamedTuple):
 
 
 class Body(NamedTuple):
-    """One body of a vehicle along a plan of T states."""
+    """A body of a vehicle, or one of its convex parts, along a plan of T states."""
 
     name: str
-    half_length: float  # metres
-    half_width: float  # metres
-    centres: Floats  # [T, 2] metres
+    corners: Floats  # [n, 2] metres around its centre, counter-clockwise, x along its heading
+    centres: Floats  # [T, 2] metres, the middle of the box around it
     along: Floats  # [T, 2] unit vector of the heading
     bend: Floats  # [T - 1] metres: farthest way of a point from where a straight line or an arc would have it
 
@@ -47,29 +46,20 @@ class _Pace(NamedTuple):
 
 def limits_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Limit]:
     """Every limited variable of a plan: ``states [T, S]``, ``controls [T - 1, 2]``."""
-    speeds = Limit("Speed", states[:, 3], vehicle.min_speed, vehicle.max_speed, "m/s")
-    most = vehicle.max_acceleration
-    accelerations = Limit("Acceleration", controls[:, 0], -most, most, "m/s^2")
+    found = [Limit("Speed", states[:, 3], vehicle.min_speed, vehicle.max_speed, "m/s")]
     if isinstance(vehicle, DifferentialDrive):
-        rate, change = vehicle.max_turn_rate, vehicle.max_turn_acceleration
-        return [
-            speeds,
-            Limit("Turn rate", states[:, 4], -rate, rate, "rad/s"),
-            accelerations,
-            Limit("Turn acceleration", controls[:, 1], -change, change, "rad/s^2"),
-        ]
-    angle, change = vehicle.max_steering, vehicle.max_steering_rate
-    found = [
-        speeds,
-        Limit("Steering", states[:, 4], -angle, angle, "rad"),
-        accelerations,
-        Limit("Steering rate", controls[:, 1], -change, change, "rad/s"),
-    ]
-    if isinstance(vehicle, CarWithTrailers):
-        fold = vehicle.max_hitch
-        found += [
-            Limit(f"Hitch {i + 1}", hitch, -fold, fold, "rad") for i, hitch in enumerate(states[:, 5:].T)
-        ]
+        most, change = vehicle.max_turn_rate, vehicle.max_turn_acceleration
+        found.append(Limit("Turn rate", states[:, 4], -most, most, "rad/s"))
+        second = Limit("Turn acceleration", controls[:, 1], -change, change, "rad/s^2")
+    else:
+        most, change = vehicle.max_steering, vehicle.max_steering_rate
+        found.append(Limit("Steering", states[:, 4], -most, most, "rad"))
+        second = Limit("Steering rate", controls[:, 1], -change, change, "rad/s")
+    if not vehicle.first_order:  # which may change as much as speed and steering themselves allow
+        most = vehicle.max_acceleration
+        found += [Limit("Acceleration", controls[:, 0], -most, most, "m/s^2"), second]
+    for i, (hitch, trailer) in enumerate(zip(states[:, 5:].T, trailers_of(vehicle), strict=True)):
+        found.append(Limit(f"Hitch {i + 1}", hitch, -trailer.max_hitch, trailer.max_hitch, "rad"))
     return found
 
 
@@ -87,15 +77,23 @@ def simulate_again(start: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
         steering += vehicle.dt * steering_rate
         steering = min(max(steering, -most), most)
         states[i + 1, 3:5] = speed, steering
-    states[1:, 2] = start[2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, 2])
-    states[1:, :2] = start[:2] + np.cumsum(_increments(states[:-1], controls, vehicle)[:, :2], axis=0)
-    if isinstance(vehicle, CarWithTrailers):
+    states[1:, 2] = start[2] + np.cumsum(_increments(states, controls, vehicle)[:, 2])
+    states[1:, :2] = start[:2] + np.cumsum(_increments(states, controls, vehicle)[:, :2], axis=0)
+    if trailers_of(vehicle):
         states[1:, 5:] = _hitches(states, controls, vehicle)
     return states
 
 
+def _held(states: Floats, controls: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
+    """Speed and steering at the beginning of each step, and their rates in it: ``[T - 1, 2]`` each."""
+    if vehicle.first_order:  # what is commanded holds from the beginning of the step to its end
+        return states[1:, 3:5], np.zeros_like(controls)
+    return states[:-1, 3:5], controls
+
+
 def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
-    """What one Runge-Kutta step adds to the first five variables of each of ``states [T, S]``."""
+    """What a Runge-Kutta step adds to pose, speed and steering of each of ``states [T, S]`` but the last."""
+    begin_held, rates = _held(states, controls, vehicle)
 
     def slopes(at: Floats) -> Floats:
         _, _, heading, speed, steering = at.T
@@ -104,10 +102,10 @@ def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
             if isinstance(vehicle, DifferentialDrive)
             else (speed * np.tan(steering) / vehicle.wheelbase)
         )
-        return np.column_stack((speed * np.cos(heading), speed * np.sin(heading), turn, controls))
+        return np.column_stack((speed * np.cos(heading), speed * np.sin(heading), turn, rates))
 
     h = vehicle.dt
-    begin = states[:, :5]
+    begin = np.column_stack((states[:-1, :3], begin_held))
     k1 = slopes(begin)
     k2 = slopes(begin + 0.5 * h * k1)
     k3 = slopes(begin + 0.5 * h * k2)
@@ -115,16 +113,20 @@ def _increments(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
     return h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
-def _hitches(states: Floats, controls: Floats, vehicle: CarWithTrailers) -> Floats:
+def _hitches(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
     """Hitch angles ``[T - 1, n]`` after each step: the only variables that feed back on themselves.
 
     How fast the car drives and turns at the beginning, middle and end of each step is computed beforehand.
     """
     h = vehicle.dt
     times = h * np.array([[0.0], [0.5], [1.0]])
-    speeds = states[:-1, 3] + times * controls[:, 0]
-    turns = speeds * np.tan(states[:-1, 4] + times * controls[:, 1]) / vehicle.wheelbase
-    lengths = vehicle.hitch_lengths
+    held, rates_held = _held(states, controls, vehicle)
+    speeds = held[:, 0] + times * rates_held[:, 0]
+    steering = held[:, 1] + times * rates_held[:, 1]
+    turns = steering
+    if not isinstance(vehicle, DifferentialDrive):
+        turns = speeds * np.tan(steering) / vehicle.wheelbase
+    lengths = [trailer.hitch_length for trailer in trailers_of(vehicle)]
 
     def slopes(motion: list[float], hitches: list[float]) -> list[float]:
         speed, turn = motion
@@ -149,55 +151,55 @@ def _hitches(states: Floats, controls: Floats, vehicle: CarWithTrailers) -> Floa
 
 
 def bodies_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Body]:
-    """The bodies along a plan, the leading one first: ``states [T, S]``, ``controls [T - 1, 2]``."""
+    """The bodies along a plan, the leading one first: ``states [T, S]``, ``controls [T - 1, 2]``.
+
+    A body with an outline is listed once for each of its polygons.
+    """
     pace = _leading_pace(states, controls, vehicle)
     heading, reference = states[:, 2], states[:, :2]
-    bodies = [
-        _body("vehicle", vehicle.front, vehicle.rear, vehicle.width, heading, reference, pace, vehicle.dt)
-    ]
-    if isinstance(vehicle, CarWithTrailers):
-        size = vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width
-        for i, (hitch, length) in enumerate(zip(states[:, 5:].T, vehicle.hitch_lengths, strict=True)):
-            heading = heading - hitch
-            reference = reference - length * np.column_stack((np.cos(heading), np.sin(heading)))
-            pace = _trailing_pace(pace, hitch, length, vehicle.dt)
-            bodies.append(_body(f"trailer {i + 1}", *size, heading, reference, pace, vehicle.dt))
+    bodies = _parts("vehicle", vehicle, heading, reference, pace, vehicle.dt)
+    for i, (hitch, trailer) in enumerate(zip(states[:, 5:].T, trailers_of(vehicle), strict=True)):
+        heading = heading - hitch
+        behind = np.column_stack((np.cos(heading), np.sin(heading)))
+        reference = reference - trailer.hitch_length * behind
+        pace = _trailing_pace(pace, hitch, trailer.hitch_length, vehicle.dt)
+        bodies += _parts(f"trailer {i + 1}", trailer, heading, reference, pace, vehicle.dt)
     return bodies
 
 
-def _body(
-    name: str,
-    front: float,
-    rear: float,
-    width: float,
-    heading: Floats,
-    reference: Floats,
-    pace: _Pace,
-    dt: float,
-) -> Body:
-    """A box around its reference points ``[T, 2]``.
+def _parts(
+    name: str, body: Vehicle | Trailer, heading: Floats, reference: Floats, pace: _Pace, dt: float
+) -> list[Body]:
+    """The convex parts of a body around its reference points ``[T, 2]``.
 
     A motion differs from a straight one between the same places by an eighth of the squared time step times
     its largest second derivative, so two motions differ by at most twice that.
     """
     along = np.column_stack((np.cos(heading), np.sin(heading)))
-    reach = math.hypot(max(front, rear), 0.5 * width)
-    second = pace.acceleration + pace.speed * pace.turn + reach * (pace.turn**2 + pace.twist)
-    return Body(
-        name,
-        0.5 * (front + rear),
-        0.5 * width,
-        reference + 0.5 * (front - rear) * along,
-        along,
-        2.0 * dt**2 / 8.0 * second,
-    )
+    across = np.column_stack((-along[:, 1], along[:, 0]))
+    parts = []
+    for polygon in _polygons(body):
+        reach = np.hypot(*polygon.T).max()
+        second = pace.acceleration + pace.speed * pace.turn + reach * (pace.turn**2 + pace.twist)
+        middle = 0.5 * (polygon.min(axis=0) + polygon.max(axis=0))
+        centres = reference + middle[0] * along + middle[1] * across
+        parts.append(Body(name, polygon - middle, centres, along, 2.0 * dt**2 / 8.0 * second))
+    return parts
+
+
+def _polygons(body: Vehicle | Trailer) -> list[Floats]:
+    """The convex polygons ``[n, 2]`` of a body, in metres around its reference point."""
+    if body.about.outline:
+        return [np.array(polygon) for polygon in body.about.outline]
+    half = 0.5 * body.width
+    return [np.array([[-body.rear, -half], [body.front, -half], [body.front, half], [-body.rear, half]])]
 
 
 def _leading_pace(states: Floats, controls: Floats, vehicle: Vehicle) -> _Pace:
     """Bounds for the leading body: it drives along its heading, at no more than it may reach in a step."""
-    acceleration, change = np.abs(controls).T
-    speed = np.abs(states[:-1, 3]) + vehicle.dt * acceleration
-    steering = np.abs(states[:-1, 4]) + vehicle.dt * change
+    held, rates = _held(states, controls, vehicle)
+    acceleration, change = np.abs(rates).T
+    speed, steering = np.abs(held).T + vehicle.dt * np.array([acceleration, change])
     if isinstance(vehicle, DifferentialDrive):
         return _Pace(speed, acceleration, steering, change)
     turn = speed * np.tan(steering) / vehicle.wheelbase

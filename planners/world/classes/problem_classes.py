@@ -14,7 +14,7 @@ from planners.world.classes.layouts import Curves, Random, Scatter, Trap, draw_c
 from planners.world.classes.shapes import TRAILER_ROOM_M, without_those_near
 from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL_RADIUS, Obstacles, Problem
 from planners.world.randomness import generator
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import CAR, Trailer, Vehicle, trailers_of
 
 CLASSES: Final = ("curves", "random", "trap")
 DIFFICULTIES: Final = ("easy", "standard", "hard")
@@ -91,6 +91,7 @@ class ProblemClass:
     difficulty: str
     layout: Curves | Random | Trap
     draw_obstacles: Callable[[np.random.Generator], Obstacles]
+    scale: float = 1.0  # of the problems: metres of the world outside in one of theirs
 
     def draw(self, seed: int, index: int) -> Problem:
         """Draw the canonical problem number ``index`` of a seed, always the same one."""
@@ -102,6 +103,7 @@ class ProblemClass:
             goal_radius=GOAL_RADIUS,
             bounds=BOUNDS,
             obstacles=self.draw_obstacles(generator(seed, self.name, self.difficulty, index)),
+            scale=self.scale,
         )
 
 
@@ -117,9 +119,9 @@ def problem_class(name: str, difficulty: str = "standard", vehicle: Vehicle = CA
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
     settings, draw_layout = _LAYOUTS[name]
     draw = partial(draw_layout, settings[difficulty])
-    if isinstance(vehicle, CarWithTrailers):
-        draw = partial(_draw_with_room, draw, _trailer_rooms(vehicle))
-    return ProblemClass(name, difficulty, settings[difficulty], draw)
+    if trailers_of(vehicle):
+        draw = partial(_draw_with_room, draw, _trailer_rooms(trailers_of(vehicle)))
+    return ProblemClass(name, difficulty, settings[difficulty], draw, vehicle.scale)
 
 
 def _draw_with_room(
@@ -128,10 +130,11 @@ def _draw_with_room(
     return without_those_near(draw(rng), rooms)
 
 
-def _trailer_rooms(vehicle: CarWithTrailers) -> Floats:
+def _trailer_rooms(trailers: tuple[Trailer, ...]) -> Floats:
     """Discs ``[n, 3]`` (x, y, radius in metres) around the bodies of the trailers at the canonical start."""
     x, y, heading = CANONICAL_START
-    behind = np.cumsum(vehicle.hitch_lengths) - 0.5 * (vehicle.trailer_front - vehicle.trailer_rear)
+    ahead = np.array([0.5 * (trailer.front - trailer.rear) for trailer in trailers])
+    behind = np.cumsum([trailer.hitch_length for trailer in trailers]) - ahead
     rooms: Floats = np.column_stack(
         (x - behind * np.cos(heading), y - behind * np.sin(heading), np.full(len(behind), TRAILER_ROOM_M))
     )

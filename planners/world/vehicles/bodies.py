@@ -7,12 +7,12 @@ import numpy as np
 from planners.world.arrays import Floats
 from planners.world.jit import jit
 from planners.world.vehicles.dynamics import load, swept_bodies
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle
+from planners.world.vehicles.vehicle import CAR, Vehicle, trailers_of
 
 
 def body_count(vehicle: Vehicle) -> int:
     """Count the bodies of a vehicle: itself and its trailers."""
-    return 1 + (len(vehicle.hitch_lengths) if isinstance(vehicle, CarWithTrailers) else 0)
+    return 1 + len(trailers_of(vehicle))
 
 
 @jit
@@ -55,13 +55,13 @@ def box_corners(boxes: Floats, widened_m: float = 0.0) -> Floats:
 def footprints(states: Floats, vehicle: Vehicle = CAR) -> Floats:
     """Corners ``[T, B, 4, 2]`` in metres of each body, without margin, at each of ``states [T, S]``."""
     bodies = [(states[:, :3], vehicle.front, vehicle.rear, vehicle.width)]
-    if isinstance(vehicle, CarWithTrailers):
-        x, y, heading = states[:, :3].T
-        for i, length in enumerate(vehicle.hitch_lengths):
-            heading = heading - states[:, 5 + i]
-            x, y = x - length * np.cos(heading), y - length * np.sin(heading)
-            pose = np.column_stack((x, y, heading))
-            bodies.append((pose, vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width))
+    x, y, heading = states[:, :3].T
+    for i, trailer in enumerate(trailers_of(vehicle)):
+        heading = heading - states[:, 5 + i]
+        length = trailer.hitch_length
+        x, y = x - length * np.cos(heading), y - length * np.sin(heading)
+        pose = np.column_stack((x, y, heading))
+        bodies.append((pose, trailer.front, trailer.rear, trailer.width))
     return np.stack([_corners(*body) for body in bodies], axis=1)
 
 

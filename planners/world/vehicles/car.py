@@ -1,4 +1,7 @@
-"""Second-order car: x' = v cos(theta), y' = v sin(theta), theta' = v tan(psi) / L, v' = a, psi' = omega."""
+"""Car: x' = v cos(theta), y' = v sin(theta), theta' = v tan(psi) / L; of second order v' = a, psi' = omega.
+
+Of first order v and psi are constant in a step: v + h a and psi + h omega of the state before.
+"""
 
 from __future__ import annotations
 
@@ -62,6 +65,8 @@ def _step(state: State, first: float, second: float, vehicle: Car) -> State:
     x, y, heading, speed, steering = state
     end_speed = speed + vehicle.dt * first
     end_steering = steering + vehicle.dt * second
+    if vehicle.first_order:
+        speed, steering, first, second = end_speed, end_steering, 0.0, 0.0
     turns = turn_rates(speed, steering, first, second, vehicle)
     x, y, heading = drive(x, y, heading, speed, end_speed, turns, vehicle.dt)
     return (

@@ -1,4 +1,4 @@
-"""A car with one or two trailers (LaValle 2006, section 13.1.2.4), each hitched to the axle in front of it.
+"""A car with one to three trailers (LaValle 2006, section 13.1.2.4), each hitched to the axle in front of it.
 
 Hitch angle beta_i = theta_(i-1) - theta_i, theta_0 the car's heading; theta_i' = v_(i-1) sin(beta_i) / d_i,
 v_i = v_(i-1) cos(beta_i). The car moves as without trailers.
@@ -14,113 +14,142 @@ from planners.world.trigonometry import sincos
 from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive, most_motion, turn_rates
 from planners.world.vehicles.interface import State, box_at, half_way, leading_body
-from planners.world.vehicles.vehicle import CarWithTrailers
+from planners.world.vehicles.vehicle import CarWithTrailers, Trailer
+
+Three = tuple[float, float, float]  # a number of each trailer; those of missing ones count for nothing
 
 
 @implements(interface.load, CarWithTrailers)
 def _load(states: Floats, i: int, vehicle: CarWithTrailers) -> State:
-    return _load_row(states[i], vehicle.hitch_lengths)
+    return _load_row(states[i], vehicle.trailers)
 
 
 @inlined
-def _load_row(row: Floats, hitch_lengths: tuple[float, ...]) -> State:
-    if len(hitch_lengths) == 1:  # decided when compiling: a state's size is part of its type
+def _load_row(row: Floats, trailers: tuple[Trailer, ...]) -> State:
+    if len(trailers) == 1:  # decided when compiling: a state's size is part of its type
         return row[0], row[1], row[2], row[3], row[4], row[5]
-    else:
+    elif len(trailers) == 2:
         return row[0], row[1], row[2], row[3], row[4], row[5], row[6]
+    else:
+        return row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7]
 
 
 @inlined
-def _hitch_rates(
-    speed: float, turn: float, hitch_1: float, hitch_2: float, length_1: float, length_2: float
-) -> tuple[float, float]:
-    """beta_1' and beta_2' (rad/s) at the car's speed and turn rate. One trailer needs only the first."""
-    sin_1, cos_1 = sincos(hitch_1)
-    sin_2, _ = sincos(hitch_2)
-    turn_1 = speed * sin_1 / length_1
-    turn_2 = speed * cos_1 * sin_2 / length_2
-    return turn - turn_1, turn_1 - turn_2
+def _second(trailers: tuple[Trailer, ...]) -> Trailer:
+    """The second trailer, or the first if it is the only one."""
+    if len(trailers) == 1:
+        return trailers[0]
+    else:
+        return trailers[1]
+
+
+@inlined
+def _second_hitch(state: State) -> float:
+    if len(state) == 6:
+        return state[5]
+    else:
+        return state[6]
+
+
+@inlined
+def _hitch_rates(speed: float, turn: float, hitches: Three, lengths: Three) -> Three:
+    """Beta' (rad/s) of each trailer at the car's speed and turn rate."""
+    sin_1, cos_1 = sincos(hitches[0])
+    sin_2, cos_2 = sincos(hitches[1])
+    sin_3, _ = sincos(hitches[2])
+    turn_1 = speed * sin_1 / lengths[0]
+    turn_2 = speed * cos_1 * sin_2 / lengths[1]
+    turn_3 = speed * cos_1 * cos_2 * sin_3 / lengths[2]
+    return turn - turn_1, turn_1 - turn_2, turn_2 - turn_3
+
+
+@inlined
+def _after(hitches: Three, h: float, rates: Three) -> Three:
+    """The hitch angles ``h`` seconds later at constant rates."""
+    return hitches[0] + h * rates[0], hitches[1] + h * rates[1], hitches[2] + h * rates[2]
+
+
+@inlined
+def _runge_kutta(start: float, h: float, k1: float, k2: float, k3: float, k4: float) -> float:
+    return start + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
 @implements(interface.step, CarWithTrailers)
 def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -> State:
     h = vehicle.dt
     speed = state[3]
+    steering = state[4]
     end_speed = speed + h * first
+    end_steering = steering + h * second
+    if vehicle.first_order:
+        speed, steering, first, second = end_speed, end_steering, 0.0, 0.0
     middle_speed = speed + 0.5 * h * first
-    end_steering = state[4] + h * second
-    turns = turn_rates(speed, state[4], first, second, vehicle)
+    turns = turn_rates(speed, steering, first, second, vehicle)
     x, y, heading = drive(state[0], state[1], state[2], speed, end_speed, turns, h)
-    length_1 = vehicle.hitch_lengths[0]
-    length_2 = vehicle.hitch_lengths[-1]
-    hitch_1 = state[5]
-    hitch_2 = state[-1]
-    k1, l1 = _hitch_rates(speed, turns[0], hitch_1, hitch_2, length_1, length_2)
-    k2, l2 = _hitch_rates(
-        middle_speed, turns[1], hitch_1 + 0.5 * h * k1, hitch_2 + 0.5 * h * l1, length_1, length_2
-    )
-    k3, l3 = _hitch_rates(
-        middle_speed, turns[1], hitch_1 + 0.5 * h * k2, hitch_2 + 0.5 * h * l2, length_1, length_2
-    )
-    k4, l4 = _hitch_rates(end_speed, turns[2], hitch_1 + h * k3, hitch_2 + h * l3, length_1, length_2)
-    new_hitch_1 = hitch_1 + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    new_hitch_2 = hitch_2 + h / 6.0 * (l1 + 2.0 * l2 + 2.0 * l3 + l4)
-    new_speed = min(max(end_speed, vehicle.min_speed), vehicle.max_speed)
-    new_steering = min(max(end_steering, -vehicle.max_steering), vehicle.max_steering)
+    trailers = vehicle.trailers
+    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
+    hitches = state[5], _second_hitch(state), state[-1]
+    k = _hitch_rates(speed, turns[0], hitches, lengths)
+    p = _hitch_rates(middle_speed, turns[1], _after(hitches, 0.5 * h, k), lengths)
+    q = _hitch_rates(middle_speed, turns[1], _after(hitches, 0.5 * h, p), lengths)
+    r = _hitch_rates(end_speed, turns[2], _after(hitches, h, q), lengths)
+    hitch_1 = _runge_kutta(hitches[0], h, k[0], p[0], q[0], r[0])
+    hitch_2 = _runge_kutta(hitches[1], h, k[1], p[1], q[1], r[1])
+    hitch_3 = _runge_kutta(hitches[2], h, k[2], p[2], q[2], r[2])
+    end_speed = min(max(end_speed, vehicle.min_speed), vehicle.max_speed)
+    end_steering = min(max(end_steering, -vehicle.max_steering), vehicle.max_steering)
     if len(state) == 6:
-        return x, y, heading, new_speed, new_steering, new_hitch_1
+        return x, y, heading, end_speed, end_steering, hitch_1
+    elif len(state) == 7:
+        return x, y, heading, end_speed, end_steering, hitch_1, hitch_2
     else:
-        return x, y, heading, new_speed, new_steering, new_hitch_1, new_hitch_2
+        return x, y, heading, end_speed, end_steering, hitch_1, hitch_2, hitch_3
 
 
 @implements(interface.is_folded, CarWithTrailers)
 def _is_folded(state: State, vehicle: CarWithTrailers) -> bool:
-    return abs(state[5]) > vehicle.max_hitch or abs(state[-1]) > vehicle.max_hitch
+    trailers = vehicle.trailers
+    return (
+        abs(state[5]) > trailers[0].max_hitch
+        or abs(_second_hitch(state)) > _second(trailers).max_hitch
+        or abs(state[-1]) > trailers[-1].max_hitch
+    )
 
 
 @inlined
-def _trailer(
-    x: float,
-    y: float,
-    heading: float,
-    hitch: float,
-    length: float,
-    speed: float,
-    turn: float,
-    vehicle: CarWithTrailers,
+def _behind(
+    x: float, y: float, heading: float, hitch: float, speed: float, turn: float, dt: float, trailer: Trailer
 ) -> tuple[float, float, float, float, Box]:
     """Axle (x, y), heading, largest turn rate and swept box of the trailer behind a body at this pose.
 
     ``speed`` (m/s) and ``turn`` (rad/s) are the largest of the axle in front within a step.
     """
-    widest = min(abs(hitch) + vehicle.dt * (turn + speed / length), 0.5 * math.pi)
+    length = trailer.hitch_length
+    widest = min(abs(hitch) + dt * (turn + speed / length), 0.5 * math.pi)
     turn_here = speed * sincos(widest)[0] / length
     heading_here = heading - hitch
     sin, cos = sincos(heading_here)
     axle_x = x - length * cos
     axle_y = y - length * sin
-    reach = max(vehicle.trailer_front, vehicle.trailer_rear)
-    margin = half_way(vehicle.dt, speed, turn_here, reach, 0.5 * vehicle.trailer_width)
-    box = box_at(
-        axle_x, axle_y, cos, sin, vehicle.trailer_front, vehicle.trailer_rear, vehicle.trailer_width, margin
-    )
+    reach = max(trailer.front, trailer.rear)
+    margin = half_way(dt, speed, turn_here, reach, 0.5 * trailer.width)
+    box = box_at(axle_x, axle_y, cos, sin, trailer.front, trailer.rear, trailer.width, margin)
     return axle_x, axle_y, heading_here, turn_here, box
 
 
 @implements(interface.swept_bodies, CarWithTrailers)
 def _swept_bodies(state: State, vehicle: CarWithTrailers) -> tuple[Box, ...]:
-    x = state[0]
-    y = state[1]
-    heading = state[2]
     speed, turn = most_motion(state[3], state[4], vehicle)
     car = leading_body(state, speed, turn, vehicle)
-    x, y, heading, turn, first = _trailer(
-        x, y, heading, state[5], vehicle.hitch_lengths[0], speed, turn, vehicle
-    )
+    trailers, dt = vehicle.trailers, vehicle.dt
+    x, y, heading, turn, first = _behind(state[0], state[1], state[2], state[5], speed, turn, dt, trailers[0])
     if len(state) == 6:
         return car, first
-    else:
-        x, y, heading, turn, second = _trailer(
-            x, y, heading, state[-1], vehicle.hitch_lengths[-1], speed, turn, vehicle
-        )
+    x, y, heading, turn, second = _behind(
+        x, y, heading, _second_hitch(state), speed, turn, dt, _second(trailers)
+    )
+    if len(state) == 7:
         return car, first, second
+    else:
+        x, y, heading, turn, third = _behind(x, y, heading, state[-1], speed, turn, dt, trailers[-1])
+        return car, first, second, third

@@ -1,4 +1,7 @@
-"""Second-order differential drive: x' = v cos(theta), y' = v sin(theta), theta' = w, v' = a, w' = alpha."""
+"""Differential drive: x' = v cos(theta), y' = v sin(theta), theta' = w; of second order v' = a, w' = alpha.
+
+Of first order, as a unicycle, v and w are constant in a step: v + h a and w + h alpha of the state before.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +30,8 @@ def _step(state: State, first: float, second: float, vehicle: DifferentialDrive)
     h = vehicle.dt
     end_speed = speed + h * first
     end_turn = turn + h * second
+    if vehicle.first_order:
+        speed, turn, second = end_speed, end_turn, 0.0
     turns = (turn, turn + 0.5 * h * second, end_turn)
     x, y, heading = drive(x, y, heading, speed, end_speed, turns, h)
     return (

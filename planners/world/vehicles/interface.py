@@ -10,11 +10,13 @@ entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is aske
 from __future__ import annotations
 
 from planners.world.arrays import Box, Floats
-from planners.world.jit import by_vehicle, inlined
+from planners.world.jit import by_vehicle, inlined, unseen
 from planners.world.trigonometry import length, sincos
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import About, Vehicle
 
 State = tuple[float, ...]
+
+unseen(About)
 
 
 @by_vehicle

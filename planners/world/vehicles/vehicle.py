@@ -1,17 +1,32 @@
-"""The robots: a car, a differential drive and a car with trailers; their bodies, limits, states and controls.
+"""The robots: cars, differential drives and cars with trailers; their bodies, limits, states and controls.
 
-A body is a box around a reference point: ``front`` metres ahead of it, ``rear`` behind, ``width`` across.
-Lengths in metres, angles in radians. The first four variables of every state are x, y, heading and speed of
-the leading body; every robot starts at rest, wheels straight, trailers straight behind.
+A body is a box around a reference point: ``front`` metres ahead of it, ``rear`` behind, ``width`` across. It
+may have an ``outline`` that fills the box only partly. Lengths in metres, angles in radians. The first four
+variables of every state are x, y, heading and speed of the leading body; unless a problem says otherwise,
+every robot starts at rest, wheels straight, trailers straight behind.
+
+A vehicle of the first order changes speed and steering (or turn rate) at once, at the beginning of a step.
+Its controls are these changes, divided by the step: as large as its range of speeds allows, and no larger.
+
+Lengths here are canonical: ``scale`` says how many metres of the world outside make one of them.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+Corners = tuple[tuple[float, float], ...]  # of a convex polygon, metres around the reference point
+
+
+class About(NamedTuple):
+    """What kernels do not see of a body, so that bodies that differ in it run the same compiled code."""
+
+    name: bytes = b""  # of a vehicle; bytes, because Numba tells the kinds of texts apart slowly
+    outline: tuple[Corners, ...] = ()  # convex polygons that the body consists of; none if it fills its box
+
 
 class Car(NamedTuple):
-    """A second-order car with its reference point at the rear axle."""
+    """A car with its reference point at the rear axle."""
 
     front: float = 1.8
     rear: float = 0.2
@@ -23,10 +38,13 @@ class Car(NamedTuple):
     max_acceleration: float = 2.0  # m/s^2
     max_steering_rate: float = 1.6  # rad/s
     dt: float = 0.1  # seconds a step
+    first_order: bool = False
+    scale: float = 1.0
+    about: About = About(b"car")
 
 
 class DifferentialDrive(NamedTuple):
-    """A second-order differential drive with its reference point at the middle of the axle."""
+    """A differential drive with its reference point at the middle of the axle; of first order a unicycle."""
 
     front: float = 0.6
     rear: float = 0.6
@@ -37,13 +55,27 @@ class DifferentialDrive(NamedTuple):
     max_turn_rate: float = 2.0  # rad/s
     max_turn_acceleration: float = 4.0  # rad/s^2
     dt: float = 0.1  # seconds a step
+    first_order: bool = False
+    scale: float = 1.0
+    about: About = About(b"differential-drive")
+
+
+class Trailer(NamedTuple):
+    """A trailer with its reference point at the middle of its axle."""
+
+    hitch_length: float = 1.9  # from its hitch back to its axle
+    front: float = 1.2  # from its axle towards its hitch
+    rear: float = 0.5  # with 0.6 the next trailer would touch its corners
+    width: float = 0.8
+    max_hitch: float = 1.0  # more is jack-knifed
+    about: About = About()
 
 
 class CarWithTrailers(NamedTuple):
-    """The car, pulling a chain of one or two trailers.
+    """A car that pulls a chain of one to three trailers.
 
-    The first trailer is hitched to the car's rear axle, the second to the axle of the first. A hitch angle is
-    the heading of the body in front less that of the trailer.
+    The first trailer is hitched to the car's rear axle, each other to the axle of the one before. A hitch
+    angle is the heading of the body in front less that of the trailer.
     """
 
     front: float = 1.8
@@ -56,48 +88,49 @@ class CarWithTrailers(NamedTuple):
     max_acceleration: float = 2.0  # m/s^2
     max_steering_rate: float = 1.6  # rad/s
     dt: float = 0.1  # seconds a step
-    hitch_lengths: tuple[float, ...] = (1.9,)  # from each trailer's hitch back to its axle
-    trailer_front: float = 1.2  # from a trailer's axle towards its hitch
-    trailer_rear: float = 0.5  # with 0.6 the next trailer would touch its corners
-    trailer_width: float = 0.8
-    max_hitch: float = 1.0  # more is jack-knifed
+    first_order: bool = False
+    scale: float = 1.0
+    about: About = About(b"car-1-trailer")
+    trailers: tuple[Trailer, ...] = (Trailer(),)
 
 
 Vehicle = Car | DifferentialDrive | CarWithTrailers
+MOST_TRAILERS = 3
 
 CAR = Car()
 DIFFERENTIAL_DRIVE = DifferentialDrive()
 CAR_1_TRAILER = CarWithTrailers()
-CAR_2_TRAILERS = CarWithTrailers(hitch_lengths=(1.9, 1.9))
+CAR_2_TRAILERS = CarWithTrailers(trailers=(Trailer(), Trailer()), about=About(b"car-2-trailers"))
 
 VEHICLES: dict[str, Vehicle] = {
-    "car": CAR,
-    "differential-drive": DIFFERENTIAL_DRIVE,
-    "car-1-trailer": CAR_1_TRAILER,
-    "car-2-trailers": CAR_2_TRAILERS,
+    vehicle.about.name.decode(): vehicle
+    for vehicle in (CAR, DIFFERENTIAL_DRIVE, CAR_1_TRAILER, CAR_2_TRAILERS)
 }
 
 
 def vehicle_named(name: str) -> Vehicle:
-    """Return the vehicle of that name. Raises ValueError if there is none."""
+    """Return the built-in vehicle of that name. Raises ValueError if there is none."""
     if name not in VEHICLES:
         raise ValueError(f"No vehicle is named {name!r}; the vehicles are {', '.join(VEHICLES)}.")
     return VEHICLES[name]
 
 
 def name_of(vehicle: Vehicle) -> str:
-    """Return the vehicle's name; a vehicle with settings of its own is named by these."""
-    return next((name for name, named in VEHICLES.items() if named == vehicle), repr(vehicle))
+    """Return the vehicle's name; a built-in one with settings of its own is named by these."""
+    name = vehicle.about.name.decode()
+    return name if VEHICLES.get(name, vehicle) == vehicle else repr(vehicle)
+
+
+def trailers_of(vehicle: Vehicle) -> tuple[Trailer, ...]:
+    """Return the trailers of a vehicle, the first one first; none if it pulls none."""
+    return vehicle.trailers if isinstance(vehicle, CarWithTrailers) else ()
 
 
 def state_names(vehicle: Vehicle) -> tuple[str, ...]:
     """Name the variables of a state, in order."""
-    pose = ("x", "y", "heading", "speed")
-    if isinstance(vehicle, DifferentialDrive):
-        return (*pose, "turn_rate")
-    if isinstance(vehicle, CarWithTrailers):
-        return (*pose, "steering", *(f"hitch_{i + 1}" for i in range(len(vehicle.hitch_lengths))))
-    return (*pose, "steering")
+    turning = "turn_rate" if isinstance(vehicle, DifferentialDrive) else "steering"
+    hitches = (f"hitch_{i + 1}" for i in range(len(trailers_of(vehicle))))
+    return ("x", "y", "heading", "speed", turning, *hitches)
 
 
 def state_size(vehicle: Vehicle) -> int:

@@ -105,4 +105,4 @@ def test_a_trailer_never_jack_knifes_in_a_turn() -> None:
     controls = turn_towards(state, (25.0, 95.0), CAR_1_TRAILER, open_scene())
     if controls is not None:
         states = simulate(state, controls, CAR_1_TRAILER)
-        assert np.abs(states[:, 5]).max() <= CAR_1_TRAILER.max_hitch + 1e-9
+        assert np.abs(states[:, 5]).max() <= CAR_1_TRAILER.trailers[0].max_hitch + 1e-9

@@ -8,21 +8,55 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from planners.world.arrays import Floats
-from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle
+from planners.world.authority.authority_equations import Body
+from planners.world.vehicles.vehicle import (
+    CAR,
+    CAR_1_TRAILER,
+    DIFFERENTIAL_DRIVE,
+    VEHICLES,
+    About,
+    DifferentialDrive,
+    Trailer,
+    Vehicle,
+    trailers_of,
+)
+
+PARTS = About(  # a body of two convex parts, neither of them a box
+    b"parts",
+    (
+        ((-0.2, -0.3), (0.6, -0.45), (0.6, 0.45), (-0.2, 0.3)),
+        ((0.6, -0.2), (1.8, 0.0), (0.6, 0.2)),
+    ),
+)
+AT_ONCE = {"first_order": True, "max_acceleration": 50.0}  # the range of speeds in a step
+KINDS: dict[str, Vehicle] = VEHICLES | {
+    "car-first-order": CAR._replace(**AT_ONCE, max_steering_rate=20.0 * CAR.max_steering, about=PARTS),
+    "unicycle-first-order": DIFFERENTIAL_DRIVE._replace(**AT_ONCE, max_turn_acceleration=40.0),
+    "car-3-trailers": CAR_1_TRAILER._replace(
+        trailers=(Trailer(), Trailer(1.5, 0.9, 0.4, 0.7, 0.9), Trailer(2.2, 1.2, 0.5, 0.8, 0.8)), about=PARTS
+    ),
+    "car-first-order-2-trailers": CAR_1_TRAILER._replace(
+        **AT_ONCE, max_steering_rate=20.0 * CAR.max_steering, trailers=(Trailer(), Trailer())
+    ),
+}
+SECOND_ORDER = {name: vehicle for name, vehicle in KINDS.items() if not vehicle.first_order}
 
 
 def exact_motion(state: Floats, controls: Floats, times: Floats, vehicle: Vehicle) -> Floats:
-    """States ``[len(times), S]`` at the given times, under constant controls ``[2]``."""
+    """States ``[len(times), S]`` at the given times, under constant controls ``[2]``, within a step."""
+    rates_held = np.zeros(2) if vehicle.first_order else controls
+    if vehicle.first_order:
+        state = state.copy()
+        state[3:5] += vehicle.dt * controls
 
     def slopes(_: float, s: Floats) -> list[float]:
         heading, speed = s[2:4]
         turn = s[4] if isinstance(vehicle, DifferentialDrive) else speed * math.tan(s[4]) / vehicle.wheelbase
-        rates = [speed * math.cos(heading), speed * math.sin(heading), turn, *controls]
-        if isinstance(vehicle, CarWithTrailers):
-            for hitch, length in zip(s[5:], vehicle.hitch_lengths, strict=True):
-                trailing = speed * math.sin(hitch) / length
-                rates.append(turn - trailing)
-                turn, speed = trailing, speed * math.cos(hitch)
+        rates = [speed * math.cos(heading), speed * math.sin(heading), turn, *rates_held]
+        for hitch, trailer in zip(s[5:], trailers_of(vehicle), strict=True):
+            trailing = speed * math.sin(hitch) / trailer.hitch_length
+            rates.append(turn - trailing)
+            turn, speed = trailing, speed * math.cos(hitch)
         return rates
 
     solved = solve_ivp(slopes, (0.0, times[-1]), state, "DOP853", times, rtol=1e-12, atol=1e-12)
@@ -39,15 +73,13 @@ def turning_limits(vehicle: Vehicle) -> tuple[float, float]:
 
 def random_state(rng: np.random.Generator, vehicle: Vehicle) -> Floats:
     """A state ``[S]`` within the limits, often at them."""
-    hitches = len(vehicle.hitch_lengths) if isinstance(vehicle, CarWithTrailers) else 0
-    fold = vehicle.max_hitch if isinstance(vehicle, CarWithTrailers) else 0.0
     most = turning_limits(vehicle)[0]
     return np.array([
         *rng.uniform(-5.0, 55.0, 2),
         rng.uniform(-math.pi, math.pi),
         often_at(rng, vehicle.min_speed, vehicle.max_speed),
         often_at(rng, -most, most),
-        *(often_at(rng, -fold, fold) for _ in range(hitches)),
+        *(often_at(rng, -each.max_hitch, each.max_hitch) for each in trailers_of(vehicle)),
     ])  # fmt: skip
 
 
@@ -74,3 +106,10 @@ def gentle_controls(rng: np.random.Generator, steps: int, vehicle: Vehicle) -> F
     turning = np.repeat(rng.uniform(-0.15, 0.15, -(-steps // 20)), 10)
     turning = np.ravel(np.column_stack((turning.reshape(-1, 10), -turning.reshape(-1, 10))))[:steps]
     return np.column_stack((acceleration, turning))
+
+
+def placed(body: Body) -> Floats:
+    """The corners ``[T, n, 2]`` of a body at each state of its plan."""
+    across = np.column_stack((-body.along[:, 1], body.along[:, 0]))
+    corners: Floats = np.stack([body.centres + u * body.along + w * across for u, w in body.corners], axis=1)
+    return corners

@@ -184,7 +184,8 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
         ({"test_problems": -5}, "-5 test problems: give 1 or more."),
         (
             {"vehicle": "tram"},
-            "Unknown vehicle 'tram'. Known: car, differential-drive, car-1-trailer, car-2-trailers.",
+            "Unknown vehicle 'tram'. Known: car, differential-drive, car-1-trailer, car-2-trailers, or a "
+            "vehicle's .yaml file.",
         ),
         (
             {"hallucination": ["dream"]},

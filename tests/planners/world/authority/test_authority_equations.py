@@ -9,11 +9,19 @@ from hypothesis import given, settings
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import Body, bodies_of, simulate_again
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import VEHICLES, Vehicle, state_size
-from tests.planners.world.motions import exact_motion, gentle_controls, random_controls, random_state
-from tests.planners.world.strategies import box_corners, seeds
+from planners.world.vehicles.vehicle import Vehicle, state_size
+from tests.planners.world.motions import (
+    KINDS,
+    SECOND_ORDER,
+    exact_motion,
+    gentle_controls,
+    placed,
+    random_controls,
+    random_state,
+)
+from tests.planners.world.strategies import seeds
 
-each_vehicle = pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
+each_vehicle = pytest.mark.parametrize("vehicle", KINDS.values(), ids=KINDS)
 
 
 @each_vehicle
@@ -52,7 +60,7 @@ def test_many_steps_stay_with_the_differential_equations(vehicle: Vehicle) -> No
     assert math.dist(state[:2], start[:2]) > 20.0
 
 
-@each_vehicle
+@pytest.mark.parametrize("vehicle", SECOND_ORDER.values(), ids=SECOND_ORDER)
 def test_the_error_falls_with_the_fourth_power_of_the_time_step(vehicle: Vehicle) -> None:
     state = np.zeros(state_size(vehicle))
     state[3:5] = 1.0, 0.2
@@ -82,26 +90,17 @@ def test_between_two_states_no_body_point_leaves_the_arc_by_more_than_the_bend(
     truth = bodies_of(motion, np.tile(controls, (20, 1)), vehicle)
     for bound, body in zip(bounds, truth, strict=True):
         on_arc = _arc(body, times / vehicle.dt)
-        assert np.linalg.norm(_corners(body) - on_arc, axis=2).max() <= bound.bend[0] + 1e-12
-
-
-def _corners(body: Body) -> Floats:
-    """Corners ``[T, 4, 2]``."""
-    headings = np.arctan2(body.along[:, 1], body.along[:, 0])
-    return np.array([
-        box_corners(x, y, heading, body.half_length, body.half_width)
-        for (x, y), heading in zip(body.centres, headings, strict=True)
-    ])  # fmt: skip
+        assert np.linalg.norm(placed(body) - on_arc, axis=2).max() <= bound.bend[0] + 1e-12
 
 
 def _arc(body: Body, shares: Floats) -> Floats:
-    """Corners ``[len(shares), 4, 2]`` on the arcs, at even pace, that lead the first pose to the last."""
+    """Corners ``[len(shares), n, 2]`` on the arcs, at even pace, that lead the first pose to the last."""
     (begin, end), (first, last) = body.centres[[0, -1]], body.along[[0, -1]]
     turn = math.atan2(first[0] * last[1] - first[1] * last[0], first @ last)
     if abs(turn) < 1e-9:
-        return _corners(body)[0] + shares[:, None, None] * (end - begin)
+        return placed(body)[0] + shares[:, None, None] * (end - begin)
     way = end - begin
     centre = 0.5 * (begin + end) + np.array([-way[1], way[0]]) / (2.0 * math.tan(0.5 * turn))
     cos, sin = np.cos(shares * turn), np.sin(shares * turn)
     rotations = np.stack([np.stack([cos, sin], axis=-1), np.stack([-sin, cos], axis=-1)], axis=1)
-    return (_corners(body)[0] - centre) @ rotations + centre
+    return (placed(body)[0] - centre) @ rotations + centre

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from planners.world.vehicles.vehicle import (
     state_size,
     vehicle_named,
 )
-from tests.planners.world.strategies import box_corners
+from tests.planners.world.motions import placed
 
 TRAILERS = [vehicle for vehicle in VEHICLES.values() if isinstance(vehicle, CarWithTrailers)]
 
@@ -48,17 +47,10 @@ def test_states_begin_with_the_leading_bodys_pose_and_speed(vehicle: Vehicle) ->
 
 @pytest.mark.parametrize("vehicle", TRAILERS, ids=name_of)
 def test_within_the_largest_hitch_angle_no_two_bodies_touch(vehicle: CarWithTrailers) -> None:
-    angles = np.linspace(-vehicle.max_hitch, vehicle.max_hitch, 41)
-    for hitches in itertools.product(angles, repeat=len(vehicle.hitch_lengths)):
+    angles = [np.linspace(-each.max_hitch, each.max_hitch, 41) for each in vehicle.trailers]
+    for hitches in itertools.product(*angles):
         state = np.array([[0.0, 0.0, 0.3, 0.0, 0.0, *hitches]])
-        polygons = [
-            shapely.Polygon(
-                box_corners(
-                    *body.centres[0], math.atan2(*body.along[0][::-1]), body.half_length, body.half_width
-                )
-            )
-            for body in bodies_of(state, np.empty((0, 2)), vehicle)
-        ]
+        polygons = [shapely.Polygon(placed(body)[0]) for body in bodies_of(state, np.empty((0, 2)), vehicle)]
         gaps = [one.distance(other) for one, other in itertools.combinations(polygons, 2)]
         assert min(gaps) > 0.05  # metres; between two states a hitch angle may swing out by a little more
 
@@ -67,9 +59,6 @@ def test_jack_knifed_the_trailer_does_meet_the_car() -> None:
     """So the largest hitch angle is needed."""
     state = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 2.6]])
     car, trailer = (
-        shapely.Polygon(
-            box_corners(*body.centres[0], math.atan2(*body.along[0][::-1]), body.half_length, body.half_width)
-        )
-        for body in bodies_of(state, np.empty((0, 2)), CAR_1_TRAILER)
+        shapely.Polygon(placed(body)[0]) for body in bodies_of(state, np.empty((0, 2)), CAR_1_TRAILER)
     )
     assert car.intersects(trailer)

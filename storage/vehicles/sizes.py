@@ -1,0 +1,114 @@
+"""What sizes, limits and step of a vehicle must have to do with each other, and the scale that follows."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle, trailers_of
+
+REACH_M: Final = 1.75  # ``planners.world.geometry.collision.REACH_M``, which compiles when it is imported
+ROOM: Final = 1.5  # times as long as the body are the places that roadmaps look for
+BEHIND_M: Final = 8.0  # room for trailers behind the start of canonical problems
+SCALES: Final = (2.0**-6, 2.0**6)
+ANGLES: Final = 41  # hitch angles at which bodies may not meet
+
+
+class _Pace(NamedTuple):
+    """How far a body's points get in half a step, at most."""
+
+    body: str
+    half_length: float
+    half_width: float
+    half_way: float  # metres
+
+
+def check_sizes(vehicle: Vehicle) -> None:
+    """Raise ValueError, the end of a sentence, if a ``vehicle`` moves too far in a step or meets itself."""
+    straight = not isinstance(vehicle, DifferentialDrive)  # fast cars do not steer sharply
+    for body, half_length, half_width, half_way in _paces(vehicle, straight):
+        narrow = min(half_length, half_width)
+        if half_way > narrow:
+            raise ValueError(
+                f"has step {vehicle.dt:g} s, in which a point of {body} moves up to {2.0 * half_way:.3g} m, "
+                f"more than the {2.0 * narrow:.3g} m that it is wide; give "
+                f"{vehicle.dt * narrow / half_way:.2g} s or less"
+            )
+    ahead: Vehicle | Trailer = vehicle
+    for number, trailer in enumerate(trailers_of(vehicle), start=1):
+        angles = np.linspace(-trailer.max_hitch, trailer.max_hitch, ANGLES).tolist()
+        if _shape(ahead).intersects(_turned(trailer, 0.0)):
+            angles = []  # a semi-trailer lies over the tractor that carries it
+        for angle in angles:
+            if _shape(ahead).intersects(_turned(trailer, angle)):
+                raise ValueError(
+                    f"has trailer {number} touch the body in front at a hitch angle of {abs(angle):.2f} rad; "
+                    "give a smaller max_hitch, a longer hitch_length or shorter bodies"
+                )
+        ahead = trailer
+
+
+def scale_for(vehicle: Vehicle) -> float:
+    """How many metres make a canonical one, so that a ``vehicle`` given in metres suits canonical problems.
+
+    It is the least power of two with which no box that planners check is larger than they can check, and
+    trailers have room behind the start. It is 1 for the built-in vehicles.
+    """
+    needs = [
+        max(math.hypot(length + way, width + way), ROOM * math.hypot(length, width)) / REACH_M
+        for _, length, width, way in _paces(vehicle)
+    ]
+    trailers = trailers_of(vehicle)
+    rear = trailers[-1].rear if trailers else vehicle.rear
+    needs.append((sum(trailer.hitch_length for trailer in trailers) + rear) / BEHIND_M)
+    scale = 2.0 ** math.ceil(math.log2(max(needs)))
+    if not SCALES[0] <= scale <= SCALES[1]:
+        longest = 2.0 * max(length for _, length, _, _ in _paces(vehicle))
+        raise ValueError(f"has a body {longest:g} m long; expected some centimetres to 100 metres")
+    return scale
+
+
+def _paces(vehicle: Vehicle, straight: bool = False) -> list[_Pace]:
+    fastest = max(vehicle.max_speed, -vehicle.min_speed)
+    if straight:
+        turn = 0.0
+    elif isinstance(vehicle, DifferentialDrive):
+        turn = vehicle.max_turn_rate
+    else:
+        turn = fastest * math.tan(vehicle.max_steering) / vehicle.wheelbase
+    paces = [_pace("the vehicle", vehicle, fastest, turn, vehicle.dt)]
+    for i, trailer in enumerate(trailers_of(vehicle), start=1):
+        turn = 0.0 if straight else fastest / trailer.hitch_length
+        paces.append(_pace(f"trailer {i}", trailer, fastest, turn, vehicle.dt))
+    return paces
+
+
+def _pace(name: str, body: Vehicle | Trailer, speed: float, turn: float, dt: float) -> _Pace:
+    half_width = 0.5 * body.width
+    way = 0.5 * dt * math.hypot(speed + half_width * turn, max(body.front, body.rear) * turn)
+    return _Pace(name, 0.5 * (body.front + body.rear), half_width, way)
+
+
+def _polygons(body: Vehicle | Trailer) -> list[Floats]:
+    half = 0.5 * body.width
+    box = ((-body.rear, -half), (body.front, -half), (body.front, half), (-body.rear, half))
+    return [np.array(polygon) for polygon in body.about.outline or (box,)]
+
+
+def _shape(body: Vehicle | Trailer) -> Any:
+    import shapely  # late: few commands need it
+
+    return shapely.union_all([shapely.Polygon(polygon) for polygon in _polygons(body)])
+
+
+def _turned(trailer: Trailer, hitch: float) -> Any:
+    """A trailer behind a body whose axle is at (0, 0), at a hitch angle."""
+    import shapely
+
+    cos, sin = math.cos(-hitch), math.sin(-hitch)
+    turn = np.array([[cos, sin], [-sin, cos]])
+    back = np.array([-trailer.hitch_length * cos, -trailer.hitch_length * sin])
+    return shapely.union_all([shapely.Polygon(polygon @ turn + back) for polygon in _polygons(trailer)])

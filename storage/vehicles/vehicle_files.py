@@ -1,0 +1,106 @@
+"""Vehicles by name or from a YAML file (docs/vehicles.md), and as text that says all of one."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Final
+
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle, name_of
+from storage.errors import StorageError
+from storage.fields import parse_json, scale_of, short
+from storage.vehicles.definitions import FIELDS, definition_of, is_built_in, vehicle_of
+from storage.yaml_text import yaml_fields
+
+ENDINGS: Final = (".yaml", ".yml")
+BUILT_IN: Final = Path(__file__).parent / "built_in"  # a file for each vehicle that has a name
+_MOST_BRACKETS: Final = 2_000  # some hundred corners
+
+
+def read_vehicle(file: Path) -> Vehicle:
+    """The vehicle that a YAML ``file`` describes.
+
+    Raises StorageError, with one line, if the file is missing or unreadable, if one of its fields is unknown,
+    missing or out of range, or if its fields contradict each other.
+    """
+    if not file.is_file():
+        raise StorageError(
+            f"{file} is not there; give the file of a vehicle, or one of {', '.join(VEHICLES)}."
+        )
+    try:
+        vehicle = vehicle_of(yaml_fields(file, "vehicle", FIELDS, _MOST_BRACKETS))
+        if vehicle.about.name.decode() in VEHICLES and not is_built_in(vehicle):
+            raise ValueError(
+                f"has the name of another, {short(vehicle.about.name.decode())}; give it its own"
+            )
+    except ValueError as error:
+        raise StorageError(f"{file} {str(error).rstrip('.')}.") from None
+    return vehicle
+
+
+def scale_for_vehicle(stated: object, vehicle: Vehicle) -> float:
+    """The scale of a problem or a map for a ``vehicle``: its own unless one is ``stated``.
+
+    A vehicle from a file has the size that the file says. So another scale would be a mistake, whereas the
+    built-in ones stand for robots of any size. Raises ValueError, the end of a sentence.
+    """
+    scale = vehicle.scale if stated is None else scale_of(stated)
+    if scale != vehicle.scale and not is_built_in(vehicle):
+        raise ValueError(
+            f"scale is {scale:g}, but that of {name_of(vehicle)} is {vehicle.scale:g}, which follows from "
+            "its size; leave the scale out"
+        )
+    return scale
+
+
+def label_of(vehicle: Vehicle) -> str:
+    """A word that tells a ``vehicle`` from all others: its name, and unless it is built in a digest of it."""
+    if is_built_in(vehicle):
+        return name_of(vehicle)
+    definition = json.dumps(definition_of(vehicle), sort_keys=True)
+    name = vehicle.about.name.decode()
+    return f"{name}-{hashlib.sha256(definition.encode()).hexdigest()[:8]}"
+
+
+def text_of_vehicle(given: str) -> str:
+    """What says all of a vehicle that was ``given`` by name, by the path of its file, or by such a text.
+
+    That of a built-in vehicle is its name. Raises StorageError, with one line, if there is no such vehicle.
+    """
+    if given in VEHICLES:
+        return given
+    vehicle = said_vehicle(given) if given.startswith("{") else read_vehicle(_path(given))
+    return name_of(vehicle) if is_built_in(vehicle) else json.dumps(definition_of(vehicle))
+
+
+def said_vehicle(text: str) -> Vehicle:
+    """The vehicle of which ``text_of_vehicle`` says all, or to which its argument leads.
+
+    Raises StorageError, with one line, if there is none.
+    """
+    if text.startswith("{"):
+        return _defined(text)
+    return VEHICLES[text] if text in VEHICLES else read_vehicle(_path(text))
+
+
+@functools.lru_cache(maxsize=64)
+def _defined(text: str) -> Vehicle:
+    fields = parse_json(text, "The vehicle")
+    try:
+        return vehicle_of(fields)
+    except ValueError as error:
+        raise StorageError(f"The vehicle {str(error).rstrip('.')}.") from None
+
+
+def _path(given: str) -> Path:
+    path = Path(given)
+    if path.suffix in ENDINGS:
+        return path
+    near = get_close_matches(given[:60].lower(), VEHICLES, 1)
+    meant = f" (nearest is {near[0]!r})" if near else ""
+    raise StorageError(
+        f"Unknown vehicle {short(given)}{meant}. Known: {', '.join(VEHICLES)}, or a vehicle's .yaml file."
+    )
