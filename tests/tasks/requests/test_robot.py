@@ -41,7 +41,7 @@ def planner(memory: Path) -> RobotPlanner:
 
 
 def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> None:
-    assistant = Assistant(AssistantSettings("gust", "repair", 5, str(memory), 1))
+    assistant = Assistant(AssistantSettings("lattice", "repair", 5, str(memory), 1))
     for i in range(COUNT):
         attempt, plan = assistant(problem(i))
         answer = planner.plan(problem(i))
