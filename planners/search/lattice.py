@@ -36,19 +36,20 @@ from planners.search.structures.frontier import (
     reach,
     was_reached,
 )
+from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of, seconds_to_go
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.geometry.occupancy import drawing_of, window_of
-from planners.world.goal import MOST_SPEED, RADIUS, X, Y, metres_to, reaches
+from planners.world.goal import RADIUS, X, Y, asks_for_more, metres_to, place, reaches
 from planners.world.jit import inlined, lean
 from planners.world.problem import is_canonical
-from planners.world.trigonometry import sincos, wrapped
+from planners.world.trigonometry import wrapped
 from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
 SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
-LOOK_AHEAD_M: Final = 2.0  # from here to there the distance to go tells whether the heading is right
+CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
 
 
 class Lattice(NamedTuple):
@@ -62,6 +63,7 @@ class Lattice(NamedTuple):
     paces: int = 4  # cells of speeds
     greed: float = 2.0  # weight of the time to go; with 1 driving times are shorter and searches longer
     heading_s: float = 0.4  # time to go for each unit of 1 - cos of the angle to turn by
+    pace: float = 1.0  # of a connection to the goal: the share of the largest speed
     late_s: float = 1.0  # time to go for each metre by which braking for the goal comes too late
 
 
@@ -76,11 +78,14 @@ class LatticeSettings(NamedTuple):
     anywhere: tuple[Lattice, ...] = (
         Lattice(),
         Lattice(speeds=4),
-        Lattice(steps=4, speeds=4, cell=0.5, headings=32),
-        Lattice(steps=3, speeds=4, cell=0.25, headings=48),
+        Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
+        Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
     )  # the same for problems that are not canonical; where a speed is asked at the goal, without the first
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
+
+
+NOWHERE = place(0.0, 0.0, 0.0)
 
 
 @inlined
@@ -112,50 +117,12 @@ def _key(state: State, search: int, go: CostToGo, lattice: Lattice, vehicle: Veh
     return ((key << 10 | (column & 1023)) << 7 | heading) << 3 | pace
 
 
-@inlined
-def _seconds_to_stop(
-    speed: float, metres: float, room: float, most: float, late_s: float, vehicle: Vehicle
-) -> float:
-    """The least time over a distance, or up to ``room`` metres more, from one speed to at most another.
-
-    Who is too fast for that brakes, and has to come back: ``late_s`` for each metre.
-    """
-    acceleration = control_limits(vehicle)[0]
-    braking = (speed * speed - most * most) / (2.0 * acceleration)
-    metres = min(max(braking, metres), metres + room)
-    squares = speed * speed + 2.0 * acceleration * metres
-    end = min(most, math.sqrt(squares))
-    if braking > metres:
-        return (speed - most) / acceleration + late_s * (braking - metres)
-    peak = min(math.sqrt(0.5 * (squares + end * end)), vehicle.max_speed)
-    changing = (2.0 * peak * peak - speed * speed - end * end) / (2.0 * acceleration)
-    return (2.0 * peak - speed - end) / acceleration + max(metres - changing, 0.0) / vehicle.max_speed
-
-
-@inlined
-def _seconds_to_go(state: State, goal: Floats, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> float:
-    """The estimated driving time to the goal: the distance at full speed, getting to it, and turning."""
-    metres = metres_to_go(state[0], state[1], go)
-    sin, cos = sincos(state[2])
-    ahead = metres_to_go(state[0] + LOOK_AHEAD_M * cos, state[1] + LOOK_AHEAD_M * sin, go)
-    turn = min(max(1.0 - (metres - ahead) / LOOK_AHEAD_M, 0.0), 2.0)  # 1 - cos of the angle to turn by
-    if goal[MOST_SPEED] < vehicle.max_speed:
-        most = max(goal[MOST_SPEED], 0.0)
-        seconds = _seconds_to_stop(state[3], metres, goal[RADIUS], most, lattice.late_s, vehicle)
-        return float(seconds + lattice.heading_s * turn)
-    missing = vehicle.max_speed - state[3]
-    acceleration = control_limits(vehicle)[0]
-    slow = missing * missing / (2.0 * acceleration * vehicle.max_speed)
-    return float(metres / vehicle.max_speed + slow + lattice.heading_s * turn)
-
-
 @lean
 def open_vertex(
     tree: trees.Tree,
     vertex: int,
-    goal: Floats,
     frontier: Frontier,
-    go: CostToGo,
+    ahead: Ahead,
     lattice: Lattice,
     vehicle: Vehicle,
 ) -> None:
@@ -165,22 +132,22 @@ def open_vertex(
         for _ in range(lattice.steps):
             control_1, control_2 = _controls(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
-        if not was_reached(frontier, _key(state, frontier.counts[1], go, lattice, vehicle)):
+        if not was_reached(frontier, _key(state, frontier.counts[1], ahead.go, lattice, vehicle)):
             spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
-            left = _seconds_to_go(state, goal, go, lattice, vehicle)
+            left = seconds_to_go(state, ahead, lattice.heading_s, lattice.late_s, vehicle)
             push(frontier, spent + lattice.greed * left, vertex, motion)
 
 
 @lean
 def begin_lattice(
-    tree: trees.Tree, goal: Floats, frontier: Frontier, go: CostToGo, lattice: Lattice, vehicle: Vehicle
+    tree: trees.Tree, frontier: Frontier, ahead: Ahead, lattice: Lattice, vehicle: Vehicle
 ) -> None:
     """Begin a search from the vertices that the tree has: its root, or a drive that is given."""
     clear_frontier(frontier)
     last = tree.counts[trees.SIZE] - 1
-    open_vertex(tree, last, goal, frontier, go, lattice, vehicle)
+    open_vertex(tree, last, frontier, ahead, lattice, vehicle)
     for vertex in range(0, last, lattice.steps):
-        open_vertex(tree, vertex, goal, frontier, go, lattice, vehicle)
+        open_vertex(tree, vertex, frontier, ahead, lattice, vehicle)
 
 
 @lean
@@ -213,13 +180,17 @@ def grow_lattice(
     goal: Floats,
     until: int,
     frontier: Frontier,
-    go: CostToGo,
+    ahead: Ahead,
     lattice: Lattice,
     vehicle: Vehicle,
     scene: Scene,
 ) -> None:
     """Drive the primitive with the least estimate until solved, nothing is left, or ``until`` expansions."""
     counts = tree.counts
+    connects = asks_for_more(goal)
+    top = lattice.pace * vehicle.max_speed
+    if connects and trees.connect_to_goal(tree, 0, goal, top, vehicle, scene):
+        return
     while (
         counts[trees.EXPANSIONS] < until
         and counts[trees.SIZE] + lattice.steps <= tree.states.shape[0]
@@ -231,10 +202,16 @@ def grow_lattice(
         if counts[trees.GOAL_VERTEX] >= 0:
             return
         if last >= 0:
-            key = _key(load(tree.states, last, vehicle), frontier.counts[1], go, lattice, vehicle)
+            key = _key(load(tree.states, last, vehicle), frontier.counts[1], ahead.go, lattice, vehicle)
             if not was_reached(frontier, key):
                 reach(frontier, key)
-                open_vertex(tree, last, goal, frontier, go, lattice, vehicle)
+                if (
+                    connects
+                    and metres_to_go(tree.states[last, 0], tree.states[last, 1], ahead.go) < CONNECT_M
+                    and trees.connect_to_goal(tree, last, goal, top, vehicle, scene)
+                ):
+                    return
+                open_vertex(tree, last, frontier, ahead, lattice, vehicle)
 
 
 def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
@@ -270,10 +247,12 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     if arrival is not None and arrival.most_speed < vehicle.max_speed:
         levels = levels[1:]
     level = levels[0]
+    ahead = Ahead(go, NOWHERE, NO_TABLE)
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level
+        nonlocal level, ahead
         if trial == 0:
+            ahead = ahead_of(goal, go, vehicle)
             occupied = query.occupied
             if occupied is None:
                 occupied = drawing_of(query.problem, query.workspace).occupied
@@ -281,9 +260,9 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         level = paced(levels[min(trial // 2, len(levels) - 1)], vehicle)
         if improving:
             level = _varied(level, settings.improving_greed, query)
-        begin_lattice(tree, goal, frontier, go, level, vehicle)
+        begin_lattice(tree, frontier, ahead, level, vehicle)
 
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
-        grow_lattice(tree, goal, until, frontier, go, level, vehicle, scene)
+        grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
 
     return attempt(query, settings.restart_after, prepare, grow, towards_anywhere(query))

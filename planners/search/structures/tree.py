@@ -7,12 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import BitGenerator
 
+from planners.search.connection.candidates import list_connections, next_word
+from planners.search.connection.connect import connect
+from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
+from planners.search.connection.outline import outline_is_free
 from planners.search.guides.sampling import uniform
 from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.goal import metres_to, reaches
+from planners.world.goal import asks_for_more, metres_to, reaches
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import gap_to_segment, length
@@ -35,6 +39,7 @@ class Tree(NamedTuple):
     counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
     bound: Floats  # [1] seconds by which the goal must be reached; vertices too late for that are not added
     buckets: Buckets
+    connection: Connection
 
 
 class Extension(NamedTuple):
@@ -52,6 +57,10 @@ class Extension(NamedTuple):
 
 EXTENSION = Extension()
 NO_LEAD = np.empty((0, 2))
+CONNECT_M = 12.0  # from the goal: nearer vertices of an extension try to connect to it ...
+CONNECT_EVERY = 10  # ... one in so many
+OUTLINES = 8  # words of a connection that are glanced at ...
+WORDS = 2  # ... and driven, at most
 BUCKET_M = 2.0  # vertices lie up to 0.4 m apart along an extension
 
 
@@ -68,6 +77,7 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
         np.zeros(4, np.int64),
         np.zeros(1),
         allocate_buckets(),
+        allocate_connection(state_size),
     )
 
 
@@ -117,6 +127,52 @@ def append(
 
 
 @lean
+def connect_to_goal(
+    tree: Tree, vertex: int, goal: Floats, top: float, vehicle: Vehicle, scene: Scene
+) -> bool:
+    """Drive from a vertex to the goal as if nothing were in the way, and add the drive if it is free.
+
+    ``top`` is the largest speed in m/s.
+    """
+    c = tree.connection
+    state = load(tree.states, vertex, vehicle)
+    store(c.states, 0, state)
+    count = list_connections(c, goal, top, vehicle)
+    x, y, heading = first_pose(state, top, vehicle)
+    radius = radius_at(top, vehicle)
+    depth = tree.depths[vertex]
+    within_s = tree.bound[0] - depth * vehicle.dt
+    driven = 0
+    for _ in range(OUTLINES):
+        word = next_word(c, count, within_s)
+        if word < 0 or driven == WORDS:
+            return False
+        if not outline_is_free(c.words[word], radius, x, y, heading, vehicle, scene):
+            continue
+        driven += 1
+        steps = connect(c, word, goal, top, vehicle)
+        if steps == 0 or (depth + steps) * vehicle.dt >= tree.bound[0]:
+            continue
+        if tree.counts[SIZE] + steps > tree.states.shape[0]:
+            return False
+        free = 1
+        while free <= steps and state_is_free(load(c.states, free, vehicle), vehicle, scene):
+            free += 1
+        tree.counts[CHECKS] += min(free, steps)
+        if free <= steps:
+            continue
+        parent = vertex
+        for i in range(1, steps + 1):
+            state = load(c.states, i, vehicle)
+            first = c.controls[i - 1, 0]
+            second = c.controls[i - 1, 1]
+            parent = append(tree, parent, tree.waypoints[vertex], state, first, second, depth + i)
+        tree.counts[GOAL_VERTEX] = parent
+        return True
+    return False
+
+
+@lean
 def extend(
     tree: Tree,
     vertex: int,
@@ -153,6 +209,7 @@ def extend(
     control_1 = (2.0 * uniform(rng) - 1.0) * limit_1
     control_2 = (2.0 * uniform(rng) - 1.0) * limit_2
     errors = NO_ERRORS
+    connects = asks_for_more(goal)
     first = counts[SIZE]
     parent = vertex
     arrived = False
@@ -187,6 +244,13 @@ def extend(
         parent = append(tree, parent, waypoint, state, driven_1, driven_2, depth)
         if reaches(state, goal):
             counts[GOAL_VERTEX] = parent
+            break
+        if (
+            connects
+            and i % CONNECT_EVERY == CONNECT_EVERY - 1
+            and metres_to(state, goal) < CONNECT_M
+            and connect_to_goal(tree, parent, goal, vehicle.max_speed, vehicle, scene)
+        ):
             break
         arrived = length(x - target_x, y - target_y) < settings.arrival_m
         if arrived:
