@@ -14,6 +14,7 @@ from rich.console import Console
 
 SECTIONS: Final = {
     "kernels": "tests.speed.kernels",
+    "connections": "tests.speed.connections",
     "planners": "tests.speed.planners",
     "vehicles": "tests.speed.vehicles",
     "peers": "tests.speed.peers.comparison",
