@@ -10,6 +10,7 @@ import os
 from pathlib import Path
 
 from planners.memory.memory import Memory
+from planners.world.vehicles.vehicle import name_of
 from storage.archives.memories import load_memory
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.registry.memory_at import memory_at
@@ -27,7 +28,7 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
 
     Args:
         memory: the folder of a memory, the folder of a run with one memory, or a model in MLflow.
-        vehicle: the vehicle's name.
+        vehicle: the vehicle's name or file.
         host: the address to listen on.
         port: the port; 0 takes any free one.
         workers: the number of worker processes.
@@ -45,7 +46,8 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
         archive = load_memory(folder, said_vehicle(vehicle))  # refused here, not by each worker
 
         def log_addresses() -> None:
-            plans = f"{len(archive.plans)} plans of class {archive.class_name}, {vehicle}"
+            driven = name_of(archive.vehicle)
+            plans = f"{len(archive.plans)} plans of class {archive.class_name}, {driven}"
             _LOG.info("memory   %s: %s", memory, plans)
             _LOG.info("serving  %s/invocations, workers: %d; Ctrl-C stops", address_of(listener), workers)
             _LOG.info("access   %s", access())

@@ -55,7 +55,8 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
         settings: the settings of the run.
     """
     tags = {"commit": commit(), "host": platform.node(), "learned": settings.learned}
-    tags |= {name: str(getattr(settings, name)) for name in ("vehicle", "preset", "objective", "difficulty")}
+    tags |= {name: str(getattr(settings, name)) for name in ("preset", "objective", "difficulty")}
+    tags["vehicle"] = settings.vehicle_label
     tags |= {"classes": ", ".join(settings.class_names)}
     with tracker(data).run(settings.run_name, "run", tags) as run_id:
         tracker(data).parameters(run_id, parameters_of(settings))

@@ -8,6 +8,7 @@ from typing import Any
 from dashboards.web.data_reader import DataReader
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters
+from planners.world.vehicles.vehicle import name_of
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
 
@@ -22,7 +23,7 @@ def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
     when = datetime.fromtimestamp(run.settings.stat().st_mtime, UTC)
     row: dict[str, Any] = {"name": run.path.name, "when": f"{when:%Y-%m-%d %H:%M} UTC", "fault": ""}
     try:
-        settings = data.settings(run)
+        settings, vehicle = data.settings(run), name_of(data.vehicle(run))
         stages = list(dict.fromkeys(str(stage.get("stage")) for stage in data.stages(run)))
     except StorageError as error:
         return row | {"fault": str(error)}
@@ -32,7 +33,7 @@ def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
         "planners": ", ".join(settings["planners"]),
         "experiences": settings["experiences"],
         "problems": settings.get("test_problems"),
-        "vehicle": settings.get("vehicle", "car"),
+        "vehicle": vehicle,
         "stages": ", ".join(stages) or "none yet",
         "state": _state(run, stages),
     }

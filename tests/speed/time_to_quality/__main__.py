@@ -23,10 +23,10 @@ from dashboards.cells import markdown_table
 from dashboards.figures.quality_curves import quality_curves
 from dashboards.figures.style import save
 from dashboards.palette import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
-from planners.world.vehicles.vehicle import vehicle_named
 from storage.archives.memories import load_memory
 from storage.places.files import read_text
 from storage.places.run_folder import RunFolder
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.inputs.problem_sources import source_of
 from tasks.registry.model_uris import memory_digest
@@ -80,7 +80,7 @@ def report(
     """
     folder = RunFolder(run.absolute())
     settings = RunSettings.from_json(read_text(folder.settings))
-    vehicle = vehicle_named(settings.vehicle)
+    vehicle = said_vehicle(settings.vehicle)
     seconds = max(seconds, BUDGETS[-1])
     data = str(run.absolute().parent.parent)
     compile_assists(vehicle)
