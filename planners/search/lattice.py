@@ -76,11 +76,12 @@ class LatticeSettings(NamedTuple):
         Lattice(steps=3, speeds=3, cell=0.25, headings=48),
     )  # one after another, each when the one before has nothing left to drive or has taken too long
     anywhere: tuple[Lattice, ...] = (
-        Lattice(),
+        Lattice(steps=6, headings=16, heading_s=0.2),
+        Lattice(steps=10, speeds=3),  # long, so that going back leaves the cell
         Lattice(speeds=4),
         Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
         Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
-    )  # the same for problems that are not canonical; where a speed is asked at the goal, without the first
+    )  # the same for problems that are not canonical; where a speed is asked at the goal, without two
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
 
@@ -245,19 +246,20 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     levels = settings.levels if is_canonical(query.problem) else settings.anywhere
     arrival = query.problem.arrival
     if arrival is not None and arrival.most_speed < vehicle.max_speed:
-        levels = levels[1:]
-    level = levels[0]
+        levels = levels[2:]
+    level, tried = levels[0], 0
     ahead = Ahead(go, NOWHERE, NO_TABLE)
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, ahead
+        nonlocal level, tried, ahead
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             occupied = query.occupied
             if occupied is None:
                 occupied = drawing_of(query.problem, query.workspace).occupied
             fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
-        level = paced(levels[min(trial // 2, len(levels) - 1)], vehicle)
+        level = paced(levels[min(tried, len(levels) - 1)], vehicle)
+        tried += 1
         if improving:
             level = _varied(level, settings.improving_greed, query)
         begin_lattice(tree, frontier, ahead, level, vehicle)
@@ -265,4 +267,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
         grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
 
-    return attempt(query, settings.restart_after, prepare, grow, towards_anywhere(query))
+    explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
+    return attempt(
+        query, settings.restart_after, prepare, grow, towards_anywhere(query), explore_from=explore_from
+    )

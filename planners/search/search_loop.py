@@ -46,6 +46,7 @@ def attempt(
     grow: Grow,
     explore: Grow | None = None,
     follow_guide: Grow | None = None,
+    explore_from: int = 1,
 ) -> Outcome:
     """Grow a tree until the problem is solved or a limit is reached.
 
@@ -54,7 +55,7 @@ def attempt(
     long: that cuts the tails of a search with random choices (Luby, Sinclair and Zuckerman 1993). Every
     second trial explores, if that is given: where the one planner fails for long the other need not (a
     portfolio, Gomes and Selman 2001). What the query tries beside the search may end it with a plan. Before
-    the second trial the search ends if it is certain that no drive leads to the goal.
+    trial ``explore_from`` the search ends if it is certain that no drive leads to the goal.
 
     Args:
         query: the problem and its limits.
@@ -64,6 +65,7 @@ def attempt(
         grow: ``grow(tree, goal, until)`` extends the tree until it is solved or has ``until`` expansions.
         explore: grows the tree of every second trial; nothing is prepared for it.
         follow_guide: grows the first tree for ``GUIDED`` expansions, after which it is mostly solved.
+        explore_from: the first trial that explores.
     """
     began = perf_counter()
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
@@ -95,12 +97,13 @@ def attempt(
         while status is Status.BUDGET_SPENT and counts[trees.EXPANSIONS] < limits.expansions:
             if counts[trees.EXPANSIONS] >= restart_at or counts[trees.SIZE] >= limits.nodes:
                 trial += 1
-                if trial == 1 and is_unreachable(problem, scene, vehicle, query.workspace):
+                if trial == explore_from and is_unreachable(problem, scene, vehicle, query.workspace):
                     status = Status.INFEASIBLE
                     break
                 restart_at = int(counts[trees.EXPANSIONS]) + restart_after * 2**trial
                 trees.prune(tree, len(first), scene.bounds)
-                extend_tree = explore if explore is not None and trial % 2 else grow
+                explores = trial >= explore_from and (trial - explore_from) % 2 == 0
+                extend_tree = explore if explore is not None and explores else grow
                 if extend_tree is grow:
                     prepare(tree, goal, trial)
             until = min(int(counts[trees.EXPANSIONS]) + SLICE, restart_at, limits.expansions)
