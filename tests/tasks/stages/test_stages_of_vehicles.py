@@ -115,7 +115,7 @@ def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, 
 
 def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
     settings = AssistantSettings(PLANNER, "open", 3, str(run.path), 1, "car")
-    with pytest.raises(StorageError, match="made for vehicle car-1-trailer, expected car; ask for --vehicle"):
+    with pytest.raises(StorageError, match="made for vehicle car-1-trailer, expected car"):
         solve_many(settings, problems, tmp_path / "rows.parquet", None)
 
 

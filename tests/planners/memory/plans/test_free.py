@@ -11,7 +11,7 @@ from planners.memory.plans.free import ends_of, first_fitting, first_fitting_dra
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of
-from planners.world.problem import BOUNDS
+from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START
 from planners.world.randomness import generator
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -20,7 +20,10 @@ SEEDS = st.integers(0, 2**32 - 1)
 def answers(experiences, problem):
     """Which of the experiences' plans answer a problem: from the drawing, and from the scene."""
     sweeps = sweep_plans([each.plan for each in experiences])
-    masks, drawing, scene = masks_of(sweeps), drawing_of(problem), scene_of(problem)
+    asked = dataclasses.replace(
+        problem, start=CANONICAL_START, goal=CANONICAL_GOAL
+    )  # its window is the masks'
+    masks, drawing, scene = masks_of(sweeps), drawing_of(window), scene_of(problem)
     ends = ends_of(problem)
     one_by_one = [np.array([i], np.int32) for i in range(len(experiences))]
     drawn = [first_fitting_drawn(each, sweeps, masks, drawing, problem)[0] >= 0 for each in one_by_one]
