@@ -20,9 +20,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def answers(experiences, problem):
     """Which of the experiences' plans answer a problem: from the drawing, and from the scene."""
     sweeps = sweep_plans([each.plan for each in experiences])
-    asked = dataclasses.replace(
-        problem, start=CANONICAL_START, goal=CANONICAL_GOAL
-    )  # its window is the masks'
+    window = dataclasses.replace(problem, start=CANONICAL_START, goal=CANONICAL_GOAL)  # that of the masks
     masks, drawing, scene = masks_of(sweeps), drawing_of(window), scene_of(problem)
     ends = ends_of(problem)
     one_by_one = [np.array([i], np.int32) for i in range(len(experiences))]
