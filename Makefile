@@ -50,6 +50,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
-	$(PIP) install -c constraints.txt $(TORCH)
-	$(PIP) install -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
+	$(PIP) install --no-compile -c constraints.txt $(TORCH)
+	$(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
+	$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # on all cores, as pip takes one; some files are of other Pythons
 	touch $(READY)

@@ -10,14 +10,10 @@ from hypothesis import HealthCheck, settings
 
 np.seterr(all="raise", under="ignore")
 # no times: compiling a kernel takes seconds, and the machine may be busy
-settings.register_profile(
-    "strict",
-    deadline=None,
-    derandomize=True,
-    max_examples=50,
-    suppress_health_check=[HealthCheck.too_slow],
-)
-settings.load_profile("strict")
+_STRICT = settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("strict", _STRICT, max_examples=25)
+settings.register_profile("thorough", _STRICT, max_examples=500)  # HYPOTHESIS_PROFILE=thorough make test
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "strict"))
 
 TESTS: Final = Path(__file__).parent
 LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/studies/code.md)

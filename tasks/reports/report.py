@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from textwrap import fill
 from typing import Final, NamedTuple
 
 import pandas as pd
@@ -15,7 +16,7 @@ from dashboards.figures.bars import ablation, controls, planning_times, time_spl
 from dashboards.figures.planning_curves import continual_improvement, performance_profile, solved_against_time
 from dashboards.figures.recall_curves import retrieval_curves
 from dashboards.figures.style import save
-from dashboards.report.findings import findings_markdown
+from dashboards.report.findings import findings, findings_markdown
 from dashboards.report.tables import (
     as_csv,
     claims_markdown,
@@ -60,6 +61,7 @@ MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared b
 ALIKE: Final = ("classes", "worlds", "difficulty", "seed", "vehicle")  # of runs by the two methods
 MEASURED_ON: Final = ["problem_class", "planner"]
 
+LINE: Final = 110  # characters
 _LOG = logging.getLogger(__name__)
 
 
@@ -214,11 +216,13 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
 
 
 def log_tables(report: Report, run: RunFolder) -> None:
-    """Log the tables of a report, and how long each stage took."""
+    """Log the tables of a report, how long each stage took, and last what was found, in words."""
     for table in summary_tables(report.summary):
         _LOG.info(table)
     log_retrieval(report.retrieval)
     _LOG.info(stages_table(stage_cells(stages_of(run))))
+    for found in findings(report.summary):
+        _LOG.info(f"{fill(f'{found.panel}: {found.text}', LINE)}\n")
 
 
 def log_retrieval(retrieval: pd.DataFrame) -> None:

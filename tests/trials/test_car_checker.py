@@ -72,7 +72,7 @@ def test_what_the_body_sweeps_between_two_states_is_checked(seed: int) -> None:
     assert "collision" in wrong_with(problem_with(obstacles_of([[splinter]]), WIDE), plan)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seeds)
 def test_what_the_authority_calls_free_shapely_calls_free(seed: int) -> None:
     rng = np.random.default_rng(seed)

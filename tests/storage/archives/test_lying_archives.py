@@ -24,7 +24,7 @@ from tests.storage.samples import WEIGHTS, a_memory
 many = settings(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-    max_examples=60,
+    max_examples=30,
 )
 
 

@@ -25,7 +25,7 @@ each_vehicle = pytest.mark.parametrize("vehicle", KINDS.values(), ids=KINDS)
 
 
 @each_vehicle
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_a_step_follows_the_differential_equations(vehicle: Vehicle, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -76,7 +76,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_time_step(vehicle: Vehicle
 
 
 @each_vehicle
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(seed=seeds)
 def test_between_two_states_no_body_point_leaves_the_arc_by_more_than_the_bend(
     vehicle: Vehicle, seed: int

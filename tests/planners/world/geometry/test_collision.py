@@ -122,7 +122,7 @@ def test_kernel_and_fcl_agree_on_a_million_footprints_near_obstacles() -> None:
         assert_agreement(random_pairs(rng, 50_000))
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(seeds)
 def test_a_box_meets_a_piece_exactly_where_shapely_says_so(seed: int) -> None:
     pairs = random_pairs(np.random.default_rng(seed), 50, 5)
@@ -135,7 +135,7 @@ def test_a_box_meets_a_piece_exactly_where_shapely_says_so(seed: int) -> None:
         assert meets or not shrunk.intersects(polygon)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(seeds)
 def test_a_box_is_free_exactly_where_shapely_says_so(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -160,7 +160,7 @@ def test_a_box_is_free_exactly_where_shapely_says_so(seed: int) -> None:
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(seed=seeds)
 def test_what_a_step_sweeps_between_two_free_states_is_free(vehicle: Vehicle, seed: int) -> None:
     """A splinter 1 mm wide, planted anywhere that a body passes, is seen from one of the states."""

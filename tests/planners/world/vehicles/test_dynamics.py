@@ -27,7 +27,7 @@ each_vehicle = pytest.mark.parametrize("vehicle", KINDS.values(), ids=KINDS)
 
 
 @each_vehicle
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_a_step_follows_the_differential_equations(vehicle: Vehicle, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -65,7 +65,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_time_step(vehicle: Vehicle
 
 
 @each_vehicle
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_the_margin_bounds_half_the_way_of_every_point_of_each_body(vehicle: Vehicle, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -81,7 +81,7 @@ def test_the_margin_bounds_half_the_way_of_every_point_of_each_body(vehicle: Veh
 
 
 @each_vehicle
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_swept_bodies_lie_around_the_footprints(vehicle: Vehicle, seed: int) -> None:
     state = random_state(np.random.default_rng(seed), vehicle)
@@ -97,7 +97,7 @@ def test_swept_bodies_lie_around_the_footprints(vehicle: Vehicle, seed: int) -> 
 
 
 @each_vehicle
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=seeds)
 def test_admissible_controls_lead_past_no_limit_and_are_otherwise_as_asked(
     vehicle: Vehicle, seed: int
