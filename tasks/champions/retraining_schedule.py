@@ -11,6 +11,7 @@ import logging
 import signal
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -67,7 +68,7 @@ def serve(
     with locked_folder(data) as folder:  # raises if it is in use; each retraining locks it again
         data_path = folder.path
     parameters = {
-        "settings": json.loads(settings.to_json()),
+        "settings": as_parameter(settings),
         "data": str(data_path),
         "approve": approve,
         "workers": workers,
@@ -91,6 +92,12 @@ def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
     if flow_run.deployment_id is not None:
         reason = " ".join(str(state.message).split())
         _LOG.error("motion-memory: %s", reason.partition("exception: ")[2] or reason)
+
+
+def as_parameter(settings: RunSettings) -> dict[str, Any]:
+    """Settings as Prefect keeps them: plain JSON of their fields, without the version that files have."""
+    values: dict[str, Any] = json.loads(json.dumps(asdict(settings)))
+    return values
 
 
 def _schedule(every: float | None, cron: str | None) -> dict[str, Any]:

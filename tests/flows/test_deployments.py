@@ -18,6 +18,7 @@ from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from tasks.champions.drift_watch import DRIFT
+from tasks.champions.retraining_schedule import as_parameter
 from tasks.settings.presets import PRESETS, for_preset
 from tasks.settings.run_settings import CONTINUAL, Objective, RunSettings
 
@@ -109,3 +110,9 @@ def test_retraining_is_alone_and_follows_a_drift(deployed: list[dict[str, Any]])
     assert retraining["concurrency_limit"]["limit"] == 1
     assert [each["expect"] for each in retraining["triggers"]] == [[DRIFT]]
     assert all("motion-memory" in each["tags"] for each in deployed)
+
+
+def test_what_a_schedule_keeps_is_accepted_by_the_flow_and_the_same_settings() -> None:
+    settings = for_preset("smoke", classes=["trap"], experiences=4)
+    given = {"settings": as_parameter(settings), "data": "data", "approve": True}
+    assert deployments.retrain_flow.validate_parameters(given)["settings"] == settings
