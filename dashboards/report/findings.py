@@ -11,12 +11,7 @@ import pandas as pd
 from dashboards.cells import planner_title
 from dashboards.statistics.panels import COMBINED
 
-_PREFERRED: Final = (
-    "repair",
-    "open",
-    "closed",
-    "published-open",
-)  # a memory is used the first way that is there
+_PREFERRED: Final = ("repair", "open", "closed", "published-open")  # the first that was measured counts
 Row = Mapping[Any, Any]  # of a summary
 _EQUAL: Final = 1.05  # times faster or slower: less is called the same
 

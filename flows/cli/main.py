@@ -32,7 +32,7 @@ GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and to end the 
 
 
 def package_version() -> str:
-    """The version of Motion Memory and of what it stands on, for who reports a fault."""
+    """What a report of a fault should name: the versions of Motion Memory, Python and the main libraries."""
     import platform
     from importlib.metadata import version
 

@@ -47,7 +47,7 @@ def format_of(path: Path) -> str:
 
 
 def check_problem_fields(fields: Sequence[object]) -> None:
-    """Raise ValueError if one of ``fields`` is none of a problem's, or occurs twice."""
+    """Raise ValueError if a problem has no field of one of these names, or if one occurs twice."""
     if "moving" in fields:
         raise ValueError("has the field 'moving', but obstacles that move are not supported; leave it out")
     check_fields(fields, FIELDS)

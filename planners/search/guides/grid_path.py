@@ -175,9 +175,9 @@ def grid_path(
 
 
 @lean
-def _metres(path: Floats, count: int) -> float:
+def _metres(path: Floats) -> float:
     metres = 0.0
-    for i in range(1, count):
+    for i in range(1, path.shape[0]):
         metres += length(path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1])
     return metres
 
@@ -194,6 +194,5 @@ def grid_metres(
 
     The arguments are those of ``grid_path``.
     """
-    flood = (workspace or Workspace()).buffers(allocate_flood)
-    count = flood_from_goal(occupied, start[0], start[1], goal[0], goal[1], radius, window, flood)
-    return float(_metres(flood.path, count)) if count else math.inf
+    path = grid_path(occupied, start, goal, radius, workspace, window)
+    return math.inf if path is None else float(_metres(path))

@@ -10,13 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from planners.memory.build_memory import build_memory
-from planners.memory.encoder.encoder import Architecture, Encoder, initial_weights, to_onnx
-from planners.memory.encoder.training import TrainedEncoder, TrainingSettings
-from planners.memory.plans.cell_masks import rank_by_cells, rank_to_try
+from planners.memory.plans.cell_masks import rank_by_cells
 from planners.memory.plans.free import ends_of, first_fitting, free_plans
-from planners.memory.ranking.readout import centroids_of, nearest_readout
-from planners.memory.ranking.scores import best_plans
 from planners.memory.recall import (
     LIKELY_CELLS,
     MOST_EXHAUSTIVE,
@@ -32,59 +27,14 @@ from planners.world.geometry.occupancy import bits_of, occupancy_of
 from planners.world.problem import CANONICAL_GOAL
 from planners.world.randomness import generator
 from planners.world.view import View
-from planners.world.workspace import Workspace
+from tests.planners.memory.untrained import PLANS, untrained_memory
 
-PLANS = 8
 SEEDS = st.integers(0, 2**32 - 1)
-ARCHITECTURE = Architecture(channels=(2, 2), hidden=(), dimensions=6)
-
-
-def problems(seed=0):
-    rng = generator(seed, "recall")
-    plan_index = np.repeat(np.arange(-1, PLANS), 3).astype(np.int32)
-    density = rng.uniform(0.05, 0.5, (len(plan_index), 1))
-    return np.packbits(rng.random((len(plan_index), 4096)) < density, axis=1), plan_index
 
 
 @pytest.fixture(scope="module")
 def memory(experiences):
-    weights = initial_weights(ARCHITECTURE, generator(0, "weights"))
-    bits, plan_index = problems()
-    embeddings = Encoder(to_onnx(weights))(np.unpackbits(bits, axis=1).reshape(-1, 64, 64))
-    centroids, scatter = centroids_of(embeddings, plan_index + 1, PLANS + 1)
-    trained = TrainedEncoder(
-        TrainingSettings(objective="triplet", architecture=ARCHITECTURE),
-        weights,
-        centroids,
-        *nearest_readout(centroids, scatter),
-        np.zeros(PLANS, np.float32),
-        (),
-        np.empty(0, np.int32),
-    )
-    return build_memory(trained, [e.plan for e in experiences], "boxes")
-
-
-def test_centroids_are_the_mean_embeddings(memory):
-    bits, plan_index = problems()
-    grids = np.unpackbits(bits, axis=1).reshape(-1, 64, 64)
-    for row in range(PLANS + 1):
-        expected = memory.encoder(grids[plan_index == row - 1]).mean(0)
-        np.testing.assert_allclose(memory.centroids[row], expected, atol=1e-6)
-
-
-@given(seed=SEEDS, k=st.integers(1, 12))
-def test_ranking_by_centroids_is_ranking_by_euclidean_distance(memory, seed, k):
-    embedding = memory.encoder(np.unpackbits(problems(seed)[0][seed % 27]).reshape(64, 64))
-    distances = cdist(embedding[np.newaxis], memory.centroids)[0]
-    recalled = best_plans(memory.vectors @ embedding + memory.biases, k)
-    bits, plan_index = problems()
-    embeddings = memory.encoder(np.unpackbits(bits, axis=1).reshape(-1, 64, 64))
-    scatter = (np.linalg.norm(embeddings - memory.centroids[plan_index + 1], axis=1) ** 2).mean()
-    if distances[0] ** 2 + 2 * scatter < distances[1:].min() ** 2:
-        assert len(recalled) == 0
-    else:
-        assert len(recalled) == min(k, PLANS)
-        np.testing.assert_allclose(distances[1:][recalled], np.sort(distances[1:])[:k], rtol=1e-4, atol=1e-5)
+    return untrained_memory(experiences)
 
 
 @pytest.fixture(scope="module")
@@ -169,28 +119,6 @@ def test_exhaustive_finds_a_free_plan_if_one_with_few_blocked_cells_is_free(
     found = recalled_by(memory, problem, "exhaustive", k).free
     assert found >= 0 or not likely_in(memory, problem).any()
     assert found < 0 or free_in(memory, problem)[found]
-
-
-@given(
-    seed=SEEDS,
-    plans=st.integers(1, 40),
-    likely=st.integers(0, 20),
-    possible=st.integers(0, 20),
-)
-def test_likely_plans_are_tried_by_driving_time_and_then_some_possible_ones_by_cells(
-    seed, plans, likely, possible
-):
-    rng = generator(seed, "tries")
-    possible += likely
-    masks = rng.integers(0, 2**64, (plans, 64), np.uint64) & rng.integers(0, 2**64, (plans, 64), np.uint64)
-    occupied = np.where(rng.random(64) < 0.05, rng.integers(0, 2**64, 64, np.uint64), np.uint64(0))
-    by_time = rng.permutation(plans).astype(np.int32)
-    ranking, tries = rank_to_try(masks, occupied, by_time, likely, possible, Workspace())
-    cells = np.bitwise_count(masks & occupied).sum(1)
-    np.testing.assert_array_equal(ranking.cells, cells)
-    first = [i for i in by_time if cells[i] <= likely]
-    others = [i for i in np.argsort(cells, kind="stable") if likely < cells[i] <= possible]
-    assert tries.tolist() == first + others[: 2 * len(first)]
 
 
 @given(seed=SEEDS, k=st.integers(1, 12), first=st.integers(1, 7), count=st.integers(0, 12))
@@ -300,22 +228,6 @@ def test_the_default_is_exhaustive_until_there_are_too_many_plans(memory):
         biases=np.zeros(MOST_EXHAUSTIVE + 2, np.float32),
     )
     assert default_recall(many) == "hybrid"
-
-
-def test_without_no_plan_problems_row_0_never_wins(memory):
-    bits, plan_index = problems()
-    embeddings = memory.encoder(np.unpackbits(bits, axis=1).reshape(-1, 64, 64))
-    rows = np.where(plan_index < 0, -1, plan_index + 1)
-    centroids, scatter = centroids_of(embeddings, rows, PLANS + 1)
-    vectors, biases = nearest_readout(centroids, scatter)
-    bare = dataclasses.replace(memory, centroids=centroids, vectors=vectors, biases=biases)
-    scores = bare.vectors @ np.ones(6, np.float32) + bare.biases
-    assert scores.argmax() > 0
-
-
-def test_rows_that_do_not_fit_the_plans_are_refused(memory):
-    with pytest.raises(ValueError, match="8 rows of biases; 8 plans need 9"):
-        dataclasses.replace(memory, biases=memory.biases[1:])
 
 
 @pytest.mark.parametrize(("strategy", "k"), [("mask", 0), ("encoder", -1), ("guess", 1)])

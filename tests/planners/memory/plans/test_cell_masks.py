@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.memory.plans.cell_masks import MOST_CELLS, masks_of, rank_by_cells
+from planners.memory.plans.cell_masks import MOST_CELLS, masks_of, rank_by_cells, rank_to_try
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.collision import scene_of
@@ -15,6 +15,7 @@ from planners.world.geometry.occupancy import bits_of, grid_of, occupancy_of
 from planners.world.problem import Plan
 from planners.world.randomness import generator
 from planners.world.vehicles.bodies import swept_boxes
+from planners.world.workspace import Workspace
 from tests.worlds import strewn
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -81,3 +82,25 @@ def test_a_plan_that_leaves_the_window_is_never_taken_for_free():
     outside = Plan(np.tile([60.0, 60.0, 0.0, 0.0, 0.0], (3, 1)), np.zeros((2, 2)))
     ranking = rank_by_cells(masks_of(sweep_plans([outside])), np.zeros(64, np.uint64))
     assert ranking.cells.tolist() == [MOST_CELLS]
+
+
+@given(
+    seed=SEEDS,
+    plans=st.integers(1, 40),
+    likely=st.integers(0, 20),
+    possible=st.integers(0, 20),
+)
+def test_likely_plans_are_tried_by_driving_time_and_then_some_possible_ones_by_cells(
+    seed, plans, likely, possible
+):
+    rng = generator(seed, "tries")
+    possible += likely
+    masks = rng.integers(0, 2**64, (plans, 64), np.uint64) & rng.integers(0, 2**64, (plans, 64), np.uint64)
+    occupied = np.where(rng.random(64) < 0.05, rng.integers(0, 2**64, 64, np.uint64), np.uint64(0))
+    by_time = rng.permutation(plans).astype(np.int32)
+    ranking, tries = rank_to_try(masks, occupied, by_time, likely, possible, Workspace())
+    cells = np.bitwise_count(masks & occupied).sum(1)
+    np.testing.assert_array_equal(ranking.cells, cells)
+    first = [i for i in by_time if cells[i] <= likely]
+    others = [i for i in np.argsort(cells, kind="stable") if likely < cells[i] <= possible]
+    assert tries.tolist() == first + others[: 2 * len(first)]
