@@ -1,53 +1,141 @@
-"""A memory to plan with: what ``motion_memory.load`` returns."""
+"""A memory to plan with, for a robot's own process too: it needs no Prefect, MLflow, pandas or torch.
+
+Everything is loaded, checked and compiled before ``load`` returns.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
+import numpy as np
+
+from planners.memory.memory import Memory as StoredMemory
 from planners.memory.ranked_plans import RankedPlan, ranked_plans
-from planners.world.alignment import scaled
+from planners.memory.recall import RECALLS, default_recall
+from planners.search.registry import PLANNERS
+from planners.solve import ASSISTS, solve
+from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
-from planners.world.problem import Plan, Problem
+from planners.world.checked_problem import checked_problem
+from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
-from tasks.requests.robot import Answer, RobotPlanner, load_planner
+from planners.world.workspace import Workspace
+from storage.archives.memories import load_memory
+from storage.errors import StorageError
+from storage.exchange.problems import problem_of
+from storage.fields import parse_json
+from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
+from tasks.attempts.compile_assists import compile_assists
+from tasks.attempts.judged_attempts import check_attempt
+from tasks.registry.memory_at import memory_at
+from tasks.settings.checks import check_known, checked_vehicle
+from tasks.settings.errors import RunError, UsageError
 
 
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The result of planning for one problem."""
+
+    problem_id: str
+    status: str  # "solved", or how planning failed (planners.search.outcome.Status)
+    source: str | None  # "recalled", "repaired" or "searched"; None when not solved
+    plan: Plan | None  # in the frame and units of the given problem; None when not solved
+    planning_seconds: float  # from convex pieces in the canonical frame to the plan
+    call_seconds: (
+        float  # of the whole call, reading and checking the problem included, but not judging the plan
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Memory:
     """Stored plans, and a planner that they help. Several threads may use it at the same time."""
 
-    def __init__(self, planner: RobotPlanner) -> None:
-        """Use ``load`` instead."""
-        self._planner = planner
-        self.plan_arrays = planner.plan_arrays
+    stored: StoredMemory
+    planner: str
+    assist: str
+    top_k: int
+    strategy: str  # of recall
+    seed: int
+    judged: bool
+    _idle: list[Workspace] = field(default_factory=list)  # not lent to a thread
 
     def __len__(self) -> int:
         """Count the stored plans."""
-        return len(self._planner.memory.plans)
+        return len(self.stored.plans)
 
     def __repr__(self) -> str:
         """Say what the memory holds, and how it plans."""
-        memory, planner = self._planner.memory, self._planner
-        return f"<Memory of {memory.class_name}: {len(self)} plans, {planner.planner}, {planner.assist}>"
+        return f"<Memory of {self.stored.class_name}: {len(self)} plans, {self.planner}, {self.assist}>"
 
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle that the plans are for."""
-        return self._planner.memory.vehicle
+        return self.stored.vehicle
 
     def plan(self, problem: Problem | Mapping[str, Any] | str) -> Answer:
         """Plan for one problem; if there is no plan, the answer says so.
 
         Args:
-            problem: as an object in the exchange format (docs/problem-files.md), as JSON text, or as a
-                ``Problem``, which is not checked again.
+            problem: a ``Problem``, which is not checked again, or a problem in the exchange format
+                (docs/problem-files.md) as a mapping or JSON text.
 
         Raises:
-            ValueError: The problem is malformed or impossible.
-            PlanFaultError: The independent judge refuses the plan.
+            ValueError: the problem is malformed or impossible, or the memory is not made for its scale.
+            PlanFaultError: the independent judge refuses the plan.
         """
-        return self._planner.plan(problem)
+        began = perf_counter()
+        return self._planned(self._read(problem), began)
+
+    def plan_arrays(
+        self,
+        start: Pose,
+        goal: Point,
+        points: Floats,
+        polygon_starts: Indices | Integers,
+        goal_radius: float = GOAL_RADIUS,
+        bounds: Bounds = BOUNDS,
+        scale: float | None = None,
+        start_motion: tuple[float, ...] = (),
+        arrival: Arrival | None = None,
+    ) -> Answer:
+        """Plan for a problem that is in arrays already; otherwise like ``plan``.
+
+        Args:
+            start: x, y in metres, heading in radians.
+            goal: x, y in metres.
+            points: ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after
+                another.
+            polygon_starts: ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i +
+                1]]``.
+            goal_radius: metres: how far from the goal the plan may end.
+            bounds: x_min, y_min, x_max, y_max in metres.
+            scale: Metres of these lengths in one metre of the memory's problems; None: as many as of its
+                vehicle.
+            start_motion: the vehicle's state at the start behind the pose: speed (m/s), then steering angle
+                (rad) or turn rate (rad/s), then hitch angles (rad). What is missing is 0.
+            arrival: what is asked at the goal besides the place: heading, speeds, hitch angles, with
+                tolerances.
+
+        Raises:
+            ValueError: a polygon is none, or the problem is impossible.
+            PlanFaultError: the independent judge refuses the plan.
+        """
+        began = perf_counter()
+        problem = checked_problem(
+            *(start, goal, goal_radius, bounds, points, polygon_starts),
+            vehicle=self.vehicle,
+            scale=scale_for_vehicle(scale, self.vehicle),
+            start_motion=start_motion,
+            arrival=arrival,
+        )
+        return self._planned(problem, began)
 
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
         """Look up the stored plans that the encoder ranks best for a problem, without any search.
@@ -61,7 +149,7 @@ class Memory:
         """
         if k < 1:
             raise ValueError(f"k is {k}: give 1 or more")
-        return ranked_plans(self._planner.memory, self._planner.problem(problem), k)
+        return ranked_plans(self.stored, self._read(problem), k)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
         """Judge a plan by code that shares nothing with the planners: simulate it again, sweep it with FCL.
@@ -76,8 +164,48 @@ class Memory:
         Raises:
             ValueError: The problem is malformed or impossible.
         """
-        read = self._planner.problem(problem)
+        read = self._read(problem)
         return faults(read, scaled(plan, 1.0 / read.scale), self.vehicle)
+
+    def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
+        """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
+        if isinstance(given, str):
+            given = _parsed(given)
+        return given if isinstance(given, Problem) else problem_of(given, "problem", self.vehicle)
+
+    def _planned(self, problem: Problem, began: float) -> Answer:
+        canonical, alignment = to_canonical(problem)
+        with self._workspace() as workspace:
+            attempt = solve(
+                *(canonical, self.planner, self.assist, self.top_k, self.stored, self.seed),
+                vehicle=self.vehicle,
+                strategy=self.strategy,
+                workspace=workspace,
+            )
+        plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
+        spent = (attempt.planning_seconds, perf_counter() - began)
+        if self.judged:
+            check_attempt(canonical, attempt, set(), self.vehicle)
+        return Answer(problem.id, attempt.status, attempt.source, plan, *spent)
+
+    @contextmanager
+    def _workspace(self) -> Iterator[Workspace]:
+        """Lend a workspace to the calling thread: an idle one, or a new one."""
+        try:
+            workspace = self._idle.pop()
+        except IndexError:
+            workspace = Workspace()
+        try:
+            yield workspace
+        finally:
+            self._idle.append(workspace)
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return parse_json(text, "the problem")
+    except StorageError as error:
+        raise ValueError(str(error)) from None
 
 
 def load(
@@ -107,17 +235,34 @@ def load(
     Raises:
         UsageError: A name is unknown, or ``top_k`` is below 1.
         StorageError: The memory is missing, damaged, or made for another vehicle.
-        RunError: MLflow does not have the memory, or the run has several.
+        RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
+            missing.
     """
-    return Memory(
-        load_planner(
-            memory,
-            vehicle=vehicle,
-            planner=planner,
-            assist=assist,
-            top_k=top_k,
-            recall=recall,
-            seed=seed,
-            judged=judged,
+    vehicle = checked_vehicle(vehicle)
+    check_known("planner", [planner], PLANNERS)
+    check_known("assist", [assist], ASSISTS)
+    check_known("recall", [] if recall is None else [recall], RECALLS)
+    if top_k < 1:
+        raise UsageError(f"Top k is {top_k}: give 1 or more.")
+    with memory_at(str(memory)) as folder:
+        archive = load_memory(folder, said_vehicle(vehicle))  # mapped files outlive their names
+    strategy = recall or default_recall(archive)
+    compile_assists(archive.vehicle, planner, [strategy])
+    try:
+        archive.forward  # noqa: B018  made when it is first used
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
+            "pip install 'motion-memory[pipeline]'."
+        ) from None
+    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged)
+    scale = archive.scales[0]
+    away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
+    bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
+    for arrival in (None, Arrival(0.5 * math.pi, 0.1)):  # a place, then a pose
+        ready.plan_arrays(
+            *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),
+            *(scale * GOAL_RADIUS, bounds, scale),
+            arrival=arrival,
         )
-    )
+    return ready

@@ -8,9 +8,8 @@ from typing import Any
 
 from prefect import task
 
-from motion_memory.memory import Memory, load
+from motion_memory.memory import Answer, Memory, load
 from planners.world.problem import Problem
-from tasks.requests.robot import Answer
 
 
 @functools.cache

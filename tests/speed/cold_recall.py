@@ -27,6 +27,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
+import motion_memory
 from planners.memory.memory import Memory
 from planners.memory.recall import default_recall
 from planners.solve import solve
@@ -35,7 +36,6 @@ from planners.world.problem import Problem, obstacles_of
 from planners.world.workspace import Workspace
 from storage.exchange.problems import fields_of
 from tasks.attempts.timing import OtherWork, no_garbage_collection
-from tasks.requests.robot import Answer, RobotPlanner
 from tests.speed.assists import memory_of
 
 MEASURING: Final = 88
@@ -79,7 +79,7 @@ def moved(problem: Problem) -> Problem:
     )
 
 
-def from_arrays(planner: RobotPlanner, problem: Problem) -> Answer:
+def from_arrays(planner: motion_memory.Memory, problem: Problem) -> motion_memory.Answer:
     """The robot's call for the polygons of a problem."""
     vertices, polygon_starts, _ = problem.obstacles
     return planner.plan_arrays(
@@ -118,7 +118,7 @@ def report_solve(table: Table, name: str, memory: Memory, problems: Sequence[Pro
 
 def report_robot(table: Table, name: str, memory: Memory, problems: Sequence[Problem]) -> None:
     """Add a row for each way to hand in a problem."""
-    planner = RobotPlanner(memory, "gust", "repair", 5, default_recall(memory), 1, judged=False)
+    planner = motion_memory.Memory(memory, "gust", "repair", 5, default_recall(memory), 1, judged=False)
 
     def calls(some: Sequence[Problem]) -> dict[str, list[Callable[[], Any]]]:
         texts = [json.dumps(fields_of(each)) for each in some]

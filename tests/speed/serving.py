@@ -30,10 +30,10 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from motion_memory import load
 from planners.world.classes.problem_classes import problem_class
 from storage.archives.memories import save_memory
 from storage.exchange.problems import fields_of
-from tasks.requests.robot import load_planner
 from tests.speed.assists import memory_of
 from tests.tasks.served import JSON, malformed, request
 
@@ -158,7 +158,7 @@ def _nonsense(address: str, process: psutil.Popen, requests: int) -> tuple[list[
 
 
 def _robot(memory: Path, problems: list[dict[str, object]], judged: bool) -> list[float]:
-    planner = load_planner(memory, judged=judged)
+    planner = load(memory, judged=judged)
     texts = [json.dumps(problem) for problem in problems]
     gc.collect()
     gc.disable()

@@ -14,6 +14,8 @@ from threading import Thread
 import numpy as np
 import pytest
 
+from motion_memory import Answer, Memory, load
+from planners.search.connection.pose_table import seconds_to_pose
 from planners.world.authority.authority import faults
 from planners.world.problem import BOUNDS, Arrival, obstacles_of
 from planners.world.vehicles.vehicle import CAR
@@ -21,12 +23,11 @@ from storage.archives.memories import load_memory, save_memory
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of
 from tasks.requests.assistant import Assistant, AssistantSettings
-from tasks.requests.robot import Answer, RobotPlanner, load_planner
 from tasks.settings.errors import RunError, UsageError
 from tests.storage.samples import box
 from tests.tasks.served import problem, write_memory
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 COUNT = 8
 
 
@@ -36,11 +37,11 @@ def memory(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def planner(memory: Path) -> RobotPlanner:
-    return load_planner(memory)
+def planner(memory: Path) -> Memory:
+    return load(memory)
 
 
-def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> None:
+def test_it_answers_as_the_command_does(planner: Memory, memory: Path) -> None:
     assistant = Assistant(AssistantSettings("lattice", "repair", 5, str(memory), 1))
     for i in range(COUNT):
         attempt, plan = assistant(problem(i))
@@ -60,7 +61,7 @@ def test_it_answers_as_the_command_does(planner: RobotPlanner, memory: Path) -> 
         assert faults(problem(i), answer.plan, CAR) == []
 
 
-def test_any_question_may_be_asked_in_arrays_and_in_json(planner: RobotPlanner) -> None:
+def test_any_question_may_be_asked_in_arrays_and_in_json(planner: Memory) -> None:
     nothing, none = np.empty((0, 2)), np.zeros(1, np.int64)
     arrival = Arrival(0.5, 1.5, 0.0, 3.0)
     answer = planner.plan_arrays(
@@ -85,7 +86,17 @@ def same(one: Answer, other: Answer) -> bool:
     return np.array_equal(one.plan.states, other.plan.states) and one.problem_id == other.problem_id
 
 
-def test_no_plan_is_an_answer(planner: RobotPlanner) -> None:
+def test_what_a_goal_pose_needs_is_made_before_the_first_is_asked_for(memory: Path) -> None:
+    seconds_to_pose.cache_clear()
+    planner = load(memory)
+    made = seconds_to_pose.cache_info().misses
+    assert made > 0
+    pose = {"goal": [50.0, 50.0, 0.8], "goal_radius": None, "goal_tolerance": [0.5, 0.2]}
+    assert planner.plan(fields_of(problem(0)) | pose).plan is not None
+    assert seconds_to_pose.cache_info().misses == made
+
+
+def test_no_plan_is_an_answer(planner: Memory) -> None:
     walls = [box(48.0, y, 1.0) for y in np.arange(42.0, 58.0)] + [
         box(x, 43.0, 1.0) for x in np.arange(48, 58)
     ]
@@ -97,14 +108,14 @@ def test_no_plan_is_an_answer(planner: RobotPlanner) -> None:
 
 
 @pytest.mark.parametrize("bad", ["{", "[]", {}, 7, {"start": [float("nan")] * 3}, "[" * 100_000])
-def test_a_malformed_problem_is_one_line(planner: RobotPlanner, bad: object) -> None:
+def test_a_malformed_problem_is_one_line(planner: Memory, bad: object) -> None:
     with pytest.raises(ValueError, match=r".+") as error:
         planner.plan(bad)  # type: ignore[arg-type]
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("as_text", [False, True])
-def test_a_field_that_is_not_understood_is_refused(planner: RobotPlanner, as_text: bool) -> None:
+def test_a_field_that_is_not_understood_is_refused(planner: Memory, as_text: bool) -> None:
     for name, told in (
         ("obstacels", "'obstacles'"),
         ("start_sped", "'start_speed'"),
@@ -117,7 +128,7 @@ def test_a_field_that_is_not_understood_is_refused(planner: RobotPlanner, as_tex
         planner.plan(json.dumps(fields_of(problem(0)))[:-1] + ', "obstacles": []}')
 
 
-def test_threads_do_not_disturb_each_other(planner: RobotPlanner) -> None:
+def test_threads_do_not_disturb_each_other(planner: Memory) -> None:
     alone = [planner.plan(problem(i)) for i in range(COUNT)]
     wrong: list[int] = []
 
@@ -134,17 +145,17 @@ def test_threads_do_not_disturb_each_other(planner: RobotPlanner) -> None:
 
 def test_it_is_refused_what_it_is_not_for(memory: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="Unknown planner 'prm'"):
-        load_planner(memory, planner="prm")
+        load(memory, planner="prm")
     with pytest.raises(StorageError, match="made for vehicle car, expected car-1-trailer"):
-        load_planner(memory, vehicle="car-1-trailer")
+        load(memory, vehicle="car-1-trailer")
     with pytest.raises(StorageError, match="holds no memory"):
-        load_planner(tmp_path)
+        load(tmp_path)
     for name in ("curves", "trap"):
         save_memory(tmp_path / "memories" / name, load_memory(memory))
     with pytest.raises(RunError, match=r"several memories; name one of its folders: curves, trap"):
-        load_planner(tmp_path)
+        load(tmp_path)
     save_memory(tmp_path / "memories" / "combined", load_memory(memory))
-    assert len(load_planner(tmp_path).memory.plans) == len(load_memory(memory).plans)
+    assert len(load(tmp_path).stored.plans) == len(load_memory(memory).plans)
 
 
 def test_the_example_of_the_page_runs_without_what_a_robot_has_not(memory: Path, tmp_path: Path) -> None:
