@@ -59,6 +59,7 @@ def to_canonical(problem: Problem) -> tuple[Problem, Alignment]:
         bounds=bounds,
         obstacles=obstacles,
         arrival=_turned_arrival(problem.arrival, alignment.turn),
+        offset=(0.0, 0.0),
     )
     return moved, alignment
 
@@ -177,6 +178,15 @@ def scaled(plan: Plan, scale: float) -> Plan:
     states[:, [0, 1, 3]] *= scale  # x, y and speed of every vehicle; the others are angles
     controls[:, 0] *= scale  # acceleration
     return Plan(states, controls, plan.dt)
+
+
+def shifted(plan: Plan, offset: Point) -> Plan:
+    """Add ``offset``, x and y in metres, to where a plan leads."""
+    if offset == (0.0, 0.0):
+        return plan
+    states = plan.states.copy()
+    states[:, :2] += offset
+    return Plan(states, plan.controls, plan.dt)
 
 
 def _groups(problem: Problem) -> list[list[Floats]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
@@ -9,6 +11,9 @@ from planners.world.geometry.polygons import cut_polygons
 from planners.world.problem import Arrival, Problem
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
+
+FAR_M: Final = 1_000.0  # from here on frames are moved to the start: obstacles are kept in float32
+FARTHEST_M: Final = 1e10  # up to here float64 is exact to a micrometre, as plans are
 
 
 def checked_problem(
@@ -29,6 +34,9 @@ def checked_problem(
 ) -> Problem:
     """Make a problem in any frame, with obstacles of polygons that lie end to end in one array.
 
+    If the start lies far from the origin, whole metres are taken off all coordinates before anything is
+    rounded; the problem's ``offset`` says how many.
+
     Args:
         start: x, y in metres, heading in radians.
         goal: x, y in metres.
@@ -48,6 +56,13 @@ def checked_problem(
     Raises:
         ValueError: A polygon is none, or the problem makes no sense (``problem_fault``).
     """
+    if FAR_M < max(abs(start[0]), abs(start[1])) <= FARTHEST_M:
+        x, y = offset = (float(round(start[0])), float(round(start[1])))
+        start, goal = (start[0] - x, start[1] - y, start[2]), (goal[0] - x, goal[1] - y)
+        bounds = (bounds[0] - x, bounds[1] - y, bounds[2] - x, bounds[3] - y)
+        points = points - offset
+    else:
+        offset = (0.0, 0.0)
     obstacles = cut_polygons(points if scale == 1.0 else points / scale, polygon_starts)
     if groups is not None:
         ends = np.cumsum([0, *groups])
@@ -64,6 +79,7 @@ def checked_problem(
         (start_motion[0] / scale, *start_motion[1:]) if start_motion else (),
         arrival
         and arrival._replace(least_speed=arrival.least_speed / scale, most_speed=arrival.most_speed / scale),
+        offset,
     )
     fault = problem_fault(problem, vehicle)
     if fault is not None:

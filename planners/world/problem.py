@@ -59,6 +59,7 @@ class Problem:
     scale: float = 1.0  # real metres in one metre of this problem; files hold real metres
     start_motion: tuple[float, ...] = ()  # the start state behind the pose, speed first; what is missing is 0
     arrival: Arrival | None = None  # None: any heading and speed will do
+    offset: Point = (0.0, 0.0)  # real metres: where the origin of this frame lies in that of the file
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_names, trailers_of
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
+LARGEST_HEADING: Final = 10_000.0  # radians; of more turns the last digits are lost
 MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
 
 
@@ -34,13 +35,17 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     and the goal's centre are free.
     """
     heading = None if problem.arrival is None else problem.arrival.heading
-    numbers = (*problem.start, *problem.goal, problem.goal_radius, *problem.bounds, heading or 0.0)
-    if not all(math.isfinite(number) for number in numbers):
+    headings = {"start": problem.start[2], "goal": heading or 0.0}
+    numbers = (*problem.start[:2], *problem.goal, problem.goal_radius, *problem.bounds)
+    if not all(math.isfinite(number) for number in (*numbers, *headings.values())):
         return "start, goal, goal_radius and bounds must be finite numbers; correct them"
     if max(abs(number) for number in numbers) > LARGEST_COORDINATE_M:
         return (
             f"lies farther than {LARGEST_COORDINATE_M:.0f} m from the origin; move the origin near the start"
         )
+    for end, angle in headings.items():
+        if abs(angle) > LARGEST_HEADING:
+            return f"{end} heading is {angle:g} rad; expected an angle of -pi to pi, turns may be added"
     x_min, y_min, x_max, y_max = problem.bounds
     if not (x_min < x_max and y_min < y_max):
         return f"bounds {list(problem.bounds)} are inverted; expected [x_min, y_min, x_max, y_max] in metres"
@@ -96,9 +101,8 @@ def _arrival_fault(arrival: Arrival | None, vehicle: Vehicle) -> str | None:
     trailers = len(state_names(vehicle)) - 5
     angles, tolerances = len(arrival.hitches), len(arrival.hitch_tolerances)
     if (angles, tolerances) not in ((0, 0), (trailers, trailers)):
-        return (
-            f"goal has {angles} hitch angles and {tolerances} tolerances; expected {trailers} each, or none"
-        )
+        wanted = f"{trailers} of each, or none" if trailers else "none, as there are no trailers"
+        return f"goal_hitch has {angles} angles and {tolerances} tolerances; expected {wanted}"
     asked_hitches = zip(arrival.hitches, arrival.hitch_tolerances, strict=True)
     for (hitch, allowed), trailer in zip(asked_hitches, trailers_of(vehicle), strict=bool(arrival.hitches)):
         most = trailer.max_hitch

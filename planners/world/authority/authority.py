@@ -14,11 +14,18 @@ import fcl
 import numpy as np
 
 from planners.world.arrays import Floats, Integers
-from planners.world.authority.authority_equations import Body, bodies_of, limits_of, simulate_again
+from planners.world.authority.authority_equations import (
+    Body,
+    bodies_of,
+    limits_of,
+    simulate_again,
+    widest_hitches,
+)
 from planners.world.problem import Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_size
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
+BETWEEN = 0.01  # radians: how far a hitch may pass its limit between two states within it
 ROUNDING = 1e-9  # on limits, metres and so on
 _HEIGHT = 1.0  # FCL's world has three dimensions: everything here is a prism that high
 _RUN = 32  # steps whose common box is tried at once
@@ -51,6 +58,13 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
         how = f"with motion {motion}" if any(motion) else "at rest, all straight"
         found.append(f"Start: state 0 is {offset:.3g} off the problem's start {how}.")
     beyond = _limit_faults(states, controls, vehicle)
+    if not beyond and isinstance(vehicle, CarWithTrailers):
+        widest = zip(widest_hitches(states, controls, vehicle), vehicle.trailers, strict=True)
+        beyond = [
+            f"Hitch {i}: {angle:.4g} rad between two states; allowed are {trailer.max_hitch:.4g} rad."
+            for i, (angle, trailer) in enumerate(widest, start=1)
+            if angle > trailer.max_hitch + BETWEEN
+        ]
     if beyond:  # how far a step may bend is known within the limits only
         return found + beyond
     found += _dynamics_faults(*(each.astype(np.float64).tobytes() for each in (states, controls)), vehicle)

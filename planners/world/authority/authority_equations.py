@@ -12,7 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle, trailers_of
+from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Trailer, Vehicle, trailers_of
+
+WITHIN = 8  # shorter steps in each, at which hitch angles are looked at
 
 
 class Limit(NamedTuple):
@@ -148,6 +150,37 @@ def _hitches(states: Floats, controls: Floats, vehicle: Vehicle) -> Floats:
         hitches = [b + h / 6.0 * (p + 2.0 * (q + r) + s) for b, p, q, r, s in every]
         after.append(hitches)
     return np.array(after).reshape(len(after), len(lengths))
+
+
+def widest_hitches(states: Floats, controls: Floats, vehicle: CarWithTrailers) -> Floats:
+    """The largest size ``[n]`` (rad) of each hitch angle within the steps: ``states [T, S]``, ``[T - 1, 2]``.
+
+    Every step is integrated again in ``WITHIN`` shorter ones, all steps at once.
+    """
+    h = vehicle.dt / WITHIN
+    held, rates_held = _held(states, controls, vehicle)
+    lengths = [trailer.hitch_length for trailer in trailers_of(vehicle)]
+
+    def slopes(time: float, hitches: Floats) -> Floats:
+        speed, steering = (held + time * rates_held).T
+        turn = speed * np.tan(steering) / vehicle.wheelbase
+        rates = []
+        for hitch, length in zip(hitches, lengths, strict=True):
+            trailing = speed * np.sin(hitch) / length
+            rates.append(turn - trailing)
+            turn, speed = trailing, speed * np.cos(hitch)
+        return np.array(rates)
+
+    hitches = states[:-1, 5:].T
+    widest: Floats = np.abs(states[:, 5:]).max(axis=0)
+    for time in h * np.arange(WITHIN):
+        k1 = slopes(time, hitches)
+        k2 = slopes(time + 0.5 * h, hitches + 0.5 * h * k1)
+        k3 = slopes(time + 0.5 * h, hitches + 0.5 * h * k2)
+        k4 = slopes(time + h, hitches + h * k3)
+        hitches = hitches + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        widest = np.maximum(widest, np.abs(hitches).max(axis=1, initial=0.0))
+    return widest
 
 
 def bodies_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Body]:

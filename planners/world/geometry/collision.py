@@ -213,9 +213,13 @@ def point_is_free(x: float, y: float, scene: Scene) -> bool:
 
 @inlined
 def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether the vehicle is not folded, nor about to be between two states, and its bodies are free."""
+    return not is_folded(state, vehicle) and bodies_are_free(state, vehicle, scene)
+
+
+@inlined
+def bodies_are_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
     """Whether the vehicle's bodies, inflated to cover the steps into and out of a state, are free."""
-    if is_folded(state, vehicle):
-        return False
     for box in swept_bodies(state, vehicle):  # noqa: SIM110 Numba has no generators for all()
         if not box_is_free(box, scene):
             return False

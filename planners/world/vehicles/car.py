@@ -5,6 +5,8 @@ Of first order v and psi are constant in a step: v + h a and psi + h omega of th
 
 from __future__ import annotations
 
+import math
+
 from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
@@ -115,6 +117,11 @@ def _bend_rate(speed: float, vehicle: CarLike) -> float:
 @implements(interface.curvature_of, Car, CarWithTrailers)
 def _curvature_of(bend: float, vehicle: CarLike) -> float:
     return tan(bend) / vehicle.wheelbase
+
+
+@implements(interface.bend_with, Car, CarWithTrailers)
+def _bend_with(curvature: float, vehicle: CarLike) -> float:
+    return math.atan(curvature * vehicle.wheelbase)
 
 
 @implements(interface.bend_of, Car, CarWithTrailers)

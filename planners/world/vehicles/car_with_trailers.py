@@ -10,7 +10,7 @@ import math
 
 from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
-from planners.world.trigonometry import sincos
+from planners.world.trigonometry import sincos, tan
 from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive, most_motion, turn_rates
 from planners.world.vehicles.interface import State, box_at, half_way, leading_body
@@ -109,11 +109,59 @@ def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -
 @implements(interface.is_folded, CarWithTrailers)
 def _is_folded(state: State, vehicle: CarWithTrailers) -> bool:
     trailers = vehicle.trailers
+    room_1 = trailers[0].max_hitch - abs(state[5])
+    room_2 = _second(trailers).max_hitch - abs(_second_hitch(state))
+    room_3 = trailers[-1].max_hitch - abs(state[-1])
+    room = min(room_1, room_2, room_3)
+    if room < 0.0:
+        return True
+    speed = state[3]
+    if speed == 0.0:  # it may begin at a limit, and at rest nothing folds
+        return False
+    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
+    turn = speed * tan(state[4]) / vehicle.wheelbase
+    rates = _hitch_rates(speed, turn, (state[5], _second_hitch(state), state[-1]), lengths)
+    bends = _hitch_bends(state, lengths, vehicle)
     return (
-        abs(state[5]) > trailers[0].max_hitch
-        or abs(_second_hitch(state)) > _second(trailers).max_hitch
-        or abs(state[-1]) > trailers[-1].max_hitch
+        _may_fold_between(room_1, rates[0], bends[0], vehicle)
+        or (len(state) > 6 and _may_fold_between(room_2, rates[1], bends[1], vehicle))
+        or (len(state) > 7 and _may_fold_between(room_3, rates[2], bends[2], vehicle))
     )
+
+
+@inlined
+def _may_fold_between(room: float, rate: float, bend: float, vehicle: CarWithTrailers) -> bool:
+    """Whether an angle may pass its limit, ``room`` away, between this state and the middle of a step.
+
+    If both ends of a step are within the limit, it passes it only around an instant of rate 0. The nearer
+    end is at most half a step away from there, and so has at most half a step of ``bend`` (rad/s^2) as its
+    rate, and the angle moves by at most an eighth of the squared step of it. Of first order rates jump.
+    """
+    h = vehicle.dt
+    return room < 0.125 * h * h * bend and (vehicle.first_order or abs(rate) < 0.5 * h * bend)
+
+
+@inlined
+def _hitch_bends(state: State, lengths: Three, vehicle: CarWithTrailers) -> Three:
+    """The largest |beta''| (rad/s^2) of each trailer in a step into or out of a state."""
+    speed, turn = most_motion(state[3], state[4], vehicle)
+    acceleration, twist = 0.0, 0.0
+    if not vehicle.first_order:
+        acceleration = vehicle.max_acceleration
+        sharpest = min(abs(state[4]) + vehicle.max_steering_rate * vehicle.dt, vehicle.max_steering)
+        slope = tan(sharpest)
+        twist = (acceleration * slope + speed * vehicle.max_steering_rate * (1.0 + slope * slope)) / (
+            vehicle.wheelbase
+        )
+    rate_1 = turn + speed / lengths[0]
+    twist_1 = (acceleration + speed * rate_1) / lengths[0]
+    acceleration_1 = acceleration + speed * rate_1
+    rate_2 = speed / lengths[0] + speed / lengths[1]
+    twist_2 = (acceleration_1 + speed * rate_2) / lengths[1]
+    acceleration_2 = acceleration_1 + speed * rate_2
+    rate_3 = speed / lengths[1] + speed / lengths[2]
+    twist_3 = (acceleration_2 + speed * rate_3) / lengths[2]
+    return twist + twist_1, twist_1 + twist_2, twist_2 + twist_3
 
 
 @inlined

@@ -81,6 +81,11 @@ def _curvature_of(bend: float, vehicle: DifferentialDrive) -> float:
     return bend
 
 
+@implements(interface.bend_with, DifferentialDrive)
+def _bend_with(curvature: float, vehicle: DifferentialDrive) -> float:
+    return curvature
+
+
 @implements(interface.bend_of, DifferentialDrive)
 def _bend_of(state: State, vehicle: DifferentialDrive) -> float:
     return state[4] / max(abs(state[3]), SLOW) * (1.0 if state[3] >= 0.0 else -1.0)

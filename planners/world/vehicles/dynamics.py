@@ -11,6 +11,7 @@ from planners.world.vehicles.interface import State as State
 from planners.world.vehicles.interface import admissible as admissible
 from planners.world.vehicles.interface import bend_of as bend_of
 from planners.world.vehicles.interface import bend_rate as bend_rate
+from planners.world.vehicles.interface import bend_with as bend_with
 from planners.world.vehicles.interface import control_limits as control_limits
 from planners.world.vehicles.interface import curvature_of as curvature_of
 from planners.world.vehicles.interface import is_folded as is_folded

@@ -87,6 +87,12 @@ def curvature_of(bend: float, vehicle: Vehicle) -> float:
 
 
 @by_vehicle
+def bend_with(curvature: float, vehicle: Vehicle) -> float:
+    """The bend of a way with this curvature (1/m, left positive)."""
+    raise NotImplementedError
+
+
+@by_vehicle
 def bend_of(state: State, vehicle: Vehicle) -> float:
     """The bend that a state drives."""
     raise NotImplementedError
@@ -100,7 +106,7 @@ def turn_in(bend: float, speed: float, vehicle: Vehicle) -> float:
 
 @by_vehicle
 def is_folded(state: State, vehicle: Vehicle) -> bool:
-    """Whether parts of the vehicle have come too close to each other (jack-knifed)."""
+    """Whether parts of the vehicle are too close (jack-knifed), or may come to be within half a step."""
     raise NotImplementedError
 
 

@@ -108,13 +108,6 @@ VEHICLES: dict[str, Vehicle] = {
 }
 
 
-def vehicle_named(name: str) -> Vehicle:
-    """Return the built-in vehicle of that name. Raises ValueError if there is none."""
-    if name not in VEHICLES:
-        raise ValueError(f"No vehicle is named {name!r}; the vehicles are {', '.join(VEHICLES)}.")
-    return VEHICLES[name]
-
-
 def name_of(vehicle: Vehicle) -> str:
     """Return the vehicle's name; a built-in one with settings of its own is named by these."""
     name = vehicle.about.name.decode()

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -79,6 +81,19 @@ def test_a_jack_knifed_trailer_is_found() -> None:
     controls[25:29, 1] = 1.6  # wheels as far as they go: no hitch angle within the limit keeps up
     found = kinds(faults(EMPTY, driven(CAR_1_TRAILER, controls), CAR_1_TRAILER))
     assert "Hitch 1" in found
+
+
+def test_a_hitch_that_passes_its_limit_between_two_states_is_found() -> None:
+    """To and fro within a coarse step: both its ends lie within the limit, its middle far beyond."""
+    vehicle = CAR_1_TRAILER._replace(dt=1.0, max_acceleration=4.0)
+    start = np.array([*EMPTY.start, -1.0, 0.0, 0.9])
+    controls = np.array([[2.0, 0.0]])
+    problem = replace(EMPTY, start_motion=(-1.0, 0.0, 0.9))
+    plan = Plan(simulate_again(start, controls, vehicle), controls, vehicle.dt)
+    assert abs(plan.states[1, 5] - 0.9) < 1e-6
+    for limit, is_found in ((1.1, False), (0.95, True), (0.9 + 1e-5, True)):
+        narrow = vehicle._replace(trailers=(vehicle.trailers[0]._replace(max_hitch=limit),))
+        assert ("Hitch 1" in kinds(faults(problem, plan, narrow))) == is_found
 
 
 def test_a_trailer_that_does_not_begin_straight_behind_is_found() -> None:

@@ -10,7 +10,7 @@ from planners.world.vehicles import dynamics
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
-from tests.planners.world.kernels import admissible, step, swept_bodies
+from tests.planners.world.kernels import admissible, is_folded, step, swept_bodies
 from tests.planners.world.motions import (
     KINDS,
     SECOND_ORDER,
@@ -23,6 +23,7 @@ from tests.planners.world.motions import (
 )
 from tests.planners.world.strategies import seeds
 
+PULLING = {name: vehicle for name, vehicle in KINDS.items() if trailers_of(vehicle)}
 each_vehicle = pytest.mark.parametrize("vehicle", KINDS.values(), ids=KINDS)
 
 
@@ -138,3 +139,29 @@ def test_kernels_equal_their_python_functions(vehicle: Vehicle, seed: int) -> No
     assert step(now, *controls, vehicle) == pytest.approx(dynamics.step(now, *controls, vehicle), abs=1e-13)
     for ours, theirs in zip(swept_bodies(now, vehicle), dynamics.swept_bodies(now, vehicle), strict=True):
         assert ours == pytest.approx(theirs, abs=1e-13)
+
+
+@pytest.mark.parametrize("vehicle", PULLING.values(), ids=PULLING)
+def test_no_hitch_passes_its_limit_between_two_states_that_are_not_folded(vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(0)
+    most = np.array([trailer.max_hitch for trailer in trailers_of(vehicle)])
+    passed = 0
+    for _ in range(20_000):
+        state = random_state(rng, vehicle)
+        state[5:] = rng.choice([-1.0, 1.0], len(most)) * (most - rng.exponential(0.01, len(most)))
+        controls = random_controls(rng, state, vehicle)
+        finer = vehicle._replace(dt=0.1 * vehicle.dt, first_order=False)
+        after = step(tuple(state), *controls, vehicle)
+        if (np.abs(after[5:]) > most).any() or state[3] == 0.0 or after[3] == 0.0:
+            continue
+        begun = state
+        if vehicle.first_order:
+            begun = state.copy()
+            begun[3:5] += vehicle.dt * controls
+            controls = np.zeros(2)
+        middle = simulate(begun, np.tile(controls, (9, 1)), finer)
+        beyond = (np.abs(middle[:, 5:]) > most + 1e-6).any()
+        if beyond:
+            passed += 1
+            assert is_folded(tuple(state), vehicle) or is_folded(tuple(after), vehicle)
+    assert passed > 3

@@ -17,25 +17,18 @@ from planners.world.vehicles.vehicle import (
     name_of,
     state_names,
     state_size,
-    vehicle_named,
 )
 from tests.planners.world.motions import placed
 
 TRAILERS = [vehicle for vehicle in VEHICLES.values() if isinstance(vehicle, CarWithTrailers)]
 
 
-@pytest.mark.parametrize("name", VEHICLES)
-def test_a_vehicle_is_found_by_its_name_and_named(name: str) -> None:
-    assert name_of(vehicle_named(name)) == name
+def test_built_in_vehicles_are_called_by_their_names() -> None:
+    assert [name_of(vehicle) for vehicle in VEHICLES.values()] == list(VEHICLES)
 
 
 def test_a_vehicle_with_settings_of_its_own_is_called_by_them() -> None:
     assert "max_speed=9.0" in name_of(CAR._replace(max_speed=9.0))
-
-
-def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match="car, differential-drive, car-1-trailer, car-2-trailers"):
-        vehicle_named("tram")
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES.values(), ids=VEHICLES)

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planners.world.checked_problem import FARTHEST_M, checked_problem
+from planners.world.problem import Arrival, Problem
+from tests.worlds import box
+
+POINTS = np.concatenate([box(20.0, 21.0, 0.3, 2.0, 1.0), box(8.0, 14.0, 1.2, 1.5, 1.5)])
+STARTS = np.array([0, 4, 8])
+
+whole = st.integers(1_001, 5_000_000_000)
+signs = st.sampled_from([-1.0, 1.0])
+
+
+def asked(x: float, y: float) -> Problem:
+    """A problem whose coordinates are multiples of a power of two, so that moving it rounds nothing."""
+    grid = 2.0**-18
+    points = grid * np.round(POINTS / grid) + (x, y)
+    return checked_problem(
+        (x, y, 0.5),
+        (30.0 + x, 25.0 + y),
+        0.5,
+        (x - 10.0, y - 10.0, x + 40.0, y + 40.0),
+        points,
+        STARTS,
+        arrival=Arrival(0.25, 0.1, 0.0, 0.0),
+    )
+
+
+@given(whole, whole, signs, signs)
+def test_a_problem_far_away_is_the_same_problem_with_an_offset(
+    x: int, y: int, left: float, down: float
+) -> None:
+    here, there = asked(0.0, 0.0), asked(left * x, down * y)
+    assert there.offset == (left * x, down * y)
+    assert here.offset == (0.0, 0.0)
+    assert (there.start, there.goal, there.bounds) == (here.start, here.goal, here.bounds)
+    assert (there.obstacles.vertices == here.obstacles.vertices).all()
+
+
+def test_near_the_origin_nothing_is_moved() -> None:
+    problem = asked(900.0, -900.0)
+    assert problem.offset == (0.0, 0.0)
+    assert problem.start == (900.0, -900.0, 0.5)
+
+
+def test_beyond_what_float64_can_say_is_refused_in_one_line() -> None:
+    with pytest.raises(ValueError, match="move the origin near the start") as caught:
+        asked(2.0 * FARTHEST_M, 0.0)
+    assert "\n" not in str(caught.value)
