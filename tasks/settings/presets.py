@@ -185,7 +185,7 @@ def mixture_of(weighted: Sequence[str]) -> Mixture:
 
 def _check_worlds(path: Path) -> None:
     if not path.exists():
-        raise UsageError(f"{path} is no folder of worlds and no map: there is nothing of that name.")
+        raise UsageError(f"{path} does not exist; give a folder of worlds or a map.")
     parts = {part: (path / part).is_dir() for part in ("train", "test")}
     if any(parts.values()) and not all(parts.values()):
         raise UsageError(f"{path} has only one of the parts {' and '.join(parts)}; both are needed.")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from tasks.fan_out.chunk import Chunk, keep_settings
+from tasks.fan_out.chunk import Chunk
 from tasks.fan_out.stage import Stage, Values
+from tasks.inputs.shortfalls import begin_collecting, leave_out
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
+from tasks.stages.collect_gained import COLLECT_GAINED
 from tasks.stages.curate import CURATE
 from tasks.stages.keep_experiences import COMBINE, KEEP
 
@@ -24,8 +26,12 @@ def run_stage(
     return results
 
 
-def collect(data: str, settings: RunSettings, backwards: bool = False) -> None:
-    """Leave the experiences of a run in a data folder."""
-    keep_settings(data, settings)
-    for stage in (COLLECT, CURATE, KEEP, COMBINE):
+def collect(data: str, settings: RunSettings, backwards: bool = False) -> RunSettings:
+    """Leave the experiences of a run in a data folder; the settings without the classes left out."""
+    settings = begin_collecting(data, settings)
+    for stage in (COLLECT, COLLECT_GAINED, CURATE):
         run_stage(stage, data, settings, backwards)
+    settings = leave_out(data, settings)
+    for stage in (KEEP, COMBINE):
+        run_stage(stage, data, settings, backwards)
+    return settings

@@ -18,14 +18,24 @@ Embedder = Callable[[dict[str, Tensor], Tensor], Tensor]
 def deterministic(threads: int) -> Iterator[torch.device]:
     """Make torch deterministic, with so many threads, and give the device to train on; undo it at the end."""
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it cuBLAS is not deterministic
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     before, was_deterministic = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(threads)
-    torch.use_deterministic_algorithms(True)
+    _be_deterministic(True, device)
     try:
-        yield torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        yield device
     finally:
         torch.set_num_threads(before)
-        torch.use_deterministic_algorithms(was_deterministic)
+        _be_deterministic(was_deterministic, device)
+
+
+def _be_deterministic(on: bool, device: torch.device) -> None:
+    if (
+        device.type == "cpu"
+    ):  # the same for what is not compiled, without a second of imports for the compiler
+        torch.set_deterministic_debug_mode("error" if on else "default")
+    else:
+        torch.use_deterministic_algorithms(on)
 
 
 def forward_on(device: torch.device) -> Embedder:

@@ -25,3 +25,8 @@ def swept_bodies(state, vehicle):
 @jit
 def state_is_free(state, vehicle, scene):
     return collision.state_is_free(state, vehicle, scene)
+
+
+@jit
+def is_folded(state, vehicle):
+    return dynamics.is_folded(state, vehicle)

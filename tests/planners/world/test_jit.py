@@ -1,8 +1,15 @@
 """What importing the kernels leaves alone: Numba, for all other code of the process."""
 
+import gc
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
+from numba import TypingError
+
+from planners.world.jit import jit
 
 OTHERS = """
 import numba, numpy as np
@@ -29,3 +36,25 @@ def test_importing_the_kernels_leaves_numba_as_it_is_for_others(tmp_path, monkey
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture
+def collecting() -> Iterator[None]:
+    yield
+    gc.enable()
+
+
+@pytest.mark.parametrize("on", [True, False])
+def test_compiling_leaves_the_garbage_collector_as_it_was(on: bool, collecting: None) -> None:
+    def doubled(value: float) -> float:
+        return 2.0 * value
+
+    def nonsense(value: float) -> float:
+        return value.nothing  # type: ignore[attr-defined,no-any-return]
+
+    (gc.enable if on else gc.disable)()
+    assert jit(doubled)(2.0) == 4.0
+    assert gc.isenabled() == on
+    with pytest.raises(TypingError):
+        jit(nonsense)(2.0)
+    assert gc.isenabled() == on

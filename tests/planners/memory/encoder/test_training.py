@@ -101,9 +101,9 @@ def test_training_ends_when_its_patience_does_and_keeps_the_best_epoch():
     asked = settings("labels", learning_rate=1e-9, patience=1)
     kept = []
     bits, plan_index, labels = problems(600)
-    trained = train(bits, plan_index, labels, replace(asked, epochs=40), kept.append)
+    trained = train(bits, plan_index, labels, replace(asked, epochs=12), kept.append)
     hits = [epoch.hit_1 for epoch in trained.history]
-    assert len(hits) == 40 or hits[-1] < max(hits)
+    assert len(hits) == 12 or hits[-1] < max(hits)
     assert trained.score == max(hits)
     best = len(hits) - 1 - hits[::-1].index(max(hits))
     assert (kept[-1].best == kept[best].values).all()
