@@ -1,0 +1,66 @@
+"""The command ``draw``: new problems of a class, or manoeuvres of a family, into a file of problems."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from planners.world.classes.families import FAMILIES, family
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
+from storage.exchange.problem_files import format_of
+from storage.exchange.problems import write_problems
+from storage.vehicles.vehicle_files import said_vehicle
+from tasks.settings.checks import check_count, check_known, check_picture, check_seed, checked_vehicle
+from tasks.settings.errors import UsageError
+
+PICTURED: Final = 6  # problems at most in a picture
+
+
+def draw_problems(
+    name: str, difficulty: str, problems: int, seed: int, vehicle: str, out: Path, drawing: Path | None
+) -> None:
+    """Draw problems and write them for a vehicle, whole or not at all; the same seed draws the same ones.
+
+    Args:
+        name: of a class or a family.
+        difficulty: easy, standard or hard.
+        problems: how many to draw, at least 1.
+        seed: that they follow from, 0 or more.
+        vehicle: the name of a built-in one, or the path of a vehicle's file.
+        out: the file, whose ending says its format.
+        drawing: where to draw the first ones, or None.
+
+    Raises:
+        UsageError: an option is out of range, or the family is not for this vehicle.
+        StorageError: the file cannot be written, or can hold one problem only.
+    """
+    check_known("class or family", [name], (*CLASSES, *FAMILIES))
+    check_known("difficulty", [difficulty], DIFFICULTIES)
+    check_count("problems", problems)
+    check_seed(seed)
+    check_picture(drawing)
+    format_of(out)
+    driven = said_vehicle(checked_vehicle(vehicle))
+    try:
+        source = (
+            family(name, difficulty, driven) if name in FAMILIES else problem_class(name, difficulty, driven)
+        )
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    drawn = [source.draw(seed, index) for index in range(problems)]
+    write_problems(out, drawn, driven)
+    if drawing is not None:
+        _picture(drawn, driven, drawing)
+
+
+def _picture(problems: list[Problem], vehicle: Vehicle, drawing: Path) -> None:
+    from dashboards.figures.pictures import gallery_of_problems  # late: few commands draw
+    from dashboards.figures.style import save_picture
+
+    shown = problems[:PICTURED]
+    title = (
+        "Problems" if len(shown) == len(problems) else f"The first {len(shown)} of {len(problems):,} problems"
+    )
+    save_picture(gallery_of_problems(shown, vehicle, title), drawing)
