@@ -23,7 +23,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 
 @lean
-def _estimate(
+def word_seconds(
     word: Floats, radius: float, lead: float, speed: float, goal: Floats, top: float, vehicle: Vehicle
 ) -> float:
     """How long a word takes to drive, in seconds; infinite if the speed at its ends does not allow it."""
@@ -81,7 +81,7 @@ def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) 
     count = list_words(dx * cos + dy * sin, dy * cos - dx * sin, turn, c.words)
     lead = lead_of(state, top, vehicle)
     for i in range(count):
-        c.seconds[i] = _estimate(c.words[i], radius, lead, state[3], goal, top, vehicle)
+        c.seconds[i] = word_seconds(c.words[i], radius, lead, state[3], goal, top, vehicle)
     return count
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from planners.search.connection.candidates import list_connections
 from planners.search.connection.connection import Connection, allocate_connection
-from planners.world.arrays import Floats
-from planners.world.goal import HEADING, X, Y, goal_of_pose
+from planners.world.arrays import Floats, Pose
+from planners.world.goal import goal_of_pose
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos, wrapped
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -52,11 +52,11 @@ def seconds_to_pose(vehicle: Vehicle) -> Floats:
 
 
 @inlined
-def seconds_from(x: float, y: float, heading: float, goal: Floats, table: Floats, top: float) -> float:
+def seconds_from(x: float, y: float, heading: float, goal: Pose, table: Floats, top: float) -> float:
     """The time from rest at a pose to rest at the goal, in seconds; ``top`` is the full speed."""
-    sin, cos = sincos(goal[HEADING])
-    dx = x - goal[X]
-    dy = y - goal[Y]
+    sin, cos = sincos(goal[2])
+    dx = x - goal[0]
+    dy = y - goal[1]
     u = dx * cos + dy * sin
     w = dy * cos - dx * sin
     far = max(abs(u), abs(w))
@@ -66,7 +66,7 @@ def seconds_from(x: float, y: float, heading: float, goal: Floats, table: Floats
         beyond = (1.0 - share) * math.sqrt(u * u + w * w) / top
         u *= share
         w *= share
-    turn = (wrapped(heading - goal[HEADING]) + math.pi) * (HEADINGS / (2.0 * math.pi)) + 0.5 * HEADINGS
+    turn = (wrapped(heading - goal[2]) + math.pi) * (HEADINGS / (2.0 * math.pi)) + 0.5 * HEADINGS
     h = int(turn)
     part = turn - h
     u = (u + REACH_M) / CELL

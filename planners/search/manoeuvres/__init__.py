@@ -1,0 +1,1 @@
+"""Tight manoeuvres from rest to rest: searched for from the goal outwards, then driven."""

@@ -1,0 +1,58 @@
+"""Arcs: ways at a constant bend, in one gear, along which a vehicle may stop anywhere."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.jit import inlined
+from planners.world.vehicles.dynamics import State, step, turn_in
+from planners.world.vehicles.vehicle import Vehicle
+
+STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
+FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
+
+
+@inlined
+def stride_of(gear: float, vehicle: Vehicle) -> float:
+    """The metres from one look to the next: no more than are driven in a step at full speed."""
+    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    return float(min(STRIDE * (vehicle.front + vehicle.rear), top * vehicle.dt))
+
+
+@inlined
+def at_pace(state: State, speed: float, bend: float, vehicle: Vehicle) -> State:
+    """The same pose, with a speed (m/s) and a bend."""
+    return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle)) + state[5:]  # noqa: RUF005
+
+
+@inlined
+def stride_along(
+    state: State, gear: float, bend: float, metres: float, vehicle: Vehicle, scene: Scene
+) -> tuple[State, float, int]:
+    """Drive on for some metres along an arc, as far as it is free.
+
+    Where a look with the margin of the whole stride finds no room, there are ``FINE`` short ones.
+
+    Args:
+        state: from where.
+        gear: 1 forwards, -1 backwards.
+        bend: of the arc.
+        metres: of the stride, at most that of ``stride_of``.
+        vehicle: what is driven.
+        scene: what must not be met.
+
+    Returns:
+        The last free state, how many metres were free, and how often obstacles were looked at.
+    """
+    speed = gear * metres / vehicle.dt
+    after = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    if state_is_free(after, vehicle, scene):
+        return after, metres, 1
+    speed /= FINE
+    for k in range(FINE):
+        after = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+        if not state_is_free(after, vehicle, scene):
+            return state, k * metres / FINE, k + 2
+        state = after
+    return state, metres, FINE + 1

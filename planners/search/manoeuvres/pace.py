@@ -1,0 +1,88 @@
+"""Speeds over an arc from rest to rest where each place has a limit of its own."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from planners.world.arrays import Floats
+from planners.world.jit import inlined, lean
+
+SLOWEST: Final = 0.5  # a speed below this share of what one step changes is rest
+
+
+@inlined
+def _limit_at(way: float, limits: Floats, count: int, stride: float) -> float:
+    """The limit at a place, between two of those that are known."""
+    at = min(max(way / stride, 0.0), float(count))
+    i = min(int(at), count - 1)
+    return float(limits[i] + (at - i) * (limits[i + 1] - limits[i]))
+
+
+@lean
+def fill_pace(
+    speeds: Floats, limits: Floats, count: int, metres: float, gear: float, acceleration: float, dt: float
+) -> int:
+    """Fill in speeds that lead exactly ``metres`` far, as quickly as limits of speed allow, nearly.
+
+    The speeds are chosen step by step, so that they can be braked in time. They lead a little too far, which
+    a factor below 1 on all of them puts right.
+
+    Args:
+        speeds: ``[C]`` m/s, to fill in; negative backwards.
+        limits: ``[count + 1]`` m/s, at places equally far from one another, the first and the last at the
+            ends; lowered to what can be braked from.
+        count: see ``limits``.
+        metres: how far.
+        gear: 1 forwards, -1 backwards.
+        acceleration: the largest, in m/s^2.
+        dt: seconds of a step.
+
+    Returns:
+        How many steps that takes; -1 if there is no room for them.
+    """
+    stride = metres / count
+    limits[count] = 0.0
+    for i in range(count - 1, -1, -1):
+        limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * acceleration * stride))
+    change = acceleration * dt
+    speeds[0] = 0.0
+    speed = 0.0
+    way = 0.0
+    steps = 0
+    most = speeds.shape[0] - 1
+    while steps < most:
+        after = speed + change
+        for _ in range(2):
+            after = min(after, _limit_at(way + 0.5 * dt * (speed + after), limits, count, stride))
+        after = max(after, speed - change, 0.0)
+        if after < SLOWEST * change and way > 0.5 * metres:
+            break
+        if after <= 0.0:
+            return -1
+        steps += 1
+        speeds[steps] = after
+        way += 0.5 * dt * (speed + after)
+        speed = after
+    while speed > 0.0 and steps < most:
+        after = max(speed - change, 0.0)
+        steps += 1
+        speeds[steps] = after
+        way += 0.5 * dt * (speed + after)
+        speed = after
+    peak = 0
+    for i in range(steps + 1):
+        if speeds[i] > speeds[peak]:
+            peak = i
+    while way < metres:
+        if steps == most or peak == 0:
+            return -1
+        steps += 1
+        for i in range(steps, peak, -1):
+            speeds[i] = speeds[i - 1]
+        way += dt * speeds[peak]
+    if speed > 0.0:
+        return -1
+    for i in range(steps + 1):
+        speeds[i] *= gear * metres / way
+    return steps

@@ -1,0 +1,159 @@
+"""Tries words of turns from the start to a node of a goal tree, and drives the first that is free."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from planners.search.connection.candidates import list_connections, next_word, word_seconds
+from planners.search.connection.connection import Connection, first_pose, radius_at
+from planners.search.connection.outline import outline_is_free
+from planners.search.connection.words import PARTS, list_words
+from planners.search.manoeuvres.arcs import stride_along, stride_of
+from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goal
+from planners.search.manoeuvres.driving import Drive
+from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree
+from planners.search.manoeuvres.joining import arcs_are_free, close, take_word, trailers_are_off
+from planners.search.query import Endings
+from planners.search.structures.cost_to_go import CostToGo
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
+from planners.world.jit import lean
+from planners.world.trigonometry import sincos, wrapped
+from planners.world.vehicles.dynamics import load, tightest_bend
+from planners.world.vehicles.vehicle import Vehicle
+
+OUTLINES: Final = 12  # words of a shot that are glanced at
+CLOSED: Final = 2  # and corrected, where there are trailers
+NEAR: Final = 0.3  # radians: hitches that are farther off than this are not corrected
+
+
+class FromStart(NamedTuple):
+    """What is known of the way from the start."""
+
+    start: Floats  # [1, S]
+    go: CostToGo  # around obstacles
+    table: Floats  # that of ``seconds_to_pose``
+    endings: Endings  # of known plans
+    radius: float  # of words, in metres, with which trailers keep straight enough
+
+
+@lean
+def word_is_free(
+    c: Connection, number: int, top: float, vehicle: Vehicle, scene: Scene, tree: GoalTree
+) -> bool:
+    """Whether the way of a word from ``c.states[0]`` is free."""
+    word = c.words[number]
+    state = load(c.states, 0, vehicle)
+    radius = radius_at(top, vehicle)
+    x, y, heading = first_pose(state, top, vehicle)
+    if not outline_is_free(word, radius, x, y, heading, vehicle, scene):
+        return False
+    state = (x, y, heading) + state[3:]  # noqa: RUF005
+    bend_limit = tightest_bend(top, vehicle)
+    for k in range(PARTS):
+        metres = radius * abs(word[PARTS + k])
+        if metres == 0.0:
+            continue
+        gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
+        count = math.ceil(metres / stride_of(gear, vehicle))
+        stride = metres / count
+        for _ in range(count):
+            state, free, checks = stride_along(state, gear, word[k] * bend_limit, stride, vehicle, scene)
+            tree.counts[CHECKS] += checks
+            if free < stride:
+                return False
+    return True
+
+
+@lean
+def _shoot_alone(
+    tree: GoalTree,
+    node: int,
+    known: FromStart,
+    goal: Floats,
+    drive: Drive,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Try words to a node without trailers."""
+    c = drive.connection
+    for k in range(c.states.shape[1]):
+        c.states[0, k] = known.start[0, k]
+    target = drive.target
+    target[0] = tree.states[node, 0]
+    target[1] = tree.states[node, 1]
+    target[3] = tree.states[node, 2]
+    top = vehicle.max_speed
+    count = list_connections(c, target, top, vehicle)
+    for _ in range(OUTLINES):
+        word = next_word(c, count, math.inf)
+        if word < 0:
+            return False
+        if word_is_free(c, word, top, vehicle, scene, tree):
+            arrives = drive_to_goal(drive, tree, node, word, known.start, known.endings, goal, vehicle, scene)
+            tree.counts[CHECKS] += drive.counts[1]
+            return bool(arrives)
+    return False
+
+
+@lean
+def _shoot_with_trailers(
+    tree: GoalTree,
+    node: int,
+    known: FromStart,
+    goal: Floats,
+    drive: Drive,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Try words to a node, corrected so that the trailers stand as they do there."""
+    c = drive.connection
+    x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+    if known.start[0, 3] != 0.0:
+        return False
+    radius = known.radius
+    dx = (tree.states[node, 0] - x) / radius
+    dy = (tree.states[node, 1] - y) / radius
+    sin, cos = sincos(heading)
+    turn = wrapped(tree.states[node, 2] - heading)
+    count = list_words(dx * cos + dy * sin, dy * cos - dx * sin, turn, c.words)
+    for i in range(count):
+        c.seconds[i] = word_seconds(c.words[i], radius, 0.0, 0.0, drive.target, vehicle.max_speed, vehicle)
+    for k in range(tree.states.shape[1]):
+        drive.join.ends[1, k] = tree.states[node, k]
+    closed = 0
+    for _ in range(OUTLINES):
+        word = next_word(c, count, math.inf)
+        if word < 0 or closed == CLOSED:
+            return False
+        if not outline_is_free(c.words[word], radius, x, y, heading, vehicle, scene):
+            continue
+        take_word(drive.join, c.words[word], radius, vehicle)
+        if trailers_are_off(known.start, drive.join, NEAR, vehicle):
+            continue
+        closed += 1
+        if not close(known.start, drive.join, vehicle):
+            continue
+        free, checks = arcs_are_free(known.start, drive.join, vehicle, scene)
+        tree.counts[CHECKS] += checks
+        if free and drive_arcs_to_goal(drive, tree, node, known.start, known.endings, goal, vehicle, scene):
+            return True
+    return False
+
+
+@lean
+def shoot(
+    tree: GoalTree,
+    node: int,
+    known: FromStart,
+    goal: Floats,
+    drive: Drive,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Try words from the start to a node, and drive the first that is free, and on to the goal."""
+    if len(load(tree.states, node, vehicle)) > 5:  # decided when compiling
+        return _shoot_with_trailers(tree, node, known, goal, drive, vehicle, scene)
+    else:
+        return _shoot_alone(tree, node, known, goal, drive, vehicle, scene)
