@@ -1,0 +1,209 @@
+"""Drives words of turns, and arcs from rest to rest, each as quickly as obstacles allow."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.search.connection.connect import connect
+from planners.search.connection.connection import Connection, allocate_connection, radius_at
+from planners.search.connection.words import PARTS
+from planners.search.manoeuvres.arcs import at_pace, stride_of
+from planners.search.manoeuvres.joining import Join, allocate_join
+from planners.search.manoeuvres.pace import fill_pace
+from planners.world.arrays import Floats, Indices
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import SLACK
+from planners.world.jit import lean
+from planners.world.vehicles.dynamics import (
+    admissible,
+    control_limits,
+    curvature_of,
+    load,
+    step,
+    store,
+    tightest_bend,
+    turn_in,
+    turn_limit,
+)
+from planners.world.vehicles.vehicle import Vehicle
+
+STEPS: Final = 1 << 13  # of a drive at most
+TOPS: Final = (
+    1.0,
+    0.7,
+    0.5,
+    0.35,
+    0.25,
+    0.17,
+    0.12,
+    0.08,
+    0.04,
+)  # shares of full speed
+NEAR_M: Final = 2e-3  # how exactly a word leads to a node, in metres and radians
+STRIDES: Final = 1 << 10  # of an arc at most
+ROUNDING: Final = 1e-9
+SMALLEST: Final = 1e-6  # metres: shorter arcs are left out
+
+
+class Drive(NamedTuple):
+    """Buffers for one drive at a time."""
+
+    states: Floats  # [STEPS + 1, S]
+    controls: Floats  # [STEPS, 2]
+    counts: Indices  # [3] steps; looks at obstacles; parts of known endings
+    levels: Indices  # [STRIDES + 1] which of the ``TOPS`` is free at each stride of an arc
+    limits: Floats  # [STRIDES + 1] and the speed that this allows, in m/s
+    target: Floats  # [7] as of ``goal_of``: the node
+    connection: Connection
+    join: Join
+
+
+def allocate_drive(state_size: int) -> Drive:
+    """Buffers for states of ``state_size`` numbers."""
+    return Drive(
+        np.zeros((STEPS + 1, state_size)),
+        np.zeros((STEPS, 2)),
+        np.zeros(3, np.int64),
+        np.zeros(STRIDES + 1, np.int64),
+        np.zeros(STRIDES + 1),
+        np.array([0.0, 0.0, NEAR_M, 0.0, NEAR_M, -SLACK, SLACK]),
+        allocate_connection(state_size),
+        allocate_join(state_size),
+    )
+
+
+@lean
+def append(drive: Drive, steps: int) -> bool:
+    """Add the drive of the connection behind the present one."""
+    c = drive.connection
+    at = drive.counts[0]
+    if at + steps > drive.controls.shape[0]:
+        return False
+    for i in range(steps):
+        for k in range(2):
+            drive.controls[at + i, k] = c.controls[i, k]
+        for k in range(c.states.shape[1]):
+            drive.states[at + i + 1, k] = c.states[i + 1, k]
+    drive.counts[0] += steps
+    return True
+
+
+@lean
+def connection_is_free(drive: Drive, steps: int, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether the first steps of the drive of the connection are free."""
+    for i in range(steps + 1):
+        drive.counts[1] += 1
+        if not state_is_free(load(drive.connection.states, i, vehicle), vehicle, scene):
+            return False
+    return True
+
+
+@lean
+def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
+    """Turn the wheels at rest, from the end of the drive. Returns the steps that lie in the connection."""
+    c = drive.connection
+    state = load(drive.states, drive.counts[0], vehicle)
+    store(c.states, 0, state)
+    if turn_in(bend, 0.0, vehicle) != bend:
+        return 0  # who turns by driving
+    limit = control_limits(vehicle)[1] * vehicle.dt
+    steps = max(math.ceil(abs(bend - state[4]) / limit - ROUNDING), 0)
+    for i in range(steps):
+        second = (bend - state[4]) / (vehicle.dt * (steps - i))
+        c.controls[i, 0] = 0.0
+        c.controls[i, 1] = second
+        state = step(state, 0.0, second, vehicle)
+        store(c.states, i + 1, state)
+    return steps
+
+
+@lean
+def _list_limits(
+    drive: Drive, gear: float, bend: float, metres: float, top: float, vehicle: Vehicle, scene: Scene
+) -> int:
+    """Find the largest of the ``TOPS`` that is free at each stride of an arc. Returns the strides."""
+    state = load(drive.states, drive.counts[0], vehicle)
+    count = min(max(math.ceil(metres / stride_of(gear, vehicle)), 1), drive.levels.shape[0] - 1)
+    speed = gear * metres / (count * vehicle.dt)
+    for i in range(count + 1):
+        level = 0
+        while level < len(TOPS) - 1:
+            drive.counts[1] += 1
+            if state_is_free(at_pace(state, gear * TOPS[level] * top, bend, vehicle), vehicle, scene):
+                break
+            level += 1
+        drive.levels[i] = level
+        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    return count
+
+
+@lean
+def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Vehicle, scene: Scene) -> bool:
+    """Turn the wheels at rest, then drive an arc from rest to rest, as quickly as obstacles allow."""
+    c = drive.connection
+    limit_1, limit_2 = control_limits(vehicle)
+    turning = turn_wheels(drive, bend, vehicle)
+    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    acceleration = limit_1
+    if turn_in(bend, 0.0, vehicle) != bend:
+        curvature = abs(curvature_of(bend, vehicle))
+        top = min(top, turn_limit(vehicle) / curvature)
+        acceleration = min(limit_1, limit_2 / curvature)
+    count = _list_limits(drive, gear, bend, metres, top, vehicle, scene)
+    for slower in range(len(TOPS)):
+        for i in range(count + 1):
+            level = drive.levels[i]
+            if i > 0:
+                level = max(level, drive.levels[i - 1])
+            if i < count:
+                level = max(level, drive.levels[i + 1])
+            drive.limits[i] = TOPS[min(level + slower, len(TOPS) - 1)] * top
+        steps = fill_pace(c.speeds, drive.limits, count, metres, gear, acceleration, vehicle.dt)
+        if steps < 0 or turning + steps > c.controls.shape[0]:
+            return False
+        state = load(c.states, turning, vehicle)
+        for i in range(steps):
+            first = (c.speeds[i + 1] - state[3]) / vehicle.dt
+            second = (turn_in(bend, c.speeds[i + 1], vehicle) - state[4]) / vehicle.dt
+            first = min(max(first, -limit_1), limit_1)
+            second = min(max(second, -limit_2), limit_2)
+            first, second = admissible(state, first, second, vehicle)
+            c.controls[turning + i, 0] = first
+            c.controls[turning + i, 1] = second
+            state = step(state, first, second, vehicle)
+            store(c.states, turning + i + 1, state)
+        if connection_is_free(drive, turning + steps, vehicle, scene):
+            return append(drive, turning + steps)
+    return False
+
+
+@lean
+def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
+    """Drive a word of the connection: in one go if it is free at some speed, else from arc to arc."""
+    c = drive.connection
+    at_rest = drive.states[0, 3] == 0.0
+    for share in (1.0, 0.5, 0.25):
+        for k in range(c.states.shape[1]):
+            c.states[0, k] = drive.states[0, k]
+        top = share * vehicle.max_speed
+        if radius_at(top, vehicle) != radius_at(vehicle.max_speed, vehicle):
+            break
+        steps = connect(c, word, drive.target, top, vehicle)
+        if steps > 0 and connection_is_free(drive, steps, vehicle, scene):
+            return append(drive, steps)
+        if not at_rest:
+            return False
+    if not at_rest:
+        return False
+    radius = radius_at(vehicle.max_speed, vehicle)
+    bend = tightest_bend(vehicle.max_speed, vehicle)
+    for k in range(PARTS):
+        metres = radius * c.words[word, PARTS + k]
+        if abs(metres) > SMALLEST:
+            gear = 1.0 if metres > 0.0 else -1.0
+            if not drive_arc(drive, gear, bend * c.words[word, k], abs(metres), vehicle, scene):
+                return False
+    return True

@@ -1,0 +1,211 @@
+"""Joins the start to a node of a goal tree by arcs that also leave the trailers as the node has them.
+
+A word of turns leads the first body to the node and the trailers somewhere. Its arcs are driven a little more
+or less sharply, a little farther or less far, until all of the state is that of the node (Gauss-Newton with
+least changes).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.search.connection.words import PARTS
+from planners.search.manoeuvres.arcs import at_pace, stride_along, stride_of
+from planners.world.arrays import Floats, Indices
+from planners.world.geometry.collision import Scene
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import wrapped
+from planners.world.vehicles.dynamics import State, bend_with, load, step, store, tightest_bend
+from planners.world.vehicles.vehicle import Vehicle
+
+MOST_ARCS: Final = 2 * PARTS
+ROUNDS: Final = 16
+BEND_SHARE: Final = 0.2  # of the tightest bend: how much an arc's bend changes as readily as ...
+LENGTH_SHARE: Final = 0.2  # ... its length does, by this share of the first body's length
+LARGEST: Final = 1.0  # change of a round, in these shares
+NUDGE: Final = 1e-5  # of a bend (rad) and of a length (m), to see what they do
+DAMPING: Final = 1e-7
+COARSE: Final = 4.0  # strides of a step here: nothing is looked at
+EXACT: Final = 1e-5  # metres and radians
+WIDEST: Final = 0.5  # radians or metres: who is farther off is not corrected
+
+
+class Join(NamedTuple):
+    """Arcs from the start to a node, and the buffers that correct them."""
+
+    arcs: Floats  # [3, MOST_ARCS] gear (1 or -1), bend, length in metres
+    ends: Floats  # [2, S] where the arcs lead, and where they should
+    effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on the end: x, y, heading, hitches
+    squares: Floats  # [6, 7] the equations of a correction
+    counts: Indices  # [1] how many arcs there are
+
+
+def allocate_join(state_size: int) -> Join:
+    """Buffers for states of ``state_size`` numbers."""
+    return Join(
+        np.zeros((3, MOST_ARCS)),
+        np.zeros((2, state_size)),
+        np.zeros((6, 2 * MOST_ARCS)),
+        np.zeros((6, 7)),
+        np.zeros(1, np.int64),
+    )
+
+
+@inlined
+def _along(state: State, gear: float, bend: float, metres: float, vehicle: Vehicle) -> State:
+    """The end of an arc, whatever is in the way."""
+    count = math.ceil(metres / (COARSE * stride_of(gear, vehicle)))
+    if count == 0:
+        return state
+    speed = gear * metres / (count * vehicle.dt)
+    for _ in range(count):
+        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    return state
+
+
+@lean
+def _end(start: Floats, join: Join, changed: int, vehicle: Vehicle) -> None:
+    """Find the end of all arcs; of number ``changed`` bend or length is nudged, of none if it is negative."""
+    state = load(start, 0, vehicle)
+    for k in range(join.counts[0]):
+        bend = join.arcs[1, k] + (NUDGE if changed == 2 * k else 0.0)
+        metres = join.arcs[2, k] + (NUDGE if changed == 2 * k + 1 else 0.0)
+        state = _along(state, join.arcs[0, k], bend, metres, vehicle)
+    store(join.ends, 0, state)
+
+
+@inlined
+def _off(join: Join, row: int) -> float:
+    """How much is missing at the end: x and y (m), heading, and each hitch (rad)."""
+    if row < 2:
+        return float(join.ends[1, row] - join.ends[0, row])
+    if row == 2:
+        return wrapped(join.ends[1, 2] - join.ends[0, 2])
+    return float(join.ends[1, row + 2] - join.ends[0, row + 2])
+
+
+@inlined
+def _worst(join: Join) -> float:
+    worst = 0.0
+    for row in range(join.ends.shape[1] - 2):
+        worst = max(worst, abs(_off(join, row)))
+    return worst
+
+
+@inlined
+def _solve(squares: Floats, rows: int) -> None:
+    """Solve the equations by elimination; they are positive definite. The solution is the last column."""
+    for i in range(rows):
+        for j in range(rows):
+            if j != i:
+                factor = squares[j, i] / squares[i, i]
+                for k in range(i, rows + 1):
+                    squares[j, k] -= factor * squares[i, k]
+    for i in range(rows):
+        squares[i, rows] /= squares[i, i]
+
+
+@lean
+def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
+    """Correct the arcs until they lead from ``start [1, S]`` to ``join.ends[1]``. Returns whether they do."""
+    rows = join.ends.shape[1] - 2
+    columns = 2 * join.counts[0]
+    limit = tightest_bend(vehicle.max_speed, vehicle)
+    size = vehicle.front + vehicle.rear
+    _end(start, join, -1, vehicle)
+    for _ in range(ROUNDS):
+        worst = _worst(join)
+        if worst < EXACT:
+            return True
+        if not worst < WIDEST:
+            return False
+        for row in range(rows):
+            join.squares[row, rows] = _off(join, row)
+        for column in range(columns):
+            weight = BEND_SHARE * limit if column % 2 == 0 else LENGTH_SHARE * size
+            _end(start, join, column, vehicle)
+            for row in range(rows):
+                effect = join.squares[row, rows] - _off(join, row)
+                join.effects[row, column] = weight * effect / NUDGE
+        for i in range(rows):
+            for j in range(rows):
+                total = DAMPING if i == j else 0.0
+                for column in range(columns):
+                    total += join.effects[i, column] * join.effects[j, column]
+                join.squares[i, j] = total
+        _solve(join.squares, rows)
+        largest = LARGEST
+        for column in range(columns):
+            change = 0.0
+            for row in range(rows):
+                change += join.effects[row, column] * join.squares[row, rows]
+            join.effects[0, column] = change  # which the next columns do not need
+            largest = max(largest, abs(change))
+        for column in range(columns):
+            change = join.effects[0, column] * LARGEST / largest
+            arc = column // 2
+            if column % 2 == 0:
+                bend = join.arcs[1, arc] + BEND_SHARE * limit * change
+                join.arcs[1, arc] = min(max(bend, -limit), limit)
+            else:
+                join.arcs[2, arc] = max(join.arcs[2, arc] + LENGTH_SHARE * size * change, 0.0)
+        _end(start, join, -1, vehicle)
+    return False
+
+
+@lean
+def take_word(join: Join, word: Floats, radius: float, vehicle: Vehicle) -> None:
+    """Make the arcs of a word; the longest are divided until there are enough to correct all of a state."""
+    bend = bend_with(1.0 / radius, vehicle)
+    arcs = join.arcs
+    count = 0
+    for k in range(PARTS):
+        metres = radius * word[PARTS + k]
+        if metres != 0.0:
+            arcs[0, count] = 1.0 if metres > 0.0 else -1.0
+            arcs[1, count] = bend * word[k]
+            arcs[2, count] = abs(metres)
+            count += 1
+    while count < join.ends.shape[1] - 2:
+        longest = 0
+        for k in range(count):
+            if arcs[2, k] > arcs[2, longest]:
+                longest = k
+        for k in range(count, longest, -1):
+            for row in range(3):
+                arcs[row, k] = arcs[row, k - 1]
+        after = min(0.5 * arcs[2, longest], vehicle.front + vehicle.rear)
+        arcs[2, longest] -= after
+        arcs[2, longest + 1] = after
+        count += 1
+    join.counts[0] = count
+
+
+@lean
+def trailers_are_off(start: Floats, join: Join, most: float, vehicle: Vehicle) -> bool:
+    """Whether the arcs leave a trailer more than ``most`` radians from where it should be."""
+    _end(start, join, -1, vehicle)
+    for row in range(3, join.ends.shape[1] - 2):  # noqa: SIM110 Numba has no generators for any()
+        if not abs(_off(join, row)) <= most:
+            return True
+    return False
+
+
+@lean
+def arcs_are_free(start: Floats, join: Join, vehicle: Vehicle, scene: Scene) -> tuple[bool, int]:
+    """Whether the arcs are free, and how often obstacles were looked at."""
+    state = load(start, 0, vehicle)
+    looks = 0
+    for k in range(join.counts[0]):
+        gear = join.arcs[0, k]
+        count = math.ceil(join.arcs[2, k] / stride_of(gear, vehicle))
+        for _ in range(count):
+            stride = join.arcs[2, k] / count
+            state, free, checks = stride_along(state, gear, join.arcs[1, k], stride, vehicle, scene)
+            looks += checks
+            if free < stride:
+                return False, looks
+    return True, looks

@@ -1,0 +1,46 @@
+"""A word's arcs are corrected until the trailers stand as they should, too."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planners.search.connection.words import MOST_WORDS, PARTS, list_words
+from planners.search.manoeuvres.joining import Join, allocate_join, close, take_word
+from planners.world.arrays import Floats
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR_1_TRAILER, CarWithTrailers, state_size
+
+RADIUS = 5.0
+
+
+def test_arcs_lead_to_a_state_with_its_hitch() -> None:
+    vehicle = CAR_1_TRAILER
+    join = allocate_join(state_size(vehicle))
+    start = np.zeros((1, state_size(vehicle)))
+    words = np.zeros((MOST_WORDS, 2 * PARTS))
+    closed = 0
+    for number in range(list_words(2.0, 0.5, 0.3, words)):
+        if (words[number, PARTS:] < 0.0).any():
+            continue
+        join.ends[1, :3] = 2.0 * RADIUS, 0.5 * RADIUS, 0.3
+        join.ends[1, 5:] = 0.05
+        take_word(join, words[number], RADIUS, vehicle)
+        if close(start, join, vehicle):
+            closed += 1
+            assert np.allclose(
+                driven(start[0], join, vehicle)[[0, 1, 2, *range(5, start.shape[1])]],
+                join.ends[1, [0, 1, 2, *range(5, start.shape[1])]],
+                atol=1e-3,
+            )
+    assert closed > 0
+
+
+def driven(state: Floats, join: Join, vehicle: CarWithTrailers) -> Floats:
+    """Where the arcs lead, in centimetres."""
+    for k in range(int(join.counts[0])):
+        gear, bend, metres = join.arcs[:, k]
+        steps = int(np.ceil(metres / 1e-2))
+        state = state.copy()
+        state[3:5] = gear * metres / (steps * vehicle.dt), bend
+        state = simulate(state, np.zeros((steps, 2)), vehicle)[-1]
+    return state
