@@ -1,0 +1,131 @@
+"""Drives from the start to a node of a goal tree, and from there to the goal."""
+
+from __future__ import annotations
+
+from planners.search.manoeuvres.driving import (
+    SMALLEST,
+    Drive,
+    append,
+    connection_is_free,
+    drive_arc,
+    drive_word,
+    turn_wheels,
+)
+from planners.search.manoeuvres.goal_tree import GoalTree
+from planners.search.query import Endings
+from planners.search.structures import tree as trees
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
+from planners.world.goal import reaches
+from planners.world.jit import lean
+from planners.world.vehicles.dynamics import admissible, load, step, store
+from planners.world.vehicles.vehicle import Vehicle
+
+
+@lean
+def drive_to_goal(
+    drive: Drive,
+    tree: GoalTree,
+    node: int,
+    word: int,
+    start: Floats,
+    endings: Endings,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Drive from the start over a word to a node, and from there over the tree's arcs to the goal.
+
+    Returns whether that leads to the goal, and nothing is in the way. The drive lies in ``drive`` then.
+    """
+    drive.counts.fill(0)
+    for k in range(drive.states.shape[1]):
+        drive.states[0, k] = start[0, k]
+    if not drive_word(drive, word, vehicle, scene):
+        return False
+    return _drive_in(drive, tree, node, endings, goal, vehicle, scene)
+
+
+@lean
+def drive_arcs_to_goal(
+    drive: Drive,
+    tree: GoalTree,
+    node: int,
+    start: Floats,
+    endings: Endings,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Drive from the start over the arcs of ``drive.join`` to a node, and from there to the goal.
+
+    Returns the same as ``drive_to_goal``.
+    """
+    drive.counts.fill(0)
+    for k in range(drive.states.shape[1]):
+        drive.states[0, k] = start[0, k]
+    arcs = drive.join.arcs
+    for k in range(drive.join.counts[0]):
+        if arcs[2, k] > SMALLEST and not drive_arc(drive, arcs[0, k], arcs[1, k], arcs[2, k], vehicle, scene):
+            return False
+    return _drive_in(drive, tree, node, endings, goal, vehicle, scene)
+
+
+@lean
+def _drive_known(drive: Drive, endings: Endings, part: int, vehicle: Vehicle, scene: Scene) -> bool:
+    """Drive a part of the known endings by its controls."""
+    c = drive.connection
+    first = endings.starts[part]
+    steps = endings.starts[part + 1] - 1 - first
+    turning = turn_wheels(drive, endings.states[first, 4], vehicle)
+    if turning + steps > c.controls.shape[0]:
+        return False
+    state = load(c.states, turning, vehicle)
+    for i in range(steps):
+        acceleration = endings.controls[first + i, 0]
+        second = endings.controls[first + i, 1]
+        acceleration, second = admissible(state, acceleration, second, vehicle)
+        c.controls[turning + i, 0] = acceleration
+        c.controls[turning + i, 1] = second
+        state = step(state, acceleration, second, vehicle)
+        store(c.states, turning + i + 1, state)
+    return bool(connection_is_free(drive, turning + steps, vehicle, scene) and append(drive, turning + steps))
+
+
+@lean
+def _drive_in(
+    drive: Drive, tree: GoalTree, node: int, endings: Endings, goal: Floats, vehicle: Vehicle, scene: Scene
+) -> bool:
+    """Drive on over the tree's arcs from a node to the goal."""
+    while node > 0:
+        if tree.known[node] >= 0:
+            if not _drive_known(drive, endings, tree.known[node], vehicle, scene):
+                return False
+            drive.counts[2] += 1
+            node = tree.parents[node]
+            continue
+        gear = 1.0 if tree.metres[node] < 0.0 else -1.0
+        bend = tree.bends[node]
+        metres = abs(tree.metres[node])
+        node = tree.parents[node]
+        while tree.known[node] < 0 and tree.bends[node] == bend and gear * tree.metres[node] < 0.0:
+            metres += abs(tree.metres[node])
+            node = tree.parents[node]
+        if not drive_arc(drive, gear, bend, metres, vehicle, scene):
+            return False
+    return reaches(load(drive.states, drive.counts[0], vehicle), goal)
+
+
+@lean
+def add_to_tree(drive: Drive, tree: trees.Tree, vehicle: Vehicle) -> bool:
+    """Add a drive from the root of a tree to the goal, unless it takes too long or has no room."""
+    steps = drive.counts[0]
+    counts = tree.counts
+    if steps * vehicle.dt >= tree.bound[0] or counts[trees.SIZE] + steps > tree.states.shape[0]:
+        return False
+    parent = 0
+    for i in range(steps):
+        state = load(drive.states, i + 1, vehicle)
+        parent = trees.append(tree, parent, 0, state, drive.controls[i, 0], drive.controls[i, 1], i + 1)
+    counts[trees.GOAL_VERTEX] = parent
+    return True

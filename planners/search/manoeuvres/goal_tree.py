@@ -1,0 +1,131 @@
+"""The tree of ways out of a goal pose, which are ways into it with time reversed."""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.search.connection.profile import run_seconds
+from planners.search.structures.frontier import Frontier, allocate_frontier, clear_frontier, push
+from planners.world.arrays import Floats, Indices
+from planners.world.goal import HEADING, HITCHES, X, Y
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import wrapped
+from planners.world.vehicles.dynamics import State, bend_rate, control_limits, store
+from planners.world.vehicles.vehicle import Vehicle
+
+NODES: Final = 1 << 17
+HITCH_CELLS: Final = 5.0  # a radian
+ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
+# indices into GoalTree.counts
+SIZE, CHECKS = range(2)
+
+
+class GoalTree(NamedTuple):
+    """Poses at rest, each joined by an arc to the one that it was reached from; the first is the goal."""
+
+    states: Floats  # [NODES, S]
+    parents: Indices  # [NODES]
+    bends: Floats  # [NODES] of the arc between a node and its parent
+    metres: Floats  # [NODES] and its length; negative if it leads backwards out, so forwards in
+    runs: Floats  # [NODES] metres that are driven in the gear of that arc until it changes
+    seconds: Floats  # [NODES] estimated driving time from the node to the goal
+    known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
+    frontier: Frontier
+    counts: Indices  # [2]
+
+
+def allocate_goal_tree(state_size: int) -> GoalTree:
+    """Buffers for states of ``state_size`` numbers."""
+    return GoalTree(
+        np.zeros((NODES, state_size)),
+        np.zeros(NODES, np.int64),
+        np.zeros(NODES),
+        np.zeros(NODES),
+        np.zeros(NODES),
+        np.zeros(NODES),
+        np.zeros(NODES, np.int64),
+        allocate_frontier(),
+        np.zeros(2, np.int64),
+    )
+
+
+@lean
+def plant_goal(tree: GoalTree, goal: Floats) -> None:
+    """Begin a tree at a goal, that of ``goal_of``. Hitches that it does not ask for are straight."""
+    clear_frontier(tree.frontier)
+    push(tree.frontier, 0.0, 0, 0)
+    tree.counts[SIZE] = 1
+    for k in range(tree.states.shape[1]):
+        tree.states[0, k] = 0.0
+    tree.states[0, 0] = goal[X]
+    tree.states[0, 1] = goal[Y]
+    tree.states[0, 2] = goal[HEADING]
+    for k in range((goal.shape[0] - HITCHES) // 2):
+        tree.states[0, 5 + k] = goal[HITCHES + 2 * k]
+    tree.parents[0] = -1
+    tree.bends[0] = 0.0
+    tree.metres[0] = 0.0
+    tree.runs[0] = 0.0
+    tree.seconds[0] = 0.0
+    tree.known[0] = 0  # the root is no end of an arc
+
+
+@inlined
+def _run_seconds(metres: float, vehicle: Vehicle) -> float:
+    return run_seconds(metres, 0.0, 0.0, vehicle.max_speed, control_limits(vehicle)[0])
+
+
+@inlined
+def seconds_after(tree: GoalTree, node: int, bend: float, metres: float, vehicle: Vehicle) -> float:
+    """The time to the goal from the end of an arc out of a node, in seconds; ``metres`` as in the tree."""
+    turning = abs(bend - tree.bends[node]) / bend_rate(vehicle.max_speed, vehicle)
+    seconds = tree.seconds[node]
+    if tree.metres[node] * metres > 0.0:
+        run = tree.runs[node]
+        seconds += _run_seconds(run + abs(metres), vehicle) - _run_seconds(run, vehicle) + ROLLING * turning
+    else:
+        seconds += _run_seconds(abs(metres), vehicle) + (turning if node > 0 else 0.0)
+    return float(seconds)
+
+
+@inlined
+def add_node(tree: GoalTree, parent: int, state: State, bend: float, metres: float, seconds: float) -> int:
+    """Add the end of an arc out of a node, and return its number. The tree must have room."""
+    new = tree.counts[SIZE]
+    tree.counts[SIZE] += 1
+    store(tree.states, new, state)
+    tree.states[new, 3] = 0.0
+    tree.states[new, 4] = 0.0
+    tree.parents[new] = parent
+    tree.bends[new] = bend
+    tree.metres[new] = metres
+    tree.seconds[new] = seconds
+    tree.known[new] = -1
+    same = tree.metres[parent] * metres > 0.0
+    tree.runs[new] = abs(metres) + (tree.runs[parent] if same else 0.0)
+    return int(new)
+
+
+@inlined
+def add_known_node(
+    tree: GoalTree, parent: int, state: State, bend: float, metres: float, seconds: float, part: int
+) -> int:
+    """Add the beginning of a part of the known endings, as ``add_node`` does."""
+    new = add_node(tree, parent, state, bend, metres, seconds)
+    tree.known[new] = part
+    return new
+
+
+@inlined
+def cell_of(state: State, gear: float, tree: GoalTree, cell: float, headings: int, vehicle: Vehicle) -> int:
+    """The cell of a pose that is left in a gear, seen from the goal; with its hitches."""
+    row = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
+    column = math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF
+    heading = int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi))) & 127
+    key = 0
+    for k in range(5, len(state)):
+        key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
+    return int(((key << 16 | row) << 16 | column) << 8 | heading << 1 | (1 if gear > 0.0 else 0))

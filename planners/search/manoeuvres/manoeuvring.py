@@ -1,0 +1,146 @@
+"""A search for manoeuvres beside another search: coarse at first, finer where that finds no way."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from planners.search.connection.connection import radius_at
+from planners.search.connection.pose_table import seconds_to_pose
+from planners.search.manoeuvres.arriving import add_to_tree
+from planners.search.manoeuvres.driving import allocate_drive
+from planners.search.manoeuvres.endings import no_endings
+from planners.search.manoeuvres.goal_tree import CHECKS, allocate_goal_tree, plant_goal
+from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
+from planners.search.manoeuvres.shots import FromStart
+from planners.search.query import Query
+from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
+from planners.search.structures.tree import CHECKS as TREE_CHECKS
+from planners.search.structures.tree import EXPANSIONS, Tree
+from planners.world.arrays import Floats
+from planners.world.geometry.occupancy import Bits, window_of
+from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED
+from planners.world.problem import start_state
+from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
+
+LEVELS: Final = (  # and for how many expansions, unless nothing is left before
+    (2000, Outward(cell=0.2, headings=48)),
+    (3000, Outward(cell=0.1, headings=64)),
+    (5000, Outward(cell=0.05, headings=96)),
+    (1 << 30, Outward(cell=0.02, headings=128)),
+)
+HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
+TIGHT: Final = 0.6  # a goal with less room around it is tight
+AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
+
+
+def suits(goal: Floats, vehicle: Vehicle) -> bool:
+    """Whether a goal, that of ``goal_of``, may be reached by manoeuvres: a pose at rest, also backwards."""
+    return bool(
+        goal[HEADING_TOLERANCE] < np.inf
+        and goal[LEAST_SPEED] <= 0.0 <= goal[MOST_SPEED]
+        and vehicle.min_speed < 0.0
+    )
+
+
+def word_radius(vehicle: Vehicle) -> float:
+    """The radius in metres of words: so large that trailers keep well within their hitches."""
+    least = 0.0
+    for trailer in reversed(trailers_of(vehicle)):
+        length = trailer.hitch_length
+        least = max(length / math.sin(HITCH_SHARE * trailer.max_hitch), math.hypot(least, length))
+    return max(least, float(radius_at(vehicle.max_speed, vehicle)))
+
+
+def _alone(vehicle: Vehicle) -> Vehicle:
+    """The vehicle without its trailers, which turns no more sharply than words do with them."""
+    if not isinstance(vehicle, CarWithTrailers):
+        return vehicle
+    fields = vehicle._asdict()
+    del fields["trailers"]
+    return Car(**fields)._replace(max_steering=math.atan(vehicle.wheelbase / word_radius(vehicle)))
+
+
+def _suited(level: Outward, vehicle: Vehicle) -> Outward:
+    """The level with bends in which trailers can follow."""
+    if not isinstance(vehicle, CarWithTrailers):
+        return level
+    share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
+    return level._replace(bends=(share, 0.0, -share, 0.5 * share, -0.5 * share))
+
+
+def allocate_way_from_start() -> CostToGo:
+    """Buffers of their own, since the search beside this one needs the way to the goal."""
+    return allocate_cost_to_go()
+
+
+class Manoeuvring:
+    """A search for a manoeuvre, which goes on each time it is told to."""
+
+    def __init__(self, query: Query, goal: Floats, occupied: Bits) -> None:
+        """Begin.
+
+        Args:
+            query: the problem, and the buffers.
+            goal: that of ``goal_of``; it has to suit.
+            occupied: ``[64]`` the cells of the problem's window that are not free.
+        """
+        problem, vehicle = query.problem, query.vehicle
+        size = state_size(vehicle)
+        self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
+        self._tree = query.workspace.buffers(allocate_goal_tree, size)
+        self._drive = query.workspace.buffers(allocate_drive, size)
+        go = query.workspace.buffers(allocate_way_from_start)
+        fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
+        start = start_state(problem, vehicle)[np.newaxis]
+        endings = query.endings or no_endings(size)
+        self._known = FromStart(start, go, seconds_to_pose(_alone(vehicle)), endings, word_radius(vehicle))
+        self._nodes = np.empty(len(endings.follows), np.int32)
+        self._level = self._spent = 0
+        self.joined = False  # whether the drive that was found ends with a known ending
+        self._begin()
+        # whether there is so little room around the goal that other searches have small hopes
+        self.is_tight = bool(room_around(self._tree.states, vehicle, query.scene) < TIGHT)
+        self._grow(0)  # compiled, if need be, before the planner's clock runs
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to try."""
+        return self._level == len(LEVELS)
+
+    def advance(self, tree: Tree, until: int) -> None:
+        """Search until there is a drive, which is added to ``tree``, or the tree has ``until`` expansions."""
+        counts = tree.counts
+        while counts[EXPANSIONS] < until and not self.is_over:
+            most, _ = LEVELS[self._level]
+            more = min(until - int(counts[EXPANSIONS]), most - self._spent)
+            checks = self._checks()
+            found, used = self._grow(more)
+            counts[EXPANSIONS] += used
+            counts[TREE_CHECKS] += self._checks() - checks
+            self._spent += used
+            if found and add_to_tree(self._drive, tree, self._vehicle):
+                self.joined = bool(self._drive.counts[2])
+                return
+            if used < more or self._spent >= most:
+                self._level, self._spent = self._level + 1, 0
+                self._begin()
+
+    def _begin(self) -> None:
+        """Plant the tree of the present level, if there is one."""
+        if not self.is_over:
+            plant_goal(self._tree, self._goal)
+            level = _suited(LEVELS[self._level][1], self._vehicle)
+            begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
+
+    def _grow(self, most: int) -> tuple[bool, int]:
+        """Grow the goal tree by some expansions at most; whether there is a drive, and how many they were."""
+        return grow_outward(
+            *(self._tree, most, self._known, self._goal, self._drive),
+            *(_suited(LEVELS[self._level][1], self._vehicle), self._vehicle, self._scene),
+        )
+
+    def _checks(self) -> int:
+        return int(self._tree.counts[CHECKS])

@@ -1,0 +1,169 @@
+"""Grows a goal tree from the goal outwards, until a word of turns leads from the start to one of its nodes.
+
+Where it is tight around the goal, few ways lead out, and most of what goes on leads away. From outside many
+ways seem to lead in, and nearly all of them end at an obstacle.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from planners.search.connection.pose_table import seconds_from
+from planners.search.manoeuvres.arcs import FINE, STRIDE, stride_along, stride_of
+from planners.search.manoeuvres.driving import Drive
+from planners.search.manoeuvres.endings import add_endings
+from planners.search.manoeuvres.goal_tree import CHECKS, SIZE, GoalTree, add_node, cell_of, seconds_after
+from planners.search.manoeuvres.shots import FromStart, shoot
+from planners.search.structures.cost_to_go import metres_to_go
+from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.collision import Scene
+from planners.world.jit import inlined, lean
+from planners.world.vehicles.dynamics import State, load, tightest_bend
+from planners.world.vehicles.vehicle import Vehicle
+
+KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
+GEARS: Final = (1.0, -1.0)
+
+
+class Outward(NamedTuple):
+    """How a tree grows. Lengths are in those of the first body."""
+
+    bends: tuple[float, ...] = (1.0, 0.0, -1.0)  # shares of the tightest
+    marks: tuple[int, ...] = (3, 8, 15, 30, 50, 80)  # strides after which an arc may end
+    cell: float = 0.05  # side of a cell
+    headings: int = 96  # cells of headings, 128 at most
+    greed: float = 1.5  # weight of the time from the start
+
+
+@lean
+def room_around(states: Floats, vehicle: Vehicle, scene: Scene) -> float:
+    """The share that is free of the tightest arcs and straight ways from ``states[0]``, a length each."""
+    bend_limit = tightest_bend(vehicle.max_speed, vehicle)
+    free = 0.0
+    whole = 0.0
+    for gear in GEARS:
+        stride = stride_of(gear, vehicle)
+        for share in (1.0, 0.0, -1.0):
+            state = load(states, 0, vehicle)
+            metres = 0.0
+            more = stride
+            while metres < vehicle.front + vehicle.rear and more == stride:
+                state, more, _ = stride_along(state, gear, share * bend_limit, stride, vehicle, scene)
+                metres += more
+            free += metres
+            whole += vehicle.front + vehicle.rear
+    return free / whole
+
+
+@inlined
+def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
+    x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+    turns = seconds_from(x, y, heading, (state[0], state[1], state[2]), known.table, vehicle.max_speed)
+    return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)
+
+
+@lean
+def begin_outward(
+    tree: GoalTree, known: FromStart, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
+) -> None:
+    """Let the stops of known endings wait that are free; ``nodes [K]`` is filled in with their numbers."""
+    add_endings(tree, known.endings, nodes, vehicle, scene)
+    for k in range(nodes.shape[0]):
+        if nodes[k] >= 0:
+            left = _seconds_from_start(load(tree.states, nodes[k], vehicle), known, vehicle)
+            push(tree.frontier, KNOWN * tree.seconds[nodes[k]] + settings.greed * left, nodes[k], 1)
+
+
+@lean
+def open_node(
+    tree: GoalTree,
+    node: int,
+    further: bool,
+    known: FromStart,
+    settings: Outward,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> None:
+    """Let the ends of all arcs out of a node wait; ``further``: also of its own arc, driven on."""
+    bend_limit = tightest_bend(vehicle.max_speed, vehicle)
+    size = vehicle.front + vehicle.rear
+    for gear in GEARS:
+        stride = stride_of(gear, vehicle)
+        if stride <= 0.0:
+            continue
+        for share in settings.bends:
+            bend = share * bend_limit
+            if node > 0 and bend == tree.bends[node] and (gear * tree.metres[node] < 0.0 or not further):
+                continue  # back where it came from, or on where its parent has been
+            state = load(tree.states, node, vehicle)
+            metres = 0.0
+            before = 0.0
+            mark = 0
+            while mark < len(settings.marks):
+                state, free, checks = stride_along(state, gear, bend, stride, vehicle, scene)
+                tree.counts[CHECKS] += checks
+                metres += free
+                ended = free < stride
+                if ended or metres >= settings.marks[mark] * STRIDE * size - 1e-9:
+                    mark += 1
+                    if metres - before >= 2.0 * stride / FINE:
+                        longest = mark == len(settings.marks) and not ended
+                        _wait(tree, node, state, bend, gear * metres, longest, known, settings, vehicle)
+                    before = metres
+                if ended:
+                    break
+
+
+@inlined
+def _wait(
+    tree: GoalTree,
+    node: int,
+    state: State,
+    bend: float,
+    metres: float,
+    longest: bool,
+    known: FromStart,
+    settings: Outward,
+    vehicle: Vehicle,
+) -> None:
+    cell = settings.cell * (vehicle.front + vehicle.rear)
+    if tree.counts[SIZE] == tree.parents.shape[0] or was_reached(
+        tree.frontier, cell_of(state, metres, tree, cell, settings.headings, vehicle)
+    ):
+        return
+    seconds = seconds_after(tree, node, bend, metres, vehicle)
+    left = _seconds_from_start(state, known, vehicle)
+    new = add_node(tree, node, state, bend, metres, seconds)
+    push(tree.frontier, seconds + settings.greed * left, new, 1 if longest else 0)
+
+
+@lean
+def grow_outward(
+    tree: GoalTree,
+    most: int,
+    known: FromStart,
+    goal: Floats,
+    drive: Drive,
+    settings: Outward,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> tuple[bool, int]:
+    """Open the node with the least estimate until solved, nothing is left, or ``most`` expansions.
+
+    Returns whether ``drive`` leads to the goal now, and how many expansions there were.
+    """
+    expansions = 0
+    cell = settings.cell * (vehicle.front + vehicle.rear)
+    while expansions < most and not is_empty(tree.frontier):
+        node, longest = pop(tree.frontier)
+        state = load(tree.states, node, vehicle)
+        key = cell_of(state, tree.metres[node], tree, cell, settings.headings, vehicle)
+        if was_reached(tree.frontier, key):
+            continue
+        reach(tree.frontier, key)
+        expansions += 1
+        if shoot(tree, node, known, goal, drive, vehicle, scene):
+            return True, expansions
+        open_node(tree, node, longest == 1, known, settings, vehicle, scene)
+    return False, expansions

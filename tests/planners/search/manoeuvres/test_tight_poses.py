@@ -1,0 +1,62 @@
+"""Tight poses: slots among parked vehicles are reached exactly, judged by the authority."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from planners.search.manoeuvres import manoeuvring
+from planners.search.query import Limits
+from planners.search.registry import plan
+from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.families import Family, family
+from planners.world.problem import Plan, Problem
+from planners.world.randomness import generator
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
+
+LIMITS = Limits(expansions=4000)
+
+
+def slot(source: Family, number: int) -> Problem:
+    return to_canonical(source.draw(3, number))[0]
+
+
+def solved(problem: Problem) -> Plan:
+    found = plan("lattice", problem, generator(0), limits=LIMITS, vehicle=CAR).plan
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("name", ["parallel", "perpendicular", "angled"])
+def test_slots_are_reached_exactly(name: str) -> None:
+    for number in range(12):
+        problem = slot(family(name, "standard"), number)
+        assert faults(problem, solved(problem)) == []
+
+
+def test_the_same_question_has_the_same_answer() -> None:
+    problem = slot(family("parallel", "hard"), 0)
+    first, second = solved(problem), solved(problem)
+    assert np.array_equal(first.states, second.states)
+    assert np.array_equal(first.controls, second.controls)
+
+
+def test_manoeuvres_solve_what_the_lattice_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    problems = [slot(family("parallel"), number) for number in range(10)]
+    ask = partial(plan, "lattice", limits=Limits(expansions=500), vehicle=CAR)
+    monkeypatch.setattr("planners.search.lattice.suits", lambda _goal, _vehicle: False)
+    alone = sum(ask(problem, generator(0)).plan is not None for problem in problems)
+    monkeypatch.setattr("planners.search.lattice.suits", manoeuvring.suits)
+    together = sum(ask(problem, generator(0)).plan is not None for problem in problems)
+    assert together >= 8 > 4 >= alone
+
+
+def test_a_trailer_is_backed_to_a_dock() -> None:
+    for number in range(2):
+        problem = slot(family("dock", "easy", CAR_1_TRAILER), number)
+        found = plan("lattice", problem, generator(0), limits=LIMITS, vehicle=CAR_1_TRAILER).plan
+        assert found is not None
+        assert faults(problem, found, CAR_1_TRAILER) == []
