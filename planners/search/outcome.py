@@ -38,3 +38,4 @@ class Outcome:
     nodes: int
     roadmap_seconds: float
     search_seconds: float
+    joined: bool = False  # whether the plan ends with one of the query's endings

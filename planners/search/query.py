@@ -31,6 +31,15 @@ class Guide(NamedTuple):
     lead: int  # how many points ahead a target lies at most; 0: near the point itself
 
 
+class Endings(NamedTuple):
+    """Parts of plans between two stops, each in the frame of the pose in which its plan ends."""
+
+    states: Floats  # [N, S] of all parts, one after another
+    controls: Floats  # [N, 2] from each state to the next; that of a part's last state counts for nothing
+    starts: Integers  # [K + 1] part k owns states[starts[k] : starts[k + 1]]
+    follows: Integers  # [K] the part that comes after it, always one before in this order; -1: the goal
+
+
 NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1, 0)
 
 
@@ -59,3 +68,4 @@ class Query:
     occupied: Bits | None = None  # [64] the cells that are not free, if they are drawn
     # what else is tried while the search goes on: told of its work so far, it may return a plan that ends it
     beside: Callable[[int], Plan | None] | None = None
+    endings: Endings | None = None  # known ways into a pose at rest, for searches of manoeuvres
