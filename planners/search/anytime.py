@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import NamedTuple
 
-from planners.optimisation.polish import ITERATIONS, polish
+from planners.optimisation.polish import most_iterations, polish
 from planners.search.guides.guidance import guidance
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
@@ -97,7 +97,7 @@ def improve(
     def consider(plan: Plan) -> bool:
         """Polish a plan and keep it if it is the best; say whether it is."""
         nonlocal best, spent
-        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, ITERATIONS))
+        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
         left = seconds - (perf_counter() - began)
         better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
         spent += EXPANSIONS_AN_ITERATION * better.iterations

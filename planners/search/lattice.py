@@ -9,9 +9,11 @@ cell of place, heading and speed count as one.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 from planners.search.guides.sampling import uniform
+from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
 from planners.search.outcome import Outcome
 from planners.search.query import Query
 from planners.search.rrt import towards_anywhere
@@ -84,6 +86,9 @@ class LatticeSettings(NamedTuple):
     )  # the same for problems that are not canonical; where a speed is asked at the goal, without two
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
+    alone: int = 2000  # expansions before manoeuvres are searched for as well, unless the goal is tight
+    by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
+    if_tight: tuple[int, int] = (16, 48)  # ... or so many
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
@@ -102,20 +107,14 @@ def _controls(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> 
 
 
 @inlined
-def _key(state: State, search: int, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> int:
-    """The cell of a state, and the search, twenty bits.
-
-    There are sixteen bits each for row and column (ten of them beside each other, the others in front of the
-    search), seven for the heading and three for the speed.
-    """
-    row = int((state[1] - go.frame[BOTTOM]) * go.frame[PER_M] / lattice.cell)
-    column = int((state[0] - go.frame[LEFT]) * go.frame[PER_M] / lattice.cell)
+def _key(state: State, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> int:
+    """The cell of a state: 16 bits each for row and column, seven for the heading, three for the speed."""
+    row = int((state[1] - go.frame[BOTTOM]) * go.frame[PER_M] / lattice.cell) & 0xFFFF
+    column = int((state[0] - go.frame[LEFT]) * go.frame[PER_M] / lattice.cell) & 0xFFFF
     heading = int((wrapped(state[2]) + math.pi) * (lattice.headings / (2.0 * math.pi))) & 127
     share = (state[3] - vehicle.min_speed) / (vehicle.max_speed - vehicle.min_speed)
     pace = min(int(share * lattice.paces), lattice.paces - 1)
-    far = (row >> 10 & 63) << 6 | (column >> 10 & 63)
-    key = (far << 20 | (search & 0xFFFFF)) << 10 | (row & 1023)
-    return ((key << 10 | (column & 1023)) << 7 | heading) << 3 | pace
+    return ((row << 16 | column) << 7 | heading) << 3 | pace
 
 
 @lean
@@ -133,7 +132,7 @@ def open_vertex(
         for _ in range(lattice.steps):
             control_1, control_2 = _controls(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
-        if not was_reached(frontier, _key(state, frontier.counts[1], ahead.go, lattice, vehicle)):
+        if not was_reached(frontier, _key(state, ahead.go, lattice, vehicle)):
             spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
             left = seconds_to_go(state, ahead, lattice.heading_s, lattice.late_s, vehicle)
             push(frontier, spent + lattice.greed * left, vertex, motion)
@@ -203,7 +202,7 @@ def grow_lattice(
         if counts[trees.GOAL_VERTEX] >= 0:
             return
         if last >= 0:
-            key = _key(load(tree.states, last, vehicle), frontier.counts[1], ahead.go, lattice, vehicle)
+            key = _key(load(tree.states, last, vehicle), ahead.go, lattice, vehicle)
             if not was_reached(frontier, key):
                 reach(frontier, key)
                 if (
@@ -249,15 +248,18 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         levels = levels[2:]
     level, tried = levels[0], 0
     ahead = Ahead(go, NOWHERE, NO_TABLE)
+    manoeuvring: Manoeuvring | None = None
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead
+        nonlocal level, tried, ahead, manoeuvring
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             occupied = query.occupied
             if occupied is None:
                 occupied = drawing_of(query.problem, query.workspace).occupied
             fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+            if suits(goal, vehicle):
+                manoeuvring = Manoeuvring(query, goal, occupied)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle)
         tried += 1
         if improving:
@@ -265,9 +267,24 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         begin_lattice(tree, frontier, ahead, level, vehicle)
 
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
-        grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
+        counts = tree.counts
+        if manoeuvring is None:
+            grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
+            return
+        here, there = settings.if_tight if manoeuvring.is_tight else settings.by_turns
+        if counts[trees.EXPANSIONS] == 0:
+            here = 0 if manoeuvring.is_tight else settings.alone
+        while counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < until:
+            before = counts[trees.EXPANSIONS]
+            grow_lattice(tree, goal, min(before + here, until), frontier, ahead, level, vehicle, scene)
+            if counts[trees.GOAL_VERTEX] < 0:
+                manoeuvring.advance(tree, min(counts[trees.EXPANSIONS] + there, until))
+            if counts[trees.EXPANSIONS] == before:
+                return
+            here = settings.if_tight[0] if manoeuvring.is_tight else settings.by_turns[0]
 
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    return attempt(
+    outcome = attempt(
         query, settings.restart_after, prepare, grow, towards_anywhere(query), explore_from=explore_from
     )
+    return replace(outcome, joined=manoeuvring is not None and manoeuvring.joined)

@@ -13,7 +13,7 @@ from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.search.structures.unreachable import is_unreachable
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, point_is_free, state_is_free
+from planners.world.geometry.collision import Scene, bodies_are_free, point_is_free
 from planners.world.goal import goal_of, reaches
 from planners.world.jit import lean
 from planners.world.problem import Plan, start_state
@@ -32,7 +32,7 @@ SLICE = 256  # expansions between two looks at the clock: a few milliseconds
 def _first_status(root: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> int:
     """Which of the ``_FIRST`` holds before any search."""
     state = load(root, 0, vehicle)
-    if not state_is_free(state, vehicle, scene):
+    if not bodies_are_free(state, vehicle, scene):  # however it is folded, it may straighten
         return 1
     if not point_is_free(goal[0], goal[1], scene):
         return 2

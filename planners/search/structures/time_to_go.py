@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.structures.cost_to_go import CostToGo, metres_to_go
 from planners.world.arrays import Floats
-from planners.world.goal import HEADING_TOLERANCE, MOST_SPEED, RADIUS
+from planners.world.goal import HEADING, HEADING_TOLERANCE, MOST_SPEED, RADIUS, X, Y
 from planners.world.jit import inlined
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, control_limits
@@ -80,6 +80,7 @@ def seconds_to_go(state: State, ahead: Ahead, turn_s: float, late_s: float, vehi
         seconds = metres / vehicle.max_speed + slow
     seconds += turn_s * turn
     if ahead.table.shape[0] > 0:
-        rest = seconds_from(state[0], state[1], state[2], goal, ahead.table, vehicle.max_speed)
+        pose = goal[X], goal[Y], goal[HEADING]
+        rest = seconds_from(state[0], state[1], state[2], pose, ahead.table, vehicle.max_speed)
         seconds = max(seconds, rest + slow - 0.5 * vehicle.max_speed / acceleration)
     return float(seconds)

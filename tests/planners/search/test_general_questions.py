@@ -90,5 +90,6 @@ def test_a_memory_of_canonical_plans_is_no_harm_to_other_questions(memory: Memor
         canonical, _ = to_canonical(asked)
         alone = solve(canonical, "lattice")
         helped = solve(canonical, "lattice", assist, 3, memory)
-        assert (helped.recalled, helped.source) == ((), alone.source)
-        assert alone.plan is None or np.array_equal(alone.plan.states, helped.plan.states)  # type: ignore[union-attr]
+        assert helped.recalled == ()
+        assert helped.solved >= alone.solved
+        assert helped.plan is None or faults(canonical, helped.plan) == []

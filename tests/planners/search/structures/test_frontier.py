@@ -2,6 +2,7 @@
 
 import heapq
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,10 +34,28 @@ def test_motions_come_back_by_their_estimates(steps):
         assert is_empty(FRONTIER) == (not heap)
 
 
-@given(st.lists(st.integers(1, 2**60), max_size=40), st.integers(1, 2**60))
+@given(st.lists(st.integers(0, 2**60), max_size=40), st.integers(0, 2**60))
 def test_only_what_was_reached_is_remembered(keys, other):
     frontier = allocate_frontier()
     for key in keys:
         reach(frontier, key)
         assert was_reached(frontier, key)
     assert not was_reached(frontier, other) or other in keys
+
+
+def test_a_search_remembers_and_forgets_as_if_it_were_the_first():
+    rng = np.random.default_rng(0)
+    used = allocate_frontier()
+    keys = rng.integers(0, 2**60, 2000).tolist()
+    memories = []
+    for frontier in (used, used, allocate_frontier()):
+        clear_frontier(frontier)
+        assert not any(was_reached(frontier, key) for key in keys)
+        for key in keys:
+            reach(frontier, key)
+        memories.append([was_reached(frontier, key) for key in keys])
+        clear_frontier(frontier)
+        for key in rng.integers(0, 2**60, 2000).tolist():
+            reach(frontier, key)
+    assert memories[0] == memories[1] == memories[2]
+    assert 0 < memories[0].count(False) < 100
