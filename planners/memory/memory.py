@@ -11,15 +11,17 @@ import numpy as np
 
 from planners.memory.encoder.encoder import Encoder, Weights, to_onnx
 from planners.memory.encoder.forward_pass import Forward, forward_of
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.plans.cell_masks import CELL_SCORES, rank_by_cells
 from planners.memory.plans.free import START_TOLERANCE
+from planners.memory.plans.plan_arrays import store_plans
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.memory.ranking.inverted_lists import InvertedLists
 from planners.memory.ranking.readout import nearest_readout
 from planners.world.arrays import Floats32, Integers
 from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.workspace import Workspace
 
 
@@ -81,6 +83,13 @@ class Memory:
         return np.argsort(self.durations, kind="stable").astype(np.int32)
 
     @functools.cached_property
+    def library(self) -> PlanLibrary:
+        """The plans as a library, whose parts answer questions that are not canonical."""
+        plans = store_plans(self.plans, state_size(self.vehicle))
+        names = tuple(f"{self.class_name}-{number}" for number in range(len(plans)))
+        return PlanLibrary(self.class_name, self.vehicle, plans, names, self.scales)
+
+    @functools.cached_property
     def heading(self) -> float | None:
         """The heading (radians) that all stored plans begin with; None if they do not agree."""
         headings = self.sweeps.first_poses[:, 2]
@@ -118,7 +127,7 @@ class Memory:
         return scores
 
 
-def scale_fault(memory: Memory, scale: float) -> str | None:
+def scale_fault(memory: Memory | PlanLibrary, scale: float) -> str | None:
     """Return why a memory cannot be used for problems of a scale, or None if it can."""
     if scale in memory.scales:
         return None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from planners.memory.memory import Memory
 from planners.memory.plans.free import ends_of, plan_fits, turned
 from planners.memory.ranking.scores import best_plans
-from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import Plan, Problem, is_canonical
@@ -43,5 +43,6 @@ def ranked_plans(memory: Memory, problem: Problem, k: int) -> list[RankedPlan]:
     for i in best_plans(scores, k).tolist():
         free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
         plan = from_canonical(turned(memory.plans[i], canonical.start[2]), alignment)
-        ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), scaled(plan, problem.scale)))
+        plan = shifted(scaled(plan, problem.scale), problem.offset)
+        ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), plan))
     return ranked

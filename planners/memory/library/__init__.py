@@ -1,0 +1,1 @@
+"""Plans of any questions, in any frames, whose parts answer other questions."""
