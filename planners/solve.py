@@ -12,25 +12,29 @@ from time import perf_counter
 
 import numpy as np
 
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
 from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.search.anytime import improve
-from planners.search.guides.detour import SECOND_LOOK, is_detour
+from planners.search.guides.detour import SECOND_LOOK, is_detour, is_detour_from_motion
 from planners.search.guides.guidance import published_guidance
 from planners.search.help import PATIENCE, Help, fresh_guide
 from planners.search.outcome import Status
-from planners.search.query import Limits, Query
+from planners.search.query import Endings, Limits, Query
 from planners.search.registry import PLANNERS
+from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
-_WITH_MEMORY = ("closed", "open", "repair", "published-open")
+_WITH_MEMORY = ("closed", "open", "repair", "join", "published-open")
+_JOINS = ("open", "repair", "join")  # the assists that aim a search at the ends of stored plans
 ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
+SUB_PLANS = "sub-plans"  # what recall from a library is called
 WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
 
 
@@ -42,7 +46,7 @@ class Attempt:
     problem_class: str
     planner: str
     assist: str
-    recall: str | None  # the strategy, one of ``RECALLS``; None without memory
+    recall: str | None  # the strategy, one of ``RECALLS``, or ``SUB_PLANS``; None without
     top_k: int  # 0 without memory
     status: str
     solved: bool
@@ -110,7 +114,7 @@ def solve(
     planner: str,
     assist: str = "none",
     top_k: int = 1,
-    memory: Memory | None = None,
+    memory: Memory | PlanLibrary | None = None,
     seed: int = 0,
     limits: Limits | None = None,
     vehicle: Vehicle = CAR,
@@ -119,13 +123,15 @@ def solve(
 ) -> Attempt:
     """Solve a problem: try stored plans first, as the assist says, then search.
 
-    Memories hold plans for canonical problems, so for others nothing is recalled.
+    Memories hold plans for canonical problems. Other problems, and all that are put to a library of plans,
+    are answered by parts of plans where possible. If not, ``join`` (as ``open`` and ``repair`` do then) aims
+    the lattice's search for a pose at rest at every place from which the end of a stored plan leads there.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
     drives shortest, else search. A free plan that is a long detour is the answer only if a short search finds
     no quicker one.
-    ``open``: the same, and where none is free, a search along the least blocked of the recalled plans helps
-    the planner. ``repair``: the same, and the blocked segments of that plan may be planned anew before.
+    ``open``: the same, and where no plan is free, a search along the least blocked of the recalled plans
+    helps the planner. ``repair``: the same, and the blocked segments of that plan may be planned anew before.
     ``published-open``: the paper's open box, where the search samples near the states of all recalled plans.
     ``fresh``: search guided by a path over the grid.
     ``random-`` before an assist picks the plans blindly.
@@ -153,7 +159,8 @@ def solve(
         raise ValueError(f"unknown assist '{assist}': choose one of {', '.join(ASSISTS)}")
     memory = None if assist in WITHOUT_MEMORY else memory
     use = assist.removeprefix("random-")
-    recalled = Recalled((), -1, 0)
+    endings: Endings | None = None
+    recalled, parts = Recalled((), -1, 0), SubPlanAnswer(None, 0.0, False, 0)
     if memory is not None:
         if memory.vehicle != vehicle:
             raise ValueError(
@@ -163,28 +170,43 @@ def solve(
         fault = scale_fault(memory, problem.scale)
         if fault is not None:
             raise ValueError(fault)
-        strategy = "random" if use != assist else strategy or default_recall(memory)
+        usual = SUB_PLANS if isinstance(memory, PlanLibrary) else strategy or default_recall(memory)
+        strategy = "random" if use != assist else usual
         blindly = generator(seed, "random-plans", problem.id) if strategy == "random" else None
-        if is_canonical(problem):
+        if isinstance(memory, Memory) and is_canonical(problem):
             recalled = recall(memory, view, strategy, top_k, blindly)
+        else:
+            library = memory if isinstance(memory, PlanLibrary) else memory.library
+            parts = sub_plan_answer(library, view, vehicle, blindly)
+            endings = library.endings if use in _JOINS and blindly is None else None
     elif assist not in WITHOUT_MEMORY:
         raise ValueError(f"assist '{assist}' needs a memory")
 
     answer: Plan | None = None
     source = ""
     status = Status.SOLVED
-    work = np.array([recalled.checks, 0, 0])  # collision checks, expansions, nodes
-    if memory is not None and recalled.free >= 0:
+    work = np.array([recalled.checks + parts.checks, 0, 0])  # collision checks, expansions, nodes
+    long = False
+    if parts.plan is not None:
+        answer, source = parts.plan, "recalled" if parts.recalled else "searched"
+        long = is_detour_from_motion(answer, parts.seconds, planner, problem)
+    elif memory is not None and recalled.free >= 0:
         answer, source = turned(memory.plans[recalled.free], problem.start[2]), "recalled"
-    if answer is None or (strategy != "centroid" and is_detour(answer, planner, view, vehicle)):
+        long = strategy != "centroid" and is_detour(answer, planner, view, vehicle)
+    if answer is None or long:
         given = limits or Limits()
-        helps = memory is not None and use in ("open", "repair") and bool(recalled.plans) and answer is None
+        helps = (
+            isinstance(memory, Memory)
+            and use in ("open", "repair")
+            and bool(recalled.plans)
+            and answer is None
+        )
         helper: Help | None = None
         rng = partial(generator, seed, "help", problem.id, planner)
 
         def beside(spent: int) -> Plan | None:
             nonlocal helper
-            if helper is None and spent >= PATIENCE and memory is not None:
+            if helper is None and spent >= PATIENCE and isinstance(memory, Memory):
                 helper = help_with(query, memory, recalled.plans, view, rng, repairs=use == "repair")
             return None if helper is None else helper.beside(spent)
 
@@ -194,6 +216,7 @@ def solve(
             vehicle=vehicle,
             occupied=view.drawn,
             beside=beside if helps else None,
+            endings=endings,
         )
         if use == "fresh":
             query = replace(query, guide=fresh_guide(query, view.bits))
@@ -212,7 +235,7 @@ def solve(
             view.seconds["repair"] = helper.repair_seconds
             view.seconds["search"] -= helper.repair_seconds
         if searched.plan is not None and (answer is None or searched.plan.duration_s < answer.duration_s):
-            repaired = helper is not None and helper.is_repair(searched.plan)
+            repaired = searched.joined or (helper is not None and helper.is_repair(searched.plan))
             answer, source = searched.plan, "repaired" if repaired else "searched"
         elif answer is None:
             status = searched.status

@@ -10,6 +10,7 @@ from time import perf_counter
 from typing import Final, NamedTuple
 
 from planners.explanation import recollections
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.memory.recall import RECALLS
@@ -71,11 +72,14 @@ class Assistant:
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
-        self._memories: dict[str, Memory] = {}
+        self._memories: dict[str, Memory | PlanLibrary] = {}
         self._workspace = Workspace()
 
-    def memory_of(self, class_name: str) -> Memory | None:
-        """The memory for problems of a class: that of the class, else the combined, else the only one."""
+    def memory_of(self, class_name: str) -> Memory | PlanLibrary | None:
+        """The memory for problems of a class: that of the class, else the combined, else the only one.
+
+        Where a library of plans is given, that serves all classes.
+        """
         if self._address is None:
             return None
         address = self._address
@@ -179,7 +183,8 @@ def plan_one(
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
         from dashboards.figures.style import save_picture
 
-        caption = f"{assistant.settings.planner}, {assistant.settings.assist}: {summary}"
+        driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
+        caption = f"{driven}{attempt.source or attempt.status}"
         figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
         save_picture(figure, drawing)
     if explained:
@@ -194,7 +199,8 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
-    recollected = recollections(canonical, attempt, memory, assistant.vehicle) if memory else []
+    ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
+    recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale)
 
 
@@ -210,6 +216,7 @@ def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: 
         plan,
         assistant.vehicle,
         problem.scale,
+        problem.offset,
     )
 
 
@@ -225,5 +232,8 @@ def _folder_of(class_name: str, folder: Path) -> str:
     archives = [candidate for candidate in candidates if (candidate / "memory.json").is_file()]
     if len({archive.name for archive in archives}) > 1 and archives[0].name not in (class_name, COMBINED):
         names = ", ".join(sorted(archive.name for archive in archives))
-        raise RunError(f"No memory of class {class_name!r} in {memories}; name one of its folders: {names}.")
+        raise RunError(
+            f"{memories} holds several memories, none of class {class_name!r}: give the problem one of these "
+            f"classes, or name a folder, as in --memory {archives[0]}. There are: {names}."
+        )
     return str(archives[0] if archives else folder)

@@ -1,0 +1,58 @@
+"""A search for a pose joins the ends of stored plans, and says so."""
+
+from __future__ import annotations
+
+import pytest
+
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.solve import Attempt, solve
+from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.families import family
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR
+from planners.world.workspace import Workspace
+
+SLOTS = range(6)
+
+
+@pytest.fixture(scope="module")
+def workspace() -> Workspace:
+    """Buffers for all searches here."""
+    return Workspace()
+
+
+def slot(number: int) -> Problem:
+    """A tight slot beside an aisle."""
+    return to_canonical(family("parallel", "standard", CAR).draw(10, number))[0]
+
+
+def alone(number: int, workspace: Workspace) -> Attempt:
+    """The search without memory."""
+    return solve(slot(number), "lattice", workspace=workspace)
+
+
+def library_of(numbers: range, workspace: Workspace) -> PlanLibrary:
+    """The plans of some slots as they were searched."""
+    attempts = [alone(number, workspace) for number in numbers]
+    return gathered_library("parallel", CAR, [(a.problem_id, a.plan) for a in attempts if a.plan is not None])
+
+
+def test_ends_of_stored_plans_are_joined_and_the_drive_is_right(workspace: Workspace) -> None:
+    library = library_of(SLOTS, workspace)
+    joined = [solve(slot(number), "lattice", "join", memory=library, workspace=workspace) for number in SLOTS]
+    assert all(attempt.solved for attempt in joined)
+    assert any(attempt.source == "repaired" for attempt in joined)
+    for number, attempt in zip(SLOTS, joined, strict=True):
+        assert attempt.plan is not None
+        assert not faults(slot(number), attempt.plan, CAR)
+    searched = sum(alone(number, workspace).expansions for number in SLOTS)
+    assert sum(attempt.expansions for attempt in joined) < searched
+
+
+def test_what_is_only_recalled_joins_nothing(workspace: Workspace) -> None:
+    library = library_of(range(2), workspace)
+    closed = [
+        solve(slot(number), "lattice", "closed", memory=library, workspace=workspace) for number in SLOTS
+    ]
+    assert all(attempt.source != "repaired" for attempt in closed)

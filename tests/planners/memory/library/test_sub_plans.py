@@ -1,0 +1,155 @@
+"""Sub-plans: listed where they lead, driven again as they were, and answers that the authority accepts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from planners.maps.questions import question_in
+from planners.memory.library.driving import drive_again
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.memory.library.recalling import allocate_recalling
+from planners.memory.library.sub_plans import (
+    ALIKE,
+    RING_M,
+    RINGS,
+    SECTORS,
+    SHAPE_CELLS,
+    SPEEDS,
+    TURNS,
+    shape_of,
+    speed_cell,
+    turn_cell,
+)
+from planners.solve import SUB_PLANS, solve
+from planners.world.alignment import mirrored, to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
+from planners.world.geometry.collision import scene_of
+from planners.world.goal import place
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR
+from tests.worlds import problem_of
+
+ORIGIN = np.array([20.0, 25.0])
+
+
+def question(seed: int, number: int, pose: bool = False) -> Problem:
+    asked = question_in(problem_class("random").draw(seed, number), number, seed, CAR, pose)
+    assert asked is not None
+    return to_canonical(asked)[0]
+
+
+@pytest.fixture(scope="module")
+def library() -> PlanLibrary:
+    questions = [question(4, number, number % 4 == 0) for number in range(60)]
+    answered = [(each.id, solve(each, "lattice").plan) for each in questions]
+    return gathered_library("random", CAR, [(name, plan) for name, plan in answered if plan is not None])
+
+
+def test_every_sub_plan_is_listed_where_it_begins_and_leads(library: PlanLibrary) -> None:
+    subs = library.sub_plans
+    assert subs.cells[0] == 0
+    assert subs.cells[-1] == len(subs.begins)
+    numbers = np.random.default_rng(1).integers(0, len(subs.begins), 200)
+    for number in numbers.tolist():
+        cell = int(np.searchsorted(subs.cells, number, side="right")) - 1
+        rest, sector = divmod(cell, SECTORS)
+        rest, ring = divmod(rest, RINGS)
+        speed, turn = divmod(rest, TURNS)
+        begin, end = int(subs.begins[number]), int(subs.begins[number] + subs.steps[number])
+        assert end <= subs.lasts[begin]
+        first, last = subs.states[begin], subs.states[end]
+        assert (speed, turn) == (speed_cell(first[3], CAR), turn_cell(first[4], CAR))
+        way = complex(*(last[:2] - first[:2])) * np.exp(-1j * first[2])
+        assert ring == int(abs(way) / RING_M)
+        assert sector == min(int((np.angle(way) + math.pi) / (2.0 * math.pi / SECTORS)), SECTORS - 1)
+    assert len(subs.cells) == (SPEEDS * TURNS * RINGS * SECTORS) + 1
+
+
+def test_in_a_cell_few_are_alike_and_the_quickest_come_first(library: PlanLibrary) -> None:
+    subs = library.sub_plans
+    for cell in np.flatnonzero(np.diff(subs.cells))[:300].tolist():
+        here = slice(subs.cells[cell], subs.cells[cell + 1])
+        assert (np.diff(subs.steps[here]) >= 0).all()
+        assert np.bincount(subs.shapes[here]).max() <= ALIKE
+
+
+def test_the_shape_of_a_mirrored_way_is_the_mirrored_shape(library: PlanLibrary) -> None:
+    plan = library.plans[1]
+    other = plan.states * [1.0, -1.0, -1.0, 1.0, -1.0]
+    for end in range(5, len(plan.states), 7):
+        shapes = [shape_of(states, 0, end) for states in (plan.states, other)]
+        assert sum(shapes) == SHAPE_CELLS - 1 or 0.5 in np.abs(shapes)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_sub_plan_is_driven_again_exactly_from_where_it_began(library: PlanLibrary, side: float) -> None:
+    subs, r, scene = library.sub_plans, allocate_recalling(5), scene_of(problem_of([]))
+    for number in range(0, len(library), 5):
+        begin = int(library.plans.starts[number])
+        last = int(subs.lasts[begin])
+        flipped = np.array([1.0, side, side, 1.0, side])
+        states = subs.states[begin : last + 1] * flipped
+        r.states[0] = [20.0, 25.0, 0.3, *states[0, 3:]]
+        turn = 0.3 - states[0, 2]
+        ways = (states[:, :2] - states[0, :2]) @ [
+            [math.cos(turn), math.sin(turn)],
+            [-math.sin(turn), math.cos(turn)],
+        ]
+        ends = ways[-1] + ORIGIN
+        if np.abs(ways).max() > 25.0:
+            continue
+        goal = place(*ends, 1e-6)
+        placing = (20.0, 25.0, 0.3, side)
+        driven, _ = drive_again(
+            *(subs, begin, placing, goal, last - begin, 0, r.pose, r.states, r.controls, CAR, scene)
+        )
+        assert driven == last - begin
+        assert np.allclose(r.states[: driven + 1, :2], ways + ORIGIN, atol=1e-6)
+        assert np.allclose(r.states[: driven + 1, 3:], states[:, 3:], atol=1e-6)
+
+
+@pytest.mark.parametrize("assist", ["closed", "random-closed"])
+def test_answers_are_right_the_same_again_and_no_fewer_than_by_search(
+    library: PlanLibrary, assist: str
+) -> None:
+    recalled = 0
+    for number in range(40):
+        asked = question(5, number, number % 3 == 0)
+        answer, again = (solve(asked, "lattice", assist, memory=library) for _ in range(2))
+        assert answer.solved == again.solved
+        if answer.plan is None or again.plan is None:
+            assert not solve(asked, "lattice").solved
+            continue
+        assert answer.recall == ("random" if assist == "random-closed" else SUB_PLANS)
+        assert np.array_equal(answer.plan.states, again.plan.states)
+        assert faults(asked, answer.plan, CAR) == []
+        recalled += answer.source == "recalled"
+    assert recalled >= 10
+
+
+def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time() -> None:
+    controls = np.concatenate([np.tile([1.0, 0.05], (20, 1)), np.tile([0.0, -0.03], (40, 1))])
+    start = np.array([0.0, 0.0, math.pi / 4, 1.0, 0.0])
+    states = simulate(start, controls, CAR)
+    library = gathered_library("one", CAR, [("one", Plan(states, controls, CAR.dt))])
+    empty = problem_of([])
+    x, y = states[-1, :2]
+    asked = Problem(
+        "q", "q", (0.0, 0.0, math.pi / 4), (x, y), 0.05, empty.bounds, empty.obstacles, 1.0, (1.0,)
+    )
+    asked = to_canonical(asked)[0]
+    durations: list[float] = []
+    for each in (asked, mirrored(asked)):
+        answer = solve(each, "gust", "closed", memory=library)  # for GUST no free plan is a detour
+        assert answer.source == "recalled"
+        assert answer.duration_s is not None
+        assert 5.0 < answer.duration_s < 6.01  # a later part of the plan may begin better
+        durations.append(answer.duration_s)
+        assert answer.plan is not None
+        assert faults(each, answer.plan, CAR) == []
+    assert durations[0] == durations[1]
