@@ -36,10 +36,15 @@ Files = Mapping[str, bytes | Array]
 def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str, Any], files: Files) -> None:
     """Write an archive as one ``folder``, in place of what was there; the same content gives the same bytes.
 
-    ``kind``: of archive, which names its header ``<kind>.json``. ``vehicle``: that it is made for.
-    ``header``: more JSON values for the header. ``files``: contents by name; arrays are written as ``.npy``.
+    Args:
+        folder: where the archive is written.
+        kind: kind of archive, which names its header ``<kind>.json``.
+        vehicle: the vehicle that it is made for.
+        header: more JSON values for the header.
+        files: contents by name; arrays are written as ``.npy``.
 
-    Raises StorageError if it cannot be written; the folder is then as it was.
+    Raises:
+        StorageError: it cannot be written; the folder is then as it was.
     """
     with whole_folder(folder) as temporary:
         for name, data in files.items():
@@ -65,10 +70,14 @@ def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str
 def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, Any], dict[str, Contents]]:
     """The header of an archive, and its files by name, after every byte was compared with what was written.
 
-    ``folder``: of the archive. ``kind``, ``vehicle``: that it has to be of.
+    Args:
+        folder: folder of the archive.
+        kind: the kind that it has to be of.
+        vehicle: the vehicle that it has to be made for.
 
-    Raises StorageError if it is missing or damaged, has more or fewer files, or is of another version, for
-    another vehicle or grid.
+    Raises:
+        StorageError: it is missing or damaged, has more or fewer files, or is of another version, for another
+            vehicle or grid.
     """
     header = _header(folder, kind)
     refuse_another(folder, header.get("vehicle"), vehicle)

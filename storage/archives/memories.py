@@ -6,7 +6,6 @@ until they are used.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
@@ -30,10 +29,10 @@ from planners.memory.plans.sweeps import PlanSweeps, sweep_plans, sweeps_with
 from planners.memory.ranking.inverted_lists import lists_with
 from planners.world.arrays import Floats, Floats32
 from planners.world.geometry.occupancy import GRID, Bits
-from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
-from storage.archives.archive import Contents, Files, read_archive, write_archive
+from storage.archives.archive import Files, read_archive, write_archive
 from storage.archives.arrays import array_of
+from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
 from storage.archives.tensors import check_floats, packed, unpacked
 from storage.errors import StorageError
 from storage.fields import scale_of, short, text_of
@@ -43,8 +42,7 @@ _KIND: Final = "memory"
 _WEIGHTS: Final = "encoder.safetensors"
 _READOUT: Final = "readout.safetensors"
 _FILES: Final = {
-    _WEIGHTS, _READOUT,
-    "states.npy", "controls.npy", "plan_starts.npy", "dt.npy", "masks.npy", "boxes.npy",
+    _WEIGHTS, _READOUT, *PLAN_FILES, "masks.npy", "boxes.npy",
 }  # fmt: skip
 SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes take 10 MB
 _LISTS: Final = "lists.safetensors"  # only in a memory of very many plans
@@ -63,10 +61,7 @@ def save_memory(folder: Path, memory: Memory) -> None:
     files: Files = {
         _WEIGHTS: packed(memory.weights),
         _READOUT: packed({"centroids": memory.centroids, "vectors": memory.vectors, "biases": memory.biases}),
-        "states.npy": plans.states,
-        "controls.npy": plans.controls,
-        "plan_starts.npy": plans.starts,
-        "dt.npy": plans.dt,
+        **files_of_plans(plans),
         "masks.npy": memory.masks,
         "boxes.npy": memory.sweeps.boxes,
     }
@@ -97,7 +92,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         architecture = architecture_of(weights)
         if described_architecture(header["architecture"]) != architecture:
             raise ValueError("its encoder is of another architecture than it says")
-        plans = _plans(files, vehicle)
+        plans = plans_in(files, vehicle)
         rows = (len(plans) + 1, architecture.dimensions)
         check_floats(weights, weight_shapes(architecture))
         check_floats(readout, {"centroids": rows, "vectors": rows, "biases": rows[:1]})
@@ -121,22 +116,6 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     except (KeyError, TypeError, ValueError, StorageError) as error:
         reason = str(error).rstrip(".")
         raise StorageError(f"{folder} is no whole memory ({reason}); build it again.") from None
-
-
-def _plans(files: Mapping[str, Contents], vehicle: Vehicle) -> StoredPlans:
-    plans = StoredPlans(
-        array_of(files["states.npy"], "<f8", (state_size(vehicle),)),
-        array_of(files["controls.npy"], "<f8", (2,)),
-        array_of(files["plan_starts.npy"], "<i8"),
-        array_of(files["dt.npy"], "<f8"),
-    )
-    most = LARGEST_COORDINATE_M
-    for numbers in (plans.states, plans.controls):
-        if not -most <= numbers.min(initial=0.0) <= numbers.max(initial=0.0) <= most:
-            raise ValueError(f"its plans have numbers that are not finite or beyond {most:.0f}")
-    if (plans.dt != vehicle.dt).any():
-        raise ValueError(f"its plans have other steps than the vehicle's, {vehicle.dt} s")
-    return plans
 
 
 def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:

@@ -1,0 +1,86 @@
+"""Libraries of plans on disk: archives of the plans as plain arrays, and of what they answered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from planners.memory.library.plan_library import PlanLibrary
+from planners.memory.memory import Memory
+from planners.memory.plans.plan_arrays import StoredPlans
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, Vehicle
+from storage.archives.archive import read_archive, write_archive
+from storage.archives.memories import load_memory
+from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
+from storage.errors import StorageError
+from storage.fields import scale_of, short, text_of
+from storage.places.run_folder import checked_name
+
+_KIND: Final = "library"
+HEADER: Final = f"{_KIND}.json"  # the file that tells a library from a memory
+_DRIFT: Final = 1e-6  # metres and radians by which states may differ from those of the controls
+
+
+def save_library(folder: Path, library: PlanLibrary) -> None:
+    """Write a ``library`` as a ``folder``, whole or not at all; the same plans give the same bytes."""
+    header = {
+        "class": library.class_name,
+        "questions": list(library.questions),
+        "scales": list(library.scales),
+    }
+    write_archive(folder, _KIND, library.vehicle, header, files_of_plans(library.plans))
+
+
+def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
+    """The library of a ``vehicle`` in a ``folder``; its plans are read from the disk when used.
+
+    Checksums say that files are as they were written, not that they are true. So the controls of every plan
+    are simulated again, and have to lead through its states.
+
+    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version or
+    for another vehicle.
+    """
+    header, files = read_archive(folder, _KIND, vehicle)
+    try:
+        if files.keys() != PLAN_FILES:
+            raise ValueError(f"missing or too many: {', '.join(sorted(files.keys() ^ PLAN_FILES))}")
+        plans = plans_in(files, vehicle)
+        _check_driven(plans, vehicle)
+        return PlanLibrary(
+            checked_name(text_of(header["class"], "class")),
+            vehicle,
+            plans,
+            _texts(header["questions"]),
+            _scales(header["scales"]),
+        )
+    except (KeyError, TypeError, ValueError, StorageError) as error:
+        reason = str(error).rstrip(".")
+        raise StorageError(f"{folder} is no whole library ({reason}); gather it again.") from None
+
+
+def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:
+    """The memory or the library of a ``vehicle`` in a ``folder``. Raises StorageError if there is neither."""
+    return load_library(folder, vehicle) if (folder / HEADER).is_file() else load_memory(folder, vehicle)
+
+
+def _check_driven(plans: StoredPlans, vehicle: Vehicle) -> None:
+    """Raise ValueError if the controls of a plan do not lead through its states."""
+    for number, plan in enumerate(plans):
+        driven = simulate(plan.states[0], plan.controls, vehicle)
+        if not np.abs(driven - plan.states).max() <= _DRIFT:
+            raise ValueError(f"the controls of its plan {number} do not lead through its states")
+
+
+def _texts(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list):
+        raise ValueError(f"its questions are {short(value)}, expected a list")
+    return tuple(text_of(each, "question") for each in value)
+
+
+def _scales(value: object) -> tuple[float, ...]:
+    if not isinstance(value, list) or not value or len({scale_of(scale) for scale in value}) < len(value):
+        raise ValueError(f"its scales are {short(value)}, expected distinct numbers")
+    return tuple(scale_of(scale) for scale in value)
