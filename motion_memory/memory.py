@@ -8,26 +8,27 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.ranked_plans import RankedPlan, ranked_plans
 from planners.memory.recall import RECALLS, default_recall
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, solve
-from planners.world.alignment import from_canonical, scaled, to_canonical
+from planners.solve import ASSISTS, SUB_PLANS, solve
+from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import checked_problem
 from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
-from storage.archives.memories import load_memory
+from storage.archives.libraries import load_memory_or_library
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
@@ -57,7 +58,7 @@ class Answer:
 class Memory:
     """Stored plans, and a planner that they help. Several threads may use it at the same time."""
 
-    stored: StoredMemory
+    stored: StoredMemory | PlanLibrary
     planner: str
     assist: str
     top_k: int
@@ -145,10 +146,13 @@ class Memory:
             k: how many plans to return at most.
 
         Raises:
-            ValueError: The problem is malformed or impossible, or ``k`` is below 1.
+            ValueError: The problem is malformed or impossible, ``k`` is below 1, or what was loaded is a
+                library of plans.
         """
         if k < 1:
             raise ValueError(f"k is {k}: give 1 or more")
+        if isinstance(self.stored, PlanLibrary):
+            raise ValueError("a library ranks no plans: ask plan() for an answer, or load a memory")
         return ranked_plans(self.stored, self._read(problem), k)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
@@ -165,7 +169,8 @@ class Memory:
             ValueError: The problem is malformed or impossible.
         """
         read = self._read(problem)
-        return faults(read, scaled(plan, 1.0 / read.scale), self.vehicle)
+        near = shifted(plan, (-read.offset[0], -read.offset[1]))
+        return faults(read, scaled(near, 1.0 / read.scale), self.vehicle)
 
     def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
         """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
@@ -183,6 +188,7 @@ class Memory:
                 workspace=workspace,
             )
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
+        plan = plan and shifted(plan, problem.offset)
         spent = (attempt.planning_seconds, perf_counter() - began)
         if self.judged:
             check_attempt(canonical, attempt, set(), self.vehicle)
@@ -222,8 +228,8 @@ def load(
     """Read and check a memory, load the compiled kernels and plan once, so that the first call is quick.
 
     Args:
-        memory: the folder of a memory, the folder of a run with one memory, or the address of a model in
-            MLflow, such as ``models:/motion-memory-trap@champion``.
+        memory: the folder of a memory or a library, the folder of a run with one memory, or the address of a
+            model in MLflow, such as ``models:/motion-memory-trap@champion``.
         vehicle: its name, or the path of its .yaml file.
         planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
         assist: how the memory helps: closed, open or repair.
@@ -245,7 +251,9 @@ def load(
     if top_k < 1:
         raise UsageError(f"Top k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
-        archive = load_memory(folder, said_vehicle(vehicle))  # mapped files outlive their names
+        archive = load_memory_or_library(folder, said_vehicle(vehicle))  # mapped files outlive their names
+    if isinstance(archive, PlanLibrary):
+        return _warmed(Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged))
     strategy = recall or default_recall(archive)
     compile_assists(archive.vehicle, planner, [strategy])
     try:
@@ -255,14 +263,19 @@ def load(
             f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
             "pip install 'motion-memory[pipeline]'."
         ) from None
-    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged)
-    scale = archive.scales[0]
+    return _warmed(Memory(archive, planner, assist, top_k, strategy, seed, judged))
+
+
+def _warmed(ready: Memory) -> Memory:
+    """Plan to a place and to a pose, so that everything is compiled and indexed; returns what was given."""
+    scale = ready.stored.scales[0]
     away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
     bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
-    for arrival in (None, Arrival(0.5 * math.pi, 0.1)):  # a place, then a pose
-        ready.plan_arrays(
-            *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),
-            *(scale * GOAL_RADIUS, bounds, scale),
-            arrival=arrival,
-        )
+    for asked in (ready, replace(ready, assist="none")):  # what is recalled, and what is searched
+        for arrival in (None, Arrival(0.5 * math.pi, 0.1)):  # a place, then a pose
+            asked.plan_arrays(
+                *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),
+                *(scale * GOAL_RADIUS, bounds, scale),
+                arrival=arrival,
+            )
     return ready
