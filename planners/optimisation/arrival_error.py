@@ -1,0 +1,78 @@
+"""What it costs that a drive does not end as asked: at its place, heading and hitch angles."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from planners.optimisation.local_model import Model
+from planners.world.arrays import Floats
+from planners.world.goal import HEADING, HEADING_TOLERANCE, HITCHES, RADIUS, X, Y
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import length, wrapped
+
+OFF: Final = 0.25  # metres; what it costs to be ``EDGE`` off the aim
+EDGE: Final = 0.05  # metres or radians that the aim lies inside of what is tolerated; half, if that is less
+
+
+@inlined
+def _edge(tolerance: float) -> float:
+    return max(min(0.5 * tolerance, EDGE), 1e-9)
+
+
+@inlined
+def _bend(tolerance: float) -> float:
+    """What it costs to be one metre or radian off the aim, twice."""
+    return OFF / (_edge(tolerance) * _edge(tolerance))
+
+
+@lean
+def aim_at(model: Model, steps: int, goal: Floats) -> None:
+    """Aim at the end of ``model.best_states``, or at what is next to it well inside of what is asked."""
+    aim, end = model.vectors[5], model.best_states[steps]
+    for c in range(aim.shape[0]):
+        aim[c] = end[c]
+    dx = end[0] - goal[X]
+    dy = end[1] - goal[Y]
+    inside = min((goal[RADIUS] - _edge(goal[RADIUS])) / max(length(dx, dy), 1e-9), 1.0)
+    aim[0] = goal[X] + inside * dx
+    aim[1] = goal[Y] + inside * dy
+    if goal[HEADING_TOLERANCE] < math.inf:
+        inside = goal[HEADING_TOLERANCE] - _edge(goal[HEADING_TOLERANCE])
+        aim[2] = goal[HEADING] + min(max(wrapped(end[2] - goal[HEADING]), -inside), inside)
+    for k in range((goal.shape[0] - HITCHES) // 2):
+        inside = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1])
+        off = end[5 + k] - goal[HITCHES + 2 * k]
+        aim[5 + k] = goal[HITCHES + 2 * k] + min(max(off, -inside), inside)
+
+
+@inlined
+def error_cost(states: Floats, i: int, aim: Floats, goal: Floats) -> float:
+    """What it costs that a state is not the aim."""
+    dx = states[i, 0] - aim[0]
+    dy = states[i, 1] - aim[1]
+    cost = 0.5 * _bend(goal[RADIUS]) * (dx * dx + dy * dy)
+    if goal[HEADING_TOLERANCE] < math.inf:
+        off = wrapped(states[i, 2] - aim[2])
+        cost += 0.5 * _bend(goal[HEADING_TOLERANCE]) * off * off
+    for k in range((goal.shape[0] - HITCHES) // 2):
+        off = states[i, 5 + k] - aim[5 + k]
+        cost += 0.5 * _bend(goal[HITCHES + 2 * k + 1]) * off * off
+    return float(cost)
+
+
+@lean
+def pull_to_aim(model: Model, steps: int, goal: Floats) -> None:
+    """Add what ``error_cost`` costs to gradient and curvature of the last state."""
+    gradient, curvature = model.gradient[steps], model.curvature[steps]
+    last, aim = model.states[steps], model.vectors[5]
+    for c in range(2):
+        gradient[c] += _bend(goal[RADIUS]) * (last[c] - aim[c])
+        curvature[c, c] += _bend(goal[RADIUS])
+    if goal[HEADING_TOLERANCE] < math.inf:
+        gradient[2] += _bend(goal[HEADING_TOLERANCE]) * wrapped(last[2] - aim[2])
+        curvature[2, 2] += _bend(goal[HEADING_TOLERANCE])
+    for k in range((goal.shape[0] - HITCHES) // 2):
+        bend = _bend(goal[HITCHES + 2 * k + 1])
+        gradient[5 + k] += bend * (last[5 + k] - aim[5 + k])
+        curvature[5 + k, 5 + k] += bend
