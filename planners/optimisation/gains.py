@@ -12,7 +12,8 @@ from typing import Final, NamedTuple
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
-from planners.world.vehicles.dynamics import admissible, control_limits, load
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load
+from planners.world.vehicles.interface import kept_within
 from planners.world.vehicles.vehicle import Vehicle
 
 EFFORT: Final = 0.01  # metres, of a step of full steering rate; keeps controls without an effect at rest
@@ -84,10 +85,26 @@ def _least(
 
 
 @lean
-def sweep_back(model: Model, steps: int, aim: Aim, damping: float, vehicle: Vehicle) -> tuple[float, float]:
+def sweep_back(
+    model: Model,
+    steps: int,
+    speeds: tuple[float, float],
+    damping: float,
+    hold: float,
+    gapped: bool,
+    vehicle: Vehicle,
+) -> tuple[float, float]:
     """Fill in change and feedback. Returns the linear and the quadratic part of the cost's expected change.
 
-    ``damping`` keeps the change small, as if it were so much more effort (metres).
+    Args:
+        model: a drive and its derivatives; ``gradient`` and ``curvature`` of its last state hold all costs.
+        steps: of the drive.
+        speeds: the least and the largest speed of the last state, in m/s.
+        damping: keeps the change small, as if it were so much more effort (metres).
+        hold: what a change of the way by a metre or radian costs in each step, in metres; if it is above 0,
+            controls cost nothing, only their change does.
+        gapped: whether the steps do not lead from state to state, but miss by ``model.gaps``.
+        vehicle: what is driven.
     """
     states, controls = model.states, model.controls
     size = states.shape[1]
@@ -98,12 +115,19 @@ def sweep_back(model: Model, steps: int, aim: Aim, damping: float, vehicle: Vehi
     weight_1 = EFFORT / (most_second * most_second)
     damping_0 = damping / (most_first * most_first)
     damping_1 = damping / (most_second * most_second)
-    _begin(model, steps, aim)
+    for r in range(size):
+        gradient[r] = model.gradient[steps, r]
+        for c in range(size):
+            hessian[r, c] = model.curvature[steps, r, c]
     linear = 0.0
     quadratic = 0.0
     for k in range(steps - 1, -1, -1):
         a = model.by_state[k]
         b = model.by_control[k]
+        if gapped:
+            for r in range(size):
+                for c in range(size):
+                    gradient[r] += hessian[r, c] * model.gaps[k, c]
         for r in range(size):
             by_first = 0.0
             by_second = 0.0
@@ -117,8 +141,8 @@ def sweep_back(model: Model, steps: int, aim: Aim, damping: float, vehicle: Vehi
                 for j in range(size):
                     value += hessian[r, j] * a[j, c]
                 product[r, c] = value
-        q0 = weight_0 * controls[k, 0]
-        q1 = weight_1 * controls[k, 1]
+        q0 = 0.0 if hold > 0.0 else weight_0 * controls[k, 0]
+        q1 = 0.0 if hold > 0.0 else weight_1 * controls[k, 1]
         q00 = weight_0
         q01 = 0.0
         q11 = weight_1
@@ -147,12 +171,14 @@ def sweep_back(model: Model, steps: int, aim: Aim, damping: float, vehicle: Vehi
                 for j in range(size):
                     value += a[j, r] * product[j, c]
                 hessian[r, c] = value
+        for r in range(3):
+            hessian[r, r] += hold
         hessian[2, 2] += max(bend, 0.0)  # a detour of the heading makes the way longer by its square
         for c in range(size):
             ahead[c] = across[0, c]
             slope[c] = across[1, c]
         change_0, change_1 = _feed_back(
-            *(model, k, q0, q1, q00 + damping_0, q01, q11 + damping_1, ahead, slope, vehicle)
+            *(model, k, steps, speeds, q0, q1, q00 + damping_0, q01, q11 + damping_1, ahead, slope, vehicle)
         )
         linear += change_0 * q0 + change_1 * q1
         quadratic += 0.5 * (
@@ -187,29 +213,39 @@ def sweep_back(model: Model, steps: int, aim: Aim, damping: float, vehicle: Vehi
 
 
 @lean
-def _begin(model: Model, steps: int, aim: Aim) -> None:
-    """Gradient and curvature of the cost of the last state."""
-    gradient, hessian = model.vectors[1], model.squares[0]
-    size = model.states.shape[1]
-    for r in range(size):
-        gradient[r] = model.gradient[steps, r]
-        for c in range(size):
-            hessian[r, c] = model.curvature[steps, r, c]
+def pull(model: Model, steps: int, aim: Aim) -> None:
+    """Add what ``miss`` costs to gradient and curvature of the last state."""
+    gradient, curvature = model.gradient[steps], model.curvature[steps]
     dx = model.states[steps, 0] - aim.x
     dy = model.states[steps, 1] - aim.y
-    pull = (dx * aim.away_y - dy * aim.away_x) / aim.distance
-    gradient[0] += aim.away_x + pull * aim.away_y
-    gradient[1] += aim.away_y - pull * aim.away_x
-    hessian[0, 0] += aim.away_y * aim.away_y / aim.distance
-    hessian[1, 1] += aim.away_x * aim.away_x / aim.distance
-    hessian[0, 1] -= aim.away_x * aim.away_y / aim.distance
-    hessian[1, 0] -= aim.away_x * aim.away_y / aim.distance
+    beside = (dx * aim.away_y - dy * aim.away_x) / aim.distance
+    gradient[0] += aim.away_x + beside * aim.away_y
+    gradient[1] += aim.away_y - beside * aim.away_x
+    curvature[0, 0] += aim.away_y * aim.away_y / aim.distance
+    curvature[1, 1] += aim.away_x * aim.away_x / aim.distance
+    curvature[0, 1] -= aim.away_x * aim.away_y / aim.distance
+    curvature[1, 0] -= aim.away_x * aim.away_y / aim.distance
+
+
+@inlined
+def in_time(
+    state: State, first: float, second: float, left: int, speeds: tuple[float, float], vehicle: Vehicle
+) -> tuple[float, float]:
+    """The controls, reduced if the speed after them could not become one of ``speeds`` in ``left`` steps.
+
+    Who is too fast for that already gets a control beyond its limit, which ``shorten`` does not accept.
+    """
+    change = left * control_limits(vehicle)[0] * vehicle.dt
+    first = kept_within(first, state[3], speeds[0] - change, speeds[1] + change, vehicle.dt)
+    return admissible(state, first, second, vehicle)
 
 
 @lean
 def _feed_back(
     model: Model,
     k: int,
+    steps: int,
+    speeds: tuple[float, float],
     q0: float,
     q1: float,
     h00: float,
@@ -225,8 +261,8 @@ def _feed_back(
     """
     most_0, most_1 = control_limits(vehicle)
     here = load(model.states, k, vehicle)
-    high_0, high_1 = admissible(here, most_0, most_1, vehicle)
-    low_0, low_1 = admissible(here, -most_0, -most_1, vehicle)
+    high_0, high_1 = in_time(here, most_0, most_1, steps - k - 1, speeds, vehicle)
+    low_0, low_1 = in_time(here, -most_0, -most_1, steps - k - 1, speeds, vehicle)
     u = model.controls[k, 0]
     w = model.controls[k, 1]
     low = (low_0 - u, low_1 - w)

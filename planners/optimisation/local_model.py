@@ -34,6 +34,7 @@ class Model(NamedTuple):
     curvature: Floats  # [C + 1, S, S]
     feedback: Floats  # [C, 2, S] change of the controls for a change of the state
     change: Floats  # [C, 2] of the controls
+    gaps: Floats  # [C, S] from the next state to where a step leads, of a drive that is only a guess
     vectors: Floats  # [6, S] scratch
     squares: Floats  # [2, S, S] scratch
     nudged: Floats  # [1, S] scratch
@@ -49,6 +50,7 @@ def allocate_model(steps: int, size: int) -> Model:
         (steps + 1, size, size),
         (steps, 2, size),
         (steps, 2),
+        (steps, size),
         (6, size),
         (2, size, size),
         (1, size),

@@ -11,18 +11,21 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, drive_along, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.local_model import Model, allocate_model
+from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
+ARRIVING_ITERATIONS: Final = 240  # where a drive must arrive as asked; some 80 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 ROOM: Final = 256  # steps, in which buffers grow
 NEVER: Final = 1 << 30  # steps
@@ -43,7 +46,7 @@ def polish(
     vehicle: Vehicle,
     scene: Scene,
     workspace: Workspace,
-    iterations: int = ITERATIONS,
+    iterations: int | None = None,
     margin_m: float = 0.0,
     seconds: float = math.inf,
 ) -> Polished:
@@ -56,21 +59,25 @@ def polish(
         vehicle: what is driven.
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
-        iterations: at most; each takes a third of a millisecond for a car.
+        iterations: at most; each takes some 0.2 to 0.3 ms for a car. By default ``most_iterations``.
         margin_m: how many metres more than it needs the plan keeps from obstacles, where there is room.
         seconds: when to end, some iterations late; then another machine may give another result.
 
     Returns:
-        The quickest free plan that was found, never a longer one than was given; the given plan if none was,
-        or if the problem asks for more at its goal than the place.
+        The quickest free plan that was found and arrives as asked, never a longer one than was given.
     """
-    if problem.arrival is not None:
-        iterations = 0  # a descent minds where a drive ends, not how
+    iterations = most_iterations(problem) if iterations is None else iterations
     model, goal = _ready(problem, len(plan.controls) + ROOM, vehicle, workspace)
     steps = len(plan.controls)
     model.controls[:steps] = plan.controls
     model.states[: steps + 1] = simulate(start_state(problem, vehicle), plan.controls, vehicle)
-    return _polished(plan, model, steps, goal, vehicle, scene, iterations, margin_m, seconds)
+    arriving = problem.arrival not in (None, Arrival())
+    return _polished(plan, model, steps, goal, arriving, vehicle, scene, iterations, margin_m, seconds)
+
+
+def most_iterations(problem: Problem) -> int:
+    """As many iterations as are of use for a problem."""
+    return ITERATIONS if problem.arrival is None else ARRIVING_ITERATIONS
 
 
 def polish_path(
@@ -91,7 +98,7 @@ def polish_path(
     most = 50 + math.ceil(1.5 * ways / (vehicle.max_speed * vehicle.dt))
     model, goal = _ready(problem, most, vehicle, workspace)
     steps = drive_along(model, np.ascontiguousarray(points[:, :2]), goal, ahead_m, vehicle)
-    return _polished(None, model, steps, goal, vehicle, scene, iterations, margin_m, math.inf)
+    return _polished(None, model, steps, goal, False, vehicle, scene, iterations, margin_m, math.inf)
 
 
 def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:
@@ -107,14 +114,15 @@ def _polished(
     model: Model,
     steps: int,
     goal: Floats,
+    arriving: bool,
     vehicle: Vehicle,
     scene: Scene,
     iterations: int,
     margin_m: float,
     seconds: float,
 ) -> Polished:
-    """Descend through all stages from the drive in ``model``."""
-    began = perf_counter()
+    """Descend from the drive in ``model``; ``arriving`` says that more than a place is asked at its end."""
+    until = perf_counter() + seconds
     arrived = int(steps_to_goal(model.states, steps, goal, vehicle))
     if arrived == 0:
         return Polished(given, 0)
@@ -126,18 +134,75 @@ def _polished(
             model.best_states[: steps + 1] = model.states[: steps + 1]
             model.best_controls[:steps] = model.controls[:steps]
     widest = min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
+    nowhere = Barrier(0.0, 0.0, margin_m, widest)
+    descended = _shortened if arriving else _descended
+    best, used = descended(model, steps, best, goal, nowhere, vehicle, scene, iterations, until)
+    if best == NEVER:
+        return Polished(None, used)
+    plan = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
+    return Polished(plan, used)
+
+
+def _descended(
+    model: Model,
+    steps: int,
+    best: int,
+    goal: Floats,
+    barrier: Barrier,
+    vehicle: Vehicle,
+    scene: Scene,
+    iterations: int,
+    until: float,
+) -> tuple[int, int]:
+    """Descend through all stages; the steps of the quickest free drive, and the iterations used."""
     circles = circles_around(scene)
     used = 0
     for strength, range_m, least_gain in STAGES:
-        stage = Stage(Barrier(strength, range_m, margin_m, widest), least_gain)
+        stage = Stage(barrier._replace(strength=strength, range_m=range_m), least_gain)
         ended = False
-        while not ended and used < iterations and perf_counter() - began < seconds:
+        while not ended and used < iterations and perf_counter() < until:
             most = min(SLICE, iterations - used)
             steps, more, best, ended = descend(
                 *(model, steps, goal, stage, most, best, vehicle, scene, circles)
             )
             used += more
+    return best, used
+
+
+def _shortened(
+    model: Model,
+    steps: int,
+    best: int,
+    goal: Floats,
+    barrier: Barrier,
+    vehicle: Vehicle,
+    scene: Scene,
+    iterations: int,
+    until: float,
+) -> tuple[int, int]:
+    """Press the drive in all ways until none helps; as ``_descended``."""
+    circles = circles_around(scene)
     if best == NEVER:
-        return Polished(None, used)
-    plan = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
-    return Polished(plan, used)
+        model.best_states[: steps + 1] = model.states[: steps + 1]
+        model.best_controls[:steps] = model.controls[:steps]
+    else:
+        steps = best
+    fewer = 1 if best < NEVER else 0
+    used = number = in_vain = 0
+    growing = True
+    while used < iterations and in_vain < len(WAYS) and fewer < steps and perf_counter() < until:
+        way = WAYS[number]
+        pushed = barrier._replace(strength=way.strength, range_m=RANGE_M)
+        most = min(MOST_TRIES, iterations - used)
+        more, done = shorten(model, steps, fewer, way, most, goal, pushed, vehicle, scene, circles)
+        used += more
+        if done:
+            steps -= fewer
+            fewer = max(2 * fewer if growing else fewer, 1)
+            best, in_vain, growing = steps, 0, True
+        elif fewer > 1:
+            fewer, growing = fewer // 2, False
+        else:
+            in_vain += 1
+            number = (number + 1) % len(WAYS)
+    return best, used

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Sequence, Set
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -25,7 +25,12 @@ from storage.errors import InUseError, StorageError
 from storage.places.files import locked
 from storage.places.mirror import files_in, remove
 from storage.tables.columns import lists_of
-from storage.tables.experiences import experiences_of, read_experience_table, write_experiences
+from storage.tables.experiences import (
+    SearchedExperience,
+    read_experience_table,
+    searched_of,
+    write_experiences,
+)
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import read_table, sound, write_table
 
@@ -47,7 +52,13 @@ def add_gained(
 ) -> None:
     """Add ``experiences`` of one ``vehicle`` to a ``folder``, all or none; adding them again changes nothing.
 
-    ``planner``: that found them. ``seeds``, ``planning_seconds``: of its searches, one an experience.
+    Args:
+        folder: folder of experiences that were gained.
+        experiences: ``[n]``, all of the vehicle.
+        planner: name of the planner that found them.
+        seeds: ``[n]``, the seed of each search.
+        planning_seconds: ``[n]``, what each search took.
+        vehicle: the vehicle that drives them.
     """
     marks = [
         _mark(each.problem.id, each.plan.states.tobytes() + each.plan.controls.tobytes())
@@ -101,30 +112,23 @@ def snapshot_ids(folder: Path, snapshot: str) -> set[str]:
         return set()
 
 
-def read_gained(folder: Path, vehicle: Vehicle) -> list[Experience]:
+def read_gained(folder: Path, vehicle: Vehicle) -> list[SearchedExperience]:
     """What a ``folder`` holds of a ``vehicle`` now, as a snapshot would keep it; nothing is written."""
     for _ in range(READINGS):
         with suppress(StorageError):  # another process merged the shards meanwhile
-            return _experiences(folder, vehicle)
-    return _experiences(folder, vehicle)
+            return _searched(folder, vehicle)
+    return _searched(folder, vehicle)
 
 
-def _experiences(folder: Path, vehicle: Vehicle) -> list[Experience]:
+def _searched(folder: Path, vehicle: Vehicle) -> list[SearchedExperience]:
     with sound(folder):
-        return experiences_of(_kept(folder, vehicle)[1], vehicle)
+        return searched_of(_kept(folder, vehicle)[1], vehicle)
 
 
-def extract_class(snapshot: Path, class_name: str, without: Set[str], path: Path, key: str) -> int:
-    """Write the experiences of a class in the file ``snapshot`` to ``path``, and return how many there are.
-
-    ``without``: ids of problems to leave out. ``key``: what they were made from. Raises StorageError if there
-    is no such file.
-    """
-    table = read_table(snapshot, EXPERIENCES)
-    pairs = zip(table["class"].to_pylist(), table["id"].to_pylist(), strict=True)
-    rows = [row for row, (name, id_) in enumerate(pairs) if name == class_name and id_ not in without]
-    write_table(path, table.take(pa.array(rows, pa.int64())), key)
-    return len(rows)
+def rows_of_class(snapshot: Path, class_name: str) -> list[int]:
+    """The rows of a class in the file ``snapshot``. Raises StorageError if there is no such file."""
+    names = read_table(snapshot, EXPERIENCES, ["class"])["class"].to_pylist()
+    return [row for row, name in enumerate(names) if name == class_name]
 
 
 def _merge(folder: Path, vehicle: Vehicle) -> None:

@@ -12,6 +12,7 @@ from planners.memory.plans.sweeps import sweep_plans
 from planners.world.geometry.occupancy import Bits
 from storage.places.run_folder import RunFolder
 from storage.tables.experiences import read_experiences
+from storage.tables.shards import row_count
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import Chunk
 from tasks.inputs.problem_sources import source_of
@@ -28,6 +29,11 @@ def taught_experiences(run: RunFolder, settings: RunSettings, name: str) -> list
         for each in settings.classes_of(name)
         for experience in read_experiences(run.experiences(each), vehicle, settings.taught)
     ]
+
+
+def taught_counts(run: RunFolder, settings: RunSettings, name: str) -> list[int]:
+    """How many experiences of each class of a memory encoders are taught."""
+    return [min(settings.taught, row_count(run.experiences(each))) for each in settings.classes_of(name)]
 
 
 def taught_masks(run: RunFolder, settings: RunSettings, name: str) -> Bits:

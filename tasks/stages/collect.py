@@ -6,24 +6,22 @@ A problem gives several candidates: some are quicker, others fit more problems. 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.optimisation.polish import polish
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
-from storage.tables.experiences import copy_experiences, write_experiences
+from storage.tables.experiences import SearchedExperience, copy_experiences, write_searched
 from storage.tables.shards import shard_is_done
-from tasks.attempts.judged_attempts import check_attempt
+from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.chunk import Chunk, Cut, chunks_of
 from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of
 from tasks.inputs.problem_sources import Source, source_key, source_of
-from tasks.settings.errors import RunError
 from tasks.settings.run_settings import RunSettings
 
 SMALLEST_CHUNK: Final = 25
@@ -64,17 +62,11 @@ def collect_chunk(chunk: Chunk) -> Collected:
     source = source_of(chunk.data, chunk.settings, chunk.class_name)
     workspace = Workspace()
     problems = (source.problem("collect", index) for index in range(chunk.first, chunk.last))
-    found = [candidates_of(problem, chunk.settings, chunk.vehicle, workspace) for problem in problems]
-    made = [each for some in found for each in some]
-    write_experiences(
-        shard,
-        [experience for experience, _ in made],
-        planners=[attempt.planner for _, attempt in made],
-        seeds=[attempt.seed for _, attempt in made],
-        planning_seconds=[attempt.planning_seconds for _, attempt in made],
-        key=chunk.key,
-        vehicle=chunk.vehicle,
-    )
+    variants = _variants(chunk.settings)
+    found = [
+        candidates_of(problem, variants, chunk.settings, chunk.vehicle, workspace) for problem in problems
+    ]
+    write_searched(shard, [each for some in found for each in some], chunk.key, chunk.vehicle)
     return Collected(sum(map(bool, found)), tried)
 
 
@@ -85,28 +77,52 @@ def _variants(settings: RunSettings) -> Sequence[Variant]:
 
 
 def candidates_of(
-    problem: Problem, settings: RunSettings, vehicle: Vehicle, workspace: Workspace
-) -> list[tuple[Experience, Attempt]]:
-    """Solve a problem and make one plan of each variant, or none if the collector finds none."""
-    attempts: dict[str, Attempt] = {}
-    made: list[tuple[Experience, Attempt]] = []
-    for planner, margin_m in _variants(settings):
-        name = planner or settings.collector
-        if name not in attempts:
-            attempts[name] = solve(problem, name, seed=settings.seed, vehicle=vehicle, workspace=workspace)
-        attempt = attempts[name]
-        if attempt.plan is None:
-            if not made:
-                break
-            continue
-        plan = attempt.plan
-        if not settings.as_published:
-            scene = scene_of(problem)
-            plan = polish(problem, plan, vehicle, scene, workspace, margin_m=margin_m).plan or plan
-        attempt = replace(attempt, plan=plan, length_m=plan.length_m, duration_s=plan.duration_s)
-        check_attempt(problem, attempt, set(), vehicle)
-        made.append((Experience(problem, plan, vehicle), attempt))
+    problem: Problem,
+    variants: Sequence[Variant],
+    settings: RunSettings,
+    vehicle: Vehicle,
+    workspace: Workspace,
+) -> list[SearchedExperience]:
+    """Solve a problem and make one plan of each variant, or none if the first variant's planner fails."""
+    searched: dict[str, SearchedExperience | None] = {}
+    made: list[SearchedExperience] = []
+    for variant in variants:
+        name = variant.planner or settings.collector
+        if name not in searched:
+            attempt = solve(problem, name, seed=settings.seed, vehicle=vehicle, workspace=workspace)
+            searched[name] = None
+            if attempt.plan is not None:
+                searched[name] = SearchedExperience(
+                    Experience(problem, attempt.plan, vehicle), name, attempt.seed, attempt.planning_seconds
+                )
+        found = searched[name]
+        if found is not None:
+            made.append(candidate_of(found, variant.margin_m, settings, workspace))
+        elif not made:
+            break
     return made
+
+
+def candidate_of(
+    found: SearchedExperience, margin_m: float, settings: RunSettings, workspace: Workspace
+) -> SearchedExperience:
+    """What an experience becomes as a candidate: polished, and checked by the authority.
+
+    Args:
+        found: the experience as a search found it.
+        margin_m: the margin of its polished plan, in metres.
+        settings: those of the run; they may say that plans stay as they were found.
+        workspace: the caller's buffers.
+
+    Raises:
+        PlanFaultError: the plan does not solve the problem.
+    """
+    problem, plan, vehicle = found.experience.problem, found.experience.plan, found.experience.vehicle
+    if not settings.as_published:
+        scene = scene_of(problem)
+        plan = polish(problem, plan, vehicle, scene, workspace, margin_m=margin_m).plan or plan
+    check_plan(problem, plan, f"{found.planner}, seed {found.seed}", vehicle)
+    return found._replace(experience=Experience(problem, plan, vehicle))
 
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:
@@ -117,7 +133,7 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     inputs = [*made, *source_key(settings, name)]
     results: list[Collected] = []
     while True:
-        cut = Cut(_problems_to_try(settings, name, source, size, results), size, inputs)
+        cut = Cut(_problems_to_try(settings, source, size, results), size, inputs)
         chunks = chunks_of(COLLECT.name, data, settings, name, cut)[len(results) :]
         kept = [each for each in map(COLLECT.kept, chunks) if each is not None]
         if not chunks or len(kept) < len(chunks):
@@ -125,13 +141,10 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
         results += [each.result for each in kept]
 
 
-def _problems_to_try(
-    settings: RunSettings, name: str, source: Source, size: int, results: Sequence[Collected]
-) -> int:
+def _problems_to_try(settings: RunSettings, source: Source, size: int, results: Sequence[Collected]) -> int:
     """How many problems to try in all, given what came of the first ones.
 
-    A class without enough problems, or with too few that are solved, makes do with fewer candidates if they
-    suffice for its experiences. RunError if they do not.
+    A class without enough problems, or with too few that are solved, makes do with fewer.
     """
     solved, tried = (sum(each[i] for each in results) for i in (0, 1))
     enough = solved >= settings.experiences
@@ -141,14 +154,8 @@ def _problems_to_try(
     expected = missing * max(tried, 1) // max(solved, 1) + 1 if tried else missing
     more = -(-min(expected, settings.wanted) // size) * size
     until = source.count("collect", tried + more)
-    if enough and until <= tried:
-        return tried
-    if until <= tried or tried >= GIVE_UP * settings.experiences + size:
-        raise RunError(
-            f"Class {name}: {solved} of {tried} problems solved, {settings.experiences} are wanted; "
-            "ask for fewer, or take easier problems."
-        )
-    return until
+    given_up = not enough and tried >= GIVE_UP * settings.experiences + size
+    return tried if until <= tried or given_up else until
 
 
 COLLECT: Final = Stage(

@@ -14,18 +14,18 @@ from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.errors import StorageError
 from storage.tables import gained_experiences as learned
-from storage.tables.experiences import read_experiences
+from storage.tables.experiences import read_experiences, read_searched
 from storage.tables.gained_experiences import (
     add_gained,
-    extract_class,
     gained_shards,
+    rows_of_class,
     snapshot_path,
     take_snapshot,
 )
 from tests.storage.samples import problem_with
 
 ROOT = Path(__file__).parents[3]
-WRITERS = 4
+WRITERS = 3
 
 
 def experience(number: int, identity: str = "", class_name: str = "curves") -> Experience:
@@ -75,8 +75,10 @@ def test_the_bound_is_of_each_class(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(learned, "MOST", 2)
     add(tmp_path, [experience(i, class_name="a" if i < 5 else "b") for i in range(6)])
     snapshot = snapshot_path(tmp_path, take_snapshot(tmp_path, "now", CAR))
-    assert extract_class(snapshot, "a", set(), tmp_path / "x" / "a.parquet", "") == 2
-    assert extract_class(snapshot, "b", {"p-5"}, tmp_path / "x" / "b.parquet", "") == 0
+    rows = {name: rows_of_class(snapshot, name) for name in ("a", "b", "c")}
+    assert {name: len(some) for name, some in rows.items()} == {"a": 2, "b": 1, "c": 0}
+    (only,) = read_searched(snapshot, rows["b"], CAR)
+    assert (only.experience.problem.id, only.planner, only.seed) == ("p-5", "gust", 1)
 
 
 def test_a_snapshot_stays_what_it_was(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from planners.memory.plans.experience import Experience
@@ -13,12 +14,14 @@ from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
+from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.tables.experiences import read_experiences
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs.gained_on_the_job import Solved, remember, with_gained
 from tasks.settings.presets import for_preset
 from tasks.settings.run_settings import RunSettings
+from tasks.stages.collect import VARIANTS, candidates_of
 from tests.tasks.in_process import collect
 
 SETTINGS = replace(
@@ -55,6 +58,29 @@ def test_what_was_learned_is_chosen_among(tmp_path: Path, solved: list[Solved]) 
     assert len(kept) == SETTINGS.experiences
 
 
+def test_what_was_learned_is_as_good_as_what_was_drawn(tmp_path: Path, solved: list[Solved]) -> None:
+    remember(tmp_path, solved, CAR)
+    settings = with_gained(SETTINGS, tmp_path, "monday")
+    collect(str(tmp_path), settings)
+    learned = _candidates(tmp_path, settings)
+    for problem, attempt in solved:
+        theirs = candidates_of(problem, VARIANTS[:-1], settings, CAR, Workspace())
+        ours = [each.plan for each in learned if each.problem.id == problem.id]
+        assert len(ours) == len(VARIANTS)
+        assert attempt.duration_s is not None
+        assert all(
+            np.array_equal(one.experience.plan.states, other.states)
+            for one, other in zip(theirs, ours, strict=False)
+        )
+        assert ours[-1].duration_s <= attempt.duration_s
+    collect(str(tmp_path), published := replace(settings, as_published=True))
+    given = {problem.id: attempt.plan for problem, attempt in solved}
+    for each in _candidates(tmp_path, published):
+        plan = given[each.problem.id]
+        assert plan is not None
+        assert np.array_equal(each.plan.states, plan.states)
+
+
 def test_a_name_means_the_same_after_more_was_learned(tmp_path: Path, solved: list[Solved]) -> None:
     remember(tmp_path, solved[:2], CAR)
     before = with_gained(SETTINGS, tmp_path, "monday")
@@ -69,7 +95,7 @@ def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, sol
     remember(tmp_path, [*solved[:1], _solved(asked)], CAR)
     settings = with_gained(SETTINGS, tmp_path, "now")
     collect(str(tmp_path), settings)
-    assert [each.problem.id for each in _candidates(tmp_path, settings)] == [solved[0].problem.id]
+    assert {each.problem.id for each in _candidates(tmp_path, settings)} == {solved[0].problem.id}
 
 
 def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) -> None:

@@ -16,11 +16,17 @@ from storage.exchange.problems import write_problems
 from storage.tables.experiences import read_experiences
 from storage.tables.imported_problems import write_imported
 from tasks.fan_out.chunk import run_folder
+from tasks.inputs.problem_sources import source_of
+from tasks.inputs.shortfalls import as_collected, shortfalls
 from tasks.settings.errors import RunError
 from tasks.settings.presets import for_preset
-from tasks.settings.run_settings import RunSettings
+from tasks.settings.recorded_settings import recorded_settings
+from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.collect import VARIANTS
-from tests.tasks.in_process import collect
+from tasks.stages.hallucinate import HALLUCINATE
+from tasks.stages.read_worlds import READ_WORLDS
+from tasks.stages.relabel import RELABEL, problems_of_memory
+from tests.tasks.in_process import collect, run_stage
 
 PLAIN = replace(
     for_preset("smoke", classes=["random"], difficulty="easy"), experiences=4, candidates=30, combined=True
@@ -85,9 +91,56 @@ def test_a_folder_with_fewer_worlds_than_candidates_makes_do(tmp_path: Path, pla
     place = run_folder(str(tmp_path / "data"), settings).worlds("few", "train")
     write_imported(place, [each.problem for each in plain])
     assert len(collected(tmp_path / "data", settings)) == 4
-    wanting = replace(settings, experiences=5)
-    write_imported(
-        run_folder(str(tmp_path / "data"), wanting).worlds("few", "train"), [each.problem for each in plain]
+
+
+@pytest.fixture
+def uneven(tmp_path: Path) -> RunSettings:
+    """A run of three classes of worlds that wants six experiences of each; there are five, one and eight."""
+    source = source_of("", replace(PLAIN, classes=("random",)), "random")
+    problems = [source.problem("collect", index) for index in range(16)]
+    counts = {"few": 5, "one": 1, "many": 8}
+    for name in counts:
+        write_problems(tmp_path / name / "train" / "problems.parquet", problems[:2])
+    settings = replace(
+        PLAIN, classes=(), worlds=tuple(str(tmp_path / name) for name in counts), experiences=6, candidates=0
     )
-    with pytest.raises(RunError, match="Class few: 4 of 4 problems solved, 5 are wanted"):
-        collected(tmp_path / "data", wanting)
+    settings = replace(settings, problems_per_experience=3, as_published=True)
+    for name, count in counts.items():
+        some = [replace(each, class_name=name) for each in problems[:count]]
+        write_imported(run_folder(str(tmp_path / "data"), settings).worlds(name, "train"), some)
+    return settings
+
+
+def test_a_run_goes_on_with_fewer_experiences_and_without_a_class_of_too_few(
+    uneven: RunSettings, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    data = str(tmp_path / "data")
+    settings = collect(data, uneven)
+    run = run_folder(data, settings)
+    assert settings.class_names == ("few", "many")
+    assert settings.run_name == uneven.run_name
+    assert [len(read_experiences(run.experiences(name))) for name in settings.memory_names] == [5, 6, 11]
+    told = [each.getMessage() for each in caplog.records]
+    assert told == [str(each) for each in shortfalls(data, uneven)]
+    assert ["few goes on with fewer: 5 of 6" in told[0], "one is left out" in told[1]] == [True, True]
+    assert recorded_settings(run) == settings == as_collected(data, uneven)
+    for stage in (HALLUCINATE, RELABEL):  # which raises if a plan does not solve what was made for it
+        run_stage(stage, data, settings)
+    made_for = problems_of_memory(data, settings, COMBINED).plan_index
+    assert sorted(set(made_for.tolist())) == list(range(11))
+
+
+def test_strict_settings_stop_at_a_class_with_too_few(uneven: RunSettings, tmp_path: Path) -> None:
+    strict = replace(uneven, strict=True)
+    with pytest.raises(RunError, match=r"Class few goes on with fewer: 5 of 6 wanted .* Ask for fewer"):
+        collect(str(tmp_path / "data"), strict)
+
+
+def test_without_any_class_there_is_no_run(tmp_path: Path) -> None:
+    for part in ("train", "test"):
+        write_problems(tmp_path / "none" / part / "problems.parquet", [])
+    settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "none"),))
+    results = run_stage(READ_WORLDS, str(tmp_path / "data"), settings)
+    assert [each.unusable is None for each in results.values()] == [False]
+    with pytest.raises(RunError, match="none is left out of the run: 0 of 4"):
+        collect(str(tmp_path / "data"), settings)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import multiprocessing
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from planners.memory.hallucination import learned_obstacles_training as training
 from planners.memory.hallucination.mixture import METHODS
 from planners.solve import solve
 from storage.errors import StorageError
@@ -34,6 +37,14 @@ SETTINGS = replace(
 @pytest.fixture(autouse=True)
 def _small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hallucinate, "CHUNK_PROBLEMS", 24)  # three chunks of two plans
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _short_training() -> Iterator[None]:
+    """A tenth of the steps: what a network learns is tested elsewhere."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training, "LearnedTraining", partial(training.LearnedTraining, steps=30))
+        yield
 
 
 @pytest.fixture(scope="module")
