@@ -1,8 +1,10 @@
-"""A route: one feasible drive from a pose to a distant goal, made of local plans that a memory may hold.
+"""A route: one feasible drive from a pose to a distant goal, made of local plans that need not end at rest.
 
-The search is depth first. From where it rests, the vehicle turns to a local goal, the local problem is
-solved, and the vehicle brakes where the outlook is best, which need not be at the local goal. If a local goal
-leads nowhere another is tried, and then the search goes back to the stop before.
+The horizon recedes: from the state in which it drives, the vehicle plans to a local goal on the shortest
+path, drives a part of that plan, and plans on from the state that it then has. It changes from one plan to
+the next only where it could also brake. The search is depth first. If no plan leads on from a state, the
+change is made earlier, then another local goal is tried, then the vehicle stops; then the search goes back by
+a leg.
 """
 
 from __future__ import annotations
@@ -13,48 +15,48 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
-from planners.maps.cutting import is_drivable
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.routes.manoeuvres import bearing, braking, is_free_drive, rolling, turn_towards
+from planners.routes.manoeuvres import braking, is_free_drive
 from planners.routes.path_ahead import LocalGoal, PathAhead
 from planners.solve import Attempt
+from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
     GOAL_RADIUS,
+    Arrival,
     Plan,
     Problem,
     start_state,
 )
-from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
-from planners.world.workspace import Workspace
 
-CANONICAL_TRIED: Final = 4  # local goals at the canonical distance to try from one stop
-STOPS_TRIED: Final = 2  # points of a plan to try to stop at
-STOPS_APART_M: Final = 8.0
+SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
-FACED: Final = 0.01  # radians by which a final goal at the canonical distance may lie aside
+RESTING: Final = 1e-6  # m/s and radians
+ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
+AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
 
 Solve = Callable[[Problem], Attempt]
 
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A drive from rest to rest: turn, follow a local plan as far as it is of use, brake."""
+    """A part of a local plan, from the state in which the leg before ends; the last before a goal brakes."""
 
-    begin: Floats  # [S] at rest
-    end: Floats  # [S] at rest
+    begin: Floats  # [S]
+    end: Floats  # [S]
     controls: Floats  # [n, 2]
-    turning: int  # how many controls turn and roll
-    driving: int  # how many follow the plan; the others brake
+    driving: int  # how many controls follow the plan; the others brake
     attempt: Attempt  # how the local problem was solved
     problem: Problem  # in the canonical frame
     goal: Point  # local or final, metres
@@ -73,7 +75,7 @@ class Stuck(NamedTuple):
     """Why there is no route."""
 
     place: Point  # metres; after a search the stop that was nearest to the goal
-    why: str  # a clause that follows "at (x, y)"
+    why: str  # a clause, which "at (x, y)" follows
     attempts: int  # local problems that were tried; 0 if there was nothing to try
 
 
@@ -82,8 +84,26 @@ class Route:
     """Legs from a start to the last of some goals."""
 
     problem: Problem  # the whole one: start, last goal, everything that is occupied
-    legs: list[Leg]
+    sections: list[list[Leg]]  # to each goal the legs of the drive from rest to rest
     paths: list[Floats]  # to each goal the shortest path over the cells, [n, 2] metres
+
+    @property
+    def legs(self) -> list[Leg]:
+        """All legs, in the order of the drive."""
+        return [leg for section in self.sections for leg in section]
+
+    def least_seconds(self, vehicle: Vehicle) -> float:
+        """Return how long as many metres take at full speed, from rest to rest at each goal."""
+        acceleration, _ = control_limits(vehicle)
+        top = vehicle.max_speed
+        seconds = 0.0
+        for section in self.sections:
+            metres = sum(Plan(leg.states(vehicle), leg.controls).length_m for leg in section)
+            if metres > top * top / acceleration:
+                seconds += metres / top + top / acceleration
+            else:
+                seconds += 2.0 * math.sqrt(metres / acceleration)
+        return seconds
 
     def plan(self, vehicle: Vehicle) -> Plan:
         """Join all legs to one plan."""
@@ -97,8 +117,7 @@ class Router:
     def __init__(
         self,
         world: OccupancyMap,
-        recalled: Solve,
-        searched: Solve,
+        solve: Solve,
         vehicle: Vehicle = CAR,
         tolerance_m: float = 0.0,
     ) -> None:
@@ -106,13 +125,12 @@ class Router:
 
         Args:
             world: the map.
-            recalled: solves canonical problems.
-            searched: solves problems whose goal may be nearer or aside.
+            solve: solves local problems, from any motion to a place.
             vehicle: what is to be driven.
             tolerance_m: how far the outlines of occupied regions may move.
         """
         self._name, self._vehicle = world.name, vehicle
-        self._recalled, self._searched = recalled, searched
+        self._solve = solve
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
         bounds = (0.0, 0.0, *world.size)
         occupied = self._surroundings.obstacles()
@@ -121,42 +139,47 @@ class Router:
         )
         self._scene = scene_of(self._whole)
         self._paths = GlobalPaths(world, 1.0)
+        roomy = replace(self._paths.grid, occupied=ndimage.binary_dilation(self._paths.grid.occupied))
+        self._roomy_paths = GlobalPaths(roomy, 1.0)  # for where the shortest path is too narrow to drive
         self._attempts = self._most_attempts = 0
-        self._workspace = Workspace()
 
     def route(self, start: Pose, goals: list[Point]) -> Route | Stuck:
         """Find a route from a pose (m, m, rad) through all ``goals``, with a stop in the disc around each."""
         whole = replace(self._whole, start=start, goal=goals[-1])
         state = start_state(whole, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
-            return Stuck(start[:2], "the vehicle stands in an obstacle, or out of the map", 0)
+            return Stuck(start[:2], "the vehicle would stand in an obstacle or outside the map", 0)
         for x, y in goals:
             if not point_is_free(x, y, self._scene):
-                return Stuck((x, y), "the goal is occupied, or out of the map", 0)
-        legs: list[Leg] = []
+                return Stuck((x, y), "the goal lies in an obstacle or outside the map", 0)
+        sections: list[list[Leg]] = []
         paths = []
         self._attempts = 0
         for goal in goals:
             ahead = PathAhead(self._paths, goal)
             path = ahead.path(state)
             if path is None:
-                return Stuck(goal, "no path over the map leads to the goal", 0)
+                return Stuck(goal, "the goal cannot be reached: no way over the map leads there", 0)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
-                return more
-            legs += more
+                around = PathAhead(self._roomy_paths, goal)
+                again = more if around.path(state) is None else self._legs_to(around, state)
+                if isinstance(again, Stuck):
+                    return more
+                more = again
+            sections.append(more)
             paths.append(path)
-            state = legs[-1].end if legs else state
-        return Route(whole, legs, paths)
+            state = more[-1].end if more else state
+        return Route(whole, sections, paths)
 
     def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
-        """Search the legs from a state to one goal, depth first."""
+        """Search the legs from a state to rest at one goal, depth first."""
         legs: list[Leg] = []
         options = [self._legs_from(ahead, state)]
         begun = self._attempts
         self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
-        nearest = state
-        while not ahead.arrived(state[np.newaxis])[0]:
+        start = nearest = state
+        while not (ahead.arrived(state[np.newaxis])[0] and np.abs(state[3:5]).max() < RESTING):
             leg = next(options[-1], None)
             if leg is not None:
                 legs.append(leg)
@@ -166,93 +189,98 @@ class Router:
                 if not options:
                     metres = ahead.to_go(nearest[np.newaxis])[0]
                     tried = self._attempts - begun
-                    why = f"the route ends, {metres:.0f} m before the goal: none of the local goals tried"
+                    why = f"no local goal could be reached {metres:.0f} m before the goal"
                     return Stuck((float(nearest[0]), float(nearest[1])), why, max(tried, 1))
                 legs.pop()
-            state = legs[-1].end if legs else state
+            state = legs[-1].end if legs else start
             nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
         return legs
 
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
-        """Yield legs from a state at rest, best first, each searched when it is needed."""
-        for goal in ahead.local_goals(state, CANONICAL_TRIED):
+        """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
+        for goal in ahead.local_goals(state):
             if self._attempts == self._most_attempts:
-                return
-            legs = self._legs_towards(ahead, state, goal)
-            if goal.final and not any(ahead.arrived(leg.end[np.newaxis])[0] for leg in legs):
-                ahead.give_up(state)
-            yield from legs
-
-    def _legs_towards(self, ahead: PathAhead, state: Floats, goal: LocalGoal) -> list[Leg]:
-        """Make legs of the plan for one local goal, with different stops; none if there is no plan."""
-        turn = self._made_ready(state, goal)
-        if turn is None:
-            return []
-        begin = simulate(state, turn, self._vehicle)[-1]
-        problem = self._problem(begin, goal)
-        if goal.canonical and not is_drivable(problem, self._vehicle, self._workspace):
-            return []
-        self._attempts += 1
-        attempt = self._recalled(problem) if goal.canonical else self._searched(problem)
-        if attempt.plan is None:
-            return []
-        driven = simulate(begin, attempt.plan.controls, self._vehicle)
-        legs = []
-        for steps, brake in self._stops(ahead, driven, float(ahead.to_go(state[np.newaxis])[0])):
-            controls = np.concatenate([turn, attempt.plan.controls[:steps], brake])
-            end = simulate(state, controls, self._vehicle)[-1]
-            legs.append(Leg(state, end, controls, len(turn), steps, attempt, problem, goal.place))
-        return legs
-
-    def _made_ready(self, state: Floats, goal: LocalGoal) -> Floats | None:
-        """The controls that turn to a canonical goal, and roll to the distance of the final one."""
-        if not goal.canonical:
-            return np.empty((0, 2))
-        turn = turn_towards(state, goal.place, self._vehicle, self._scene)
-        if turn is None or not goal.final:
-            return turn
-        facing = simulate(state, turn, self._vehicle)[-1]
-        roll = rolling(math.dist(facing[:2], goal.place) - CANONICAL_DISTANCE, self._vehicle)
-        free = is_free_drive(simulate(facing, roll, self._vehicle), self._vehicle, self._scene)
-        return np.concatenate([turn, roll]) if free else None
+                break
+            problem = self._problem(state, goal)
+            self._attempts += 1
+            attempt = self._solve(problem)
+            if attempt.plan is None:
+                continue
+            states = simulate(state, attempt.plan.controls, self._vehicle)
+            drive = _Drive(states, attempt.plan.controls, attempt, problem, goal)
+            ends = [self._handovers(ahead, drive), self._stops(ahead, drive)]
+            for legs in reversed(ends) if goal.final else ends:
+                yield from legs
 
     def _problem(self, state: Floats, goal: LocalGoal) -> Problem:
-        """The local problem of a vehicle at rest, in the canonical frame.
-
-        A canonical goal is straight ahead at the canonical distance. The final goal is where it is.
-        """
+        """The local problem, in the canonical frame: a window of the map around start and goal."""
         x, y, heading = state[:3].tolist()
-        identity = f"{self._name}-route-{self._attempts}"
-        if goal.canonical and not goal.final:
-            return self._surroundings.problem(x, y, heading, identity, self._name)
-        aside = bearing(state, goal.place)
-        faced = abs(aside) < FACED  # then the window lies along the heading, else towards the goal
-        turned = 0.0 if faced else aside
+        towards = math.atan2(goal.place[1] - y, goal.place[0] - x)
         distance = math.dist((x, y), goal.place)
-        angle = CANONICAL_START[2] + (aside if faced else 0.0)
-        return replace(
-            self._surroundings.problem(x, y, heading + turned, identity, self._name),
-            start=(0.0, 0.0, CANONICAL_START[2] - turned),
-            goal=(distance * math.cos(angle), distance * math.sin(angle)),
+        before = 0.5 * max(
+            CANONICAL_DISTANCE - distance, 0.0
+        )  # metres from the window's start to the vehicle
+        cos, sin = math.cos(towards), math.sin(towards)
+        window = self._surroundings.problem(
+            x - before * cos, y - before * sin, towards, f"{self._name}-route-{self._attempts}", self._name
         )
+        along = CANONICAL_START[2]
+        place = before * math.cos(along), before * math.sin(along), along + heading - towards
+        end = (before + distance) * math.cos(along), (before + distance) * math.sin(along)
+        motion = np.where(np.abs(state[3:]) < RESTING, 0.0, state[3:])
+        asked = replace(
+            window,
+            start=place,
+            goal=end,
+            start_motion=tuple(motion.tolist()),
+            arrival=AT_REST if goal.at_rest else None,
+        )
+        return to_canonical(asked)[0]
 
-    def _stops(self, ahead: PathAhead, driven: Floats, to_go: float) -> list[tuple[int, Floats]]:
-        """The best points of a drive ``[T, S]`` to stop at: after how many steps to brake, and the controls.
+    def _handovers(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
+        """Yield the parts of a drive after which the next plan may begin: there the vehicle could brake."""
+        free = count_free_prefix(drive.states, self._vehicle, self._scene)
+        to_go = ahead.to_go(drive.states)
+        later = free
+        for share in SHARES:
+            for steps in range(min(int(share * (len(drive.states) - 1)), later - 1), 0, -1):
+                if to_go[steps] > to_go[0] - PROGRESS_M:
+                    continue
+                brake = simulate(
+                    drive.states[steps], braking(drive.states[steps], self._vehicle), self._vehicle
+                )
+                if is_free_drive(brake, self._vehicle, self._scene):
+                    yield drive.leg(steps, np.empty((0, 2)), drive.states[steps])
+                    later = steps
+                    break
 
-        A stop in the goal disc is best, the nearer to its centre the better; then the outlook counts.
-        """
-        free = count_free_prefix(driven, self._vehicle, self._scene)
-        braked = [(steps, braking(driven[steps], self._vehicle)) for steps in range(1, free)]
-        stops = [(steps, brake, simulate(driven[steps], brake, self._vehicle)) for steps, brake in braked]
-        stops = [stop for stop in stops if is_free_drive(stop[2], self._vehicle, self._scene)]
-        if not stops:
-            return []
-        rests = np.array([states[-1] for _, _, states in stops])
-        outlook = ahead.outlook(rests)
-        further = (ahead.to_go(rests) <= to_go - PROGRESS_M) | ahead.arrived(rests)
-        chosen: list[int] = []
-        for i in np.argsort(outlook, kind="stable").tolist():
-            apart = all(np.hypot(*(rests[i, :2] - rests[j, :2])) >= STOPS_APART_M for j in chosen)
-            if further[i] and apart and len(chosen) < STOPS_TRIED and outlook[i] < math.inf:
-                chosen.append(i)
-        return [stops[i][:2] for i in chosen]
+    def _stops(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
+        """Yield the part of a drive after which the vehicle brakes, in the goal disc if it can."""
+        free = count_free_prefix(drive.states, self._vehicle, self._scene)
+        stops = []
+        for steps in range(1, free):
+            brake = braking(drive.states[steps], self._vehicle)
+            states = simulate(drive.states[steps], brake, self._vehicle)
+            if is_free_drive(states, self._vehicle, self._scene):
+                stops.append((steps, brake, states[-1]))
+        if stops:
+            rests = np.array([end for _, _, end in stops])
+            arrived, to_go = ahead.arrived(rests), ahead.to_go(rests)
+            best = int(np.where(arrived, ahead.distance(rests) - ARRIVED_M, to_go).argmin())
+            if arrived[best] or to_go[best] <= ahead.to_go(drive.states[:1])[0] - PROGRESS_M:
+                yield drive.leg(*stops[best])
+
+
+class _Drive(NamedTuple):
+    """A local plan, driven over the map."""
+
+    states: Floats  # [n + 1, S]
+    controls: Floats  # [n, 2]
+    attempt: Attempt
+    problem: Problem
+    goal: LocalGoal
+
+    def leg(self, steps: int, brake: Floats, end: Floats) -> Leg:
+        """The leg of so many steps of the plan, and then of controls ``brake [m, 2]``."""
+        controls = np.concatenate([self.controls[:steps], brake])
+        return Leg(self.states[0], end, controls, steps, self.attempt, self.problem, self.goal.place)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from dashboards.cells import CellTable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
@@ -17,7 +19,7 @@ from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import name_of
+from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
@@ -29,7 +31,7 @@ from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
-HEADINGS: Final = ("leg", "source", "driven m", "turning m", "s", "planning ms", "retrieval ms")
+HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
 RETRIEVAL: Final = (
     "occupancy",
     "encode",
@@ -46,16 +48,9 @@ class _Solver:
     scale: float  # metres of the map in a canonical metre
     seconds: list[float] = field(default_factory=list)  # planning time of each attempt
 
-    def recalled(self, problem: Problem) -> Attempt:
-        """Solve a problem with a canonical goal, with the assistant's own assist."""
-        return self._solved(problem, self.assistant.settings.assist)
-
-    def searched(self, problem: Problem) -> Attempt:
-        """Solve a problem whose goal is not canonical: the memory has no plans for it."""
-        return self._solved(problem, "none" if self.assistant.settings.assist == "none" else "fresh")
-
-    def _solved(self, problem: Problem, assist: str) -> Attempt:
-        attempt = self.assistant.attempt(replace(problem, scale=self.scale), assist)
+    def __call__(self, problem: Problem) -> Attempt:
+        """Solve a problem as the assistant is set, check the plan, and note the time."""
+        attempt = self.assistant.attempt(replace(problem, scale=self.scale))
         attempt = check_attempt(problem, attempt, set(), self.assistant.vehicle)
         self.seconds.append(attempt.planning_seconds)
         return attempt
@@ -133,7 +128,7 @@ def drive_route(
 
     def router_over(each: OccupancyMap) -> Router:
         tolerance_m = settings.tolerance_m / scale
-        return Router(each, solver.recalled, solver.searched, assistant.vehicle, tolerance_m)
+        return Router(each, solver, assistant.vehicle, tolerance_m)
 
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
@@ -174,9 +169,9 @@ def _drive_mirrored(
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    line = f"No route over {world.name}: at ({x:.1f}, {y:.1f}) {stuck.why}"
+    line = f"No route over {world.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
     if stuck.attempts == 0:
-        return UsageError(f"{line}.")
+        return UsageError(f"{line}; give another place.")
     return RunError(
         f"{line} ({stuck.attempts} local problems tried); try another --seed, heading or planner."
     )
@@ -213,7 +208,7 @@ def _record(
 
 def _driven_m(leg: Leg, assistant: Assistant) -> float:
     """The length of the part of a leg that follows its local plan, in canonical metres."""
-    states = leg.states(assistant.vehicle)[leg.turning : leg.turning + leg.driving + 1]
+    states = leg.states(assistant.vehicle)[: leg.driving + 1]
     return Plan(states, leg.controls[: leg.driving]).length_m
 
 
@@ -230,6 +225,7 @@ def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
             f"{scale * driven:.1f}",
             f"{scale * (whole.length_m - driven):.1f}",
             f"{whole.duration_s:.1f}",
+            f"{round(scale * leg.begin[3], 1) + 0.0:.1f}",
             f"{1000.0 * leg.attempt.planning_seconds:.2f}",
             f"{1000.0 * retrieval:.2f}" if used_memory else "-",
         ]
@@ -255,7 +251,7 @@ def _summary(
         for source, metres in by_source.items()
         if metres
     ]
-    parts.append(f"turning and braking {scale * (plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
+    parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
     share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
     lines.append("; ".join(parts))
     if legs:
@@ -263,11 +259,23 @@ def _summary(
             f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
             "(a repaired leg counts whole)"
         )
+        lines.append(_pace(route, plan, assistant.vehicle, scale))
     lines.append(
-        f"planning {1000.0 * sum(solver.seconds):.2f} ms in {_count(len(solver.seconds), 'attempt')}; "
-        f"of {seconds:.2f} s for the whole route; checked from end to end"
+        f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
+        f"route with its checks {seconds:.2f} s"
     )
     return lines
+
+
+def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
+    """A line: the mean speed, beside that of who drives as far at full speed, and rests at each goal."""
+    shortest = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in route.paths)
+    mean = plan.length_m / max(plan.duration_s, 1e-9)
+    share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)
+    return (
+        f"{scale * mean:.2f} m/s on average, {share:.0%} of what full speed "
+        f"from goal to goal would be; the shortest way over the cells has {scale * shortest:.0f} m"
+    )
 
 
 def _count(number: int, noun: str) -> str:
