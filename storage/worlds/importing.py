@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from planners.maps.cutting import Cut, cut_problems, cut_scenarios
 from planners.maps.occupancy_map import OccupancyMap
@@ -14,7 +14,8 @@ from planners.world.problem import Problem
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError, sentence
-from storage.exchange.problems import problems_or_faults
+from storage.exchange.problems import problem_of, problems_or_faults
+from storage.worlds.manoeuvre_scenes import READERS
 from storage.worlds.moving_ai import map_of_scenarios, read_map, read_scenarios
 from storage.worlds.numpy_grids import grid_worlds, read_grid
 from storage.worlds.pictures import picture_world
@@ -66,11 +67,16 @@ def import_part(
     """The problems of one ``part`` of a ``source``, always in the same order, each checked for the vehicle.
 
     If a source has folders for parts, these hold a part's worlds; otherwise every second world is for
-    testing. The blocks of a map belong to its parts like the squares of a chequerboard. ``settings``: how to
-    read the source.
-    ``progress``: is told how far the import is.
+    testing. The blocks of a map belong to its parts like the squares of a chequerboard.
 
-    Raises StorageError if nothing can be read, or if a world is unfit and the settings are strict.
+    Args:
+        source: where the worlds are.
+        part: "train" or "test".
+        settings: how to read the source.
+        progress: told how many worlds are done, and of how many.
+
+    Raises:
+        StorageError: nothing can be read, or a world is unfit and the settings are strict.
     """
     if part not in PARTS:
         raise StorageError(f"{part!r} is not a part of worlds; expected one of {', '.join(PARTS)}.")
@@ -166,5 +172,19 @@ def _worlds_of(file: Path, source: Source, part: Part, settings: ImportSettings)
         case "numpy":
             for where, problem in grid_worlds(file, identity, name, settings.unknown == "occupied"):
                 yield f"{file} {where}", problem
-        case _:
+        case "problems":
             yield from problems_or_faults(file, settings.vehicle)
+        case _:
+            for identity, fields in READERS[source.format](file, settings.vehicle):
+                yield f"{file} {identity}", _manoeuvre(fields, identity, source.format, settings.vehicle)
+
+
+def _manoeuvre(
+    fields: Mapping[str, Any] | str, identity: str, class_name: str, vehicle: Vehicle
+) -> Problem | str:
+    if isinstance(fields, str):
+        return fields
+    try:
+        return problem_of({**fields, "id": identity, "class": class_name}, identity, vehicle)
+    except ValueError as error:
+        return str(error)

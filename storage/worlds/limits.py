@@ -14,7 +14,10 @@ LARGEST_CELL_M: Final = 100.0
 def check_file(file: Path, most: int, advice: str) -> None:
     """Raise ValueError, the end of a sentence, if a ``file`` has more than ``most`` bytes.
 
-    ``advice``: what to do then.
+    Args:
+        file: the file.
+        most: how many bytes it may have.
+        advice: what to do if it has more.
     """
     if file.is_file() and file.stat().st_size > most:
         raise ValueError(f"is larger than {most:,} bytes; {advice}")

@@ -72,7 +72,12 @@ def map_of_scenarios(file: Path) -> Path:
 def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
     """Starts and ends ``[n, 2, 2]`` of the scenarios in a ``.scen`` file, grid metres, middles of cells.
 
-    ``world``: the map they belong to. Raises ValueError if a line is malformed, or of a map of another size.
+    Args:
+        file: the ``.scen`` file.
+        world: the map they belong to.
+
+    Raises:
+        ValueError: a line is malformed, or of a map of another size.
     """
     rows, columns = world.occupied.shape
     ends = []

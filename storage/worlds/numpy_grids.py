@@ -50,8 +50,14 @@ def grid_worlds(
 ) -> Iterator[tuple[str, Problem]]:
     """The canonical problems of arrays ``[201, 201]`` or ``[n, 201, 201]``, and where each stands in them.
 
-    ``file``: the arrays lie in. ``identity``: beginning of their ids. ``class_name``: their class. Unknown
-    cells are occupied or free. Raises ValueError, the end of a sentence, with what is wrong with the file.
+    Args:
+        file: the file of the arrays.
+        identity: how the ids of the problems begin.
+        class_name: their class.
+        unknown_is_occupied: whether unknown cells are occupied, or free.
+
+    Raises:
+        ValueError: the end of a sentence, with what is wrong with the file.
     """
     shapes = list(_shapes(file))
     for name, shape in shapes:

@@ -18,13 +18,14 @@ Part = Literal["train", "test", "validation"]
 PARTS: Final[tuple[Part, ...]] = ("train", "test", "validation")
 WORLDS: Final = {  # formats by ending
     ".png": "png", ".txt": "polygons", ".npy": "numpy", ".npz": "numpy",
-    **dict.fromkeys((".json", ".jsonl", ".parquet"), "problems"),
+    **dict.fromkeys((".json", ".jsonl", ".parquet"), "problems"), ".csv": "tpcap",
 }  # fmt: skip
 MAPS: Final = {
     ".map": "moving-ai", ".scen": "moving-ai", ".yaml": "ros", ".yml": "ros",
     ".npy": "numpy", ".npz": "numpy",
 }  # fmt: skip
-FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values()}))
+MANOEUVRES: Final = ("bench-mr", "dynobench", "tpcap")  # from pose to pose; files end like others
+FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values(), *MANOEUVRES}))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, get_args
 
 from dashboards.cells import CellTable
 from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.exchange.problems import write_problems
 from storage.places.files import whole_folder
@@ -18,6 +19,7 @@ from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 from storage.worlds.importing import Imported, ImportSettings, import_part, load_map
 from storage.worlds.sources import FORMATS, PARTS, Part, Source, source_at
 from tasks.fan_out.progress import progress
+from tasks.inputs.skipped_worlds import summed_up
 from tasks.settings.checks import (
     check_count,
     check_known,
@@ -30,7 +32,6 @@ from tasks.settings.errors import RunError, UsageError
 
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
-SHOWN_SKIPPED: Final = 20
 ONLY_OF_MAPS: Final = {"tolerance_m": 0.0, "seed": 1}  # options with their defaults
 
 HEADINGS: Final = ("class", "part", "problems", "skipped", "pieces", "a problem", "seconds")
@@ -134,19 +135,19 @@ def import_worlds(
             imported_parts[name] = import_part(source, name, settings, show)
         rows.append(_cells(source, name, imported_parts[name], time.perf_counter() - began))
     _refuse_empty(source, out, imported_parts)
-    _write(out, imported_parts)
+    _write(out, imported_parts, settings.vehicle)
     if drawing is not None:
         _draw(source, settings, imported_parts, drawing)
     _warn_of_skipped([line for imported in imported_parts.values() for line in imported.skipped])
     return CellTable("", HEADINGS, [[row] for row in rows])
 
 
-def _write(out: Path, imported_parts: Mapping[Part, Imported]) -> None:
+def _write(out: Path, imported_parts: Mapping[Part, Imported], vehicle: Vehicle) -> None:
     if out.suffix == "":
         with whole_folder(out) as folder:
             for part, imported in imported_parts.items():
                 (folder / part).mkdir()
-                write_problems(folder / part / PROBLEMS_FILE, imported.problems)
+                write_problems(folder / part / PROBLEMS_FILE, imported.problems, vehicle)
         return
     problems: dict[str, Problem] = {}
     for problem in (problem for imported in imported_parts.values() for problem in imported.problems):
@@ -155,7 +156,7 @@ def _write(out: Path, imported_parts: Mapping[Part, Imported]) -> None:
                 f'Both parts have a problem "{problem.id}"; ask for one --part, or --out a folder.'
             )
         problems[problem.id] = problem
-    write_problems(out, list(problems.values()))
+    write_problems(out, list(problems.values()), vehicle)
 
 
 def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | None) -> None:
@@ -197,10 +198,7 @@ def _cells(source: Source, part: str, imported: Imported, seconds: float) -> lis
 
 def _warn_of_skipped(skipped: list[tuple[str, str]]) -> None:
     if skipped:
-        shown = [f"{item}: {reason}" for item, reason in skipped[:SHOWN_SKIPPED]]
-        more = [f"and {len(skipped) - SHOWN_SKIPPED:,} more"] * (len(skipped) > SHOWN_SKIPPED)
-        heading = f"{len(skipped):,} skipped (use --strict to stop instead):"
-        _LOG.warning("\n  ".join([heading, *shown, *more]))
+        _LOG.warning(summed_up(skipped))
 
 
 def _draw(

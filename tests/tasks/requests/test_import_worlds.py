@@ -150,7 +150,8 @@ def test_skipped_worlds_are_listed_and_under_strict_stop(
     assert call(["import-worlds", str(tmp_path / "yard"), "--out", str(out)]) == 0
     told = capsys.readouterr().err
     assert told.startswith("1 skipped")
-    assert "2.txt: cannot be planned in: start footprint" in told
+    assert "1 × cannot be planned in: start footprint" in told
+    assert told.endswith("2.txt\n")
     out.unlink()
     assert call(["import-worlds", str(tmp_path / "yard"), "--out", str(out), "--strict"]) == 1
     assert "2.txt cannot be planned in" in capsys.readouterr().err

@@ -1,0 +1,223 @@
+"""Manoeuvres between poses that others have published: TPCAP, dynobench and Bench-MR, one reader each.
+
+A reader gives the fields of a problem as ``storage.exchange.problems`` takes them, in the frame of the file.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from planners.world.vehicles.vehicle import Vehicle, trailers_of
+from storage.fields import number_of, parse_json, short, text_of
+from storage.places.files import read_text
+from storage.worlds.limits import check_file, whole_number
+from storage.yaml_text import yaml_fields
+
+LARGEST_FILE: Final = 10_000_000  # bytes
+PARKED: Final = [0.05, math.radians(1.0)]  # metres and radians: how exactly a car is to stand
+AROUND_M: Final = 20.0  # how far the ground of a TPCAP case reaches around its ends; it has no border
+DISTANCE: Final = 0.1  # dynobench's, weighted, within which a goal is reached
+_BRACKETS: Final = 4_000  # of a dynobench environment in YAML
+
+Fields = dict[str, Any]
+
+
+def tpcap_cases(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]]:
+    """Cases of the Trajectory Planning Competition of Automated Parking: one in a ``.csv``, many in JSON.
+
+    A ``.csv`` is one line: start and goal pose, the number of obstacles, of the corners of each, and these.
+    JSON has ``cases``, each with ``id``, ``start``, ``goal`` and ``obstacles``. For any ``vehicle``. Raises
+    ValueError or StorageError with what is wrong with the file.
+    """
+    check_file(file, LARGEST_FILE, "is it a case of TPCAP?")
+    for case in [_case_of_line(file)] if file.suffix == ".csv" else _listed(_object(file), "cases"):
+        start, goal = _numbers(case, "start", 3), _numbers(case, "goal", 3)
+        ends = list(zip(start[:2], goal[:2], strict=True))
+        bounds = [min(end) - AROUND_M for end in ends] + [max(end) + AROUND_M for end in ends]
+        yield _id(case), _pose_to_pose(start, goal, bounds, case.get("obstacles"))
+
+
+def _pose_to_pose(start: list[float], goal: list[float], bounds: list[float], obstacles: object) -> Fields:
+    poses = {"start": start, "goal": goal, "goal_tolerance": PARKED}
+    return {**poses, "bounds": bounds, "obstacles": obstacles}
+
+
+def _case_of_line(file: Path) -> Fields:
+    words = [word.strip() for row in csv.reader(read_text(file).splitlines()) for word in row if word.strip()]
+    numbers = iter(words)
+
+    def next_number(what: str) -> float:
+        word = next(numbers, "")
+        try:
+            return float(word)
+        except ValueError:
+            raise ValueError(f"has {short(word)} where {what} was expected; is it cut off?") from None
+
+    def next_count(what: str) -> int:
+        count = whole_number(word := next(numbers, ""))
+        if count is None or count > len(words):
+            raise ValueError(f"has {short(word)} where {what} was expected; is it cut off?")
+        return count
+
+    start, goal = ([next_number(f"a number of the {end}") for _ in range(3)] for end in ("start", "goal"))
+    counts = [next_count("a number of corners") for _ in range(next_count("the number of obstacles"))]
+    obstacles = [[[next_number("x"), next_number("y")] for _ in range(count)] for count in counts]
+    if (extra := next(numbers, None)) is not None:
+        raise ValueError(f"goes on with {short(extra)} after its last obstacle; are its counts right?")
+    return {"id": file.stem, "start": start, "goal": goal, "obstacles": obstacles}
+
+
+def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]]:
+    """Problems between poses in Bench-MR's polygon scenes, packed as JSON, for any ``vehicle``.
+
+    The file has ``environments``, lists of polygons by name, and ``problems``, each with ``id``,
+    ``environment``, ``start``, ``goal`` and ``bounds``. These hold the reference point and not the body, and
+    so are widened by as far as the vehicle reaches. Raises ValueError or StorageError.
+    """
+    check_file(file, LARGEST_FILE, "is it a file of Bench-MR's scenes?")
+    fields = _object(file)
+    environments = fields.get("environments")
+    if not isinstance(environments, Mapping):
+        raise ValueError("has no environments, polygons by the name of a scene; is it of Bench-MR?")
+    reach = vehicle.scale * math.hypot(max(vehicle.front, vehicle.rear), 0.5 * vehicle.width)
+    for problem in _listed(fields, "problems"):
+        name = text_of(problem.get("environment"), "environment")
+        if name not in environments:
+            raise ValueError(f"has no environment {short(name)}; it has {', '.join(environments)}")
+        start, goal = _numbers(problem, "start", 3), _numbers(problem, "goal", 3)
+        x_min, y_min, x_max, y_max = _corners(problem.get("bounds"))
+        bounds = [x_min - reach, y_min - reach, x_max + reach, y_max + reach]
+        yield _id(problem), _pose_to_pose(start, goal, bounds, environments[name])
+
+
+def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields | str]]:
+    """Problems of dynobench, one in its YAML or many packed as JSON, or why they are not for a ``vehicle``.
+
+    The vehicle of the model ``car1_v0`` is called ``dynobench-car1-v0``. JSON has ``problems``, each with
+    ``id``, ``model``, ``start``, ``goal``, ``bounds`` and ``obstacles``. Raises ValueError or StorageError.
+    """
+    check_file(file, LARGEST_FILE, "is it a problem of dynobench?")
+    problems = _listed(_object(file), "problems") if file.suffix == ".json" else [_in_yaml(file)]
+    for problem in problems:
+        model = text_of(problem.get("model"), "model")
+        wanted = f"dynobench-{model.replace('_', '-')}"
+        if vehicle.about.name.decode() != wanted:
+            yield _id(problem), f"is for the model {model}; its --vehicle is one of the name {wanted}"
+            continue
+        kind = model.startswith("car"), model.startswith("unicycle2")
+        fields: Fields = {"bounds": _corners(problem.get("bounds"))}
+        fields["obstacles"] = [_box(each) for each in _listed(problem, "obstacles")]
+        size = 5 if model.startswith("unicycle2") else 3 + len(trailers_of(vehicle))
+        fields |= _start(_numbers(problem, "start", size), *kind)
+        yield _id(problem), fields | _goal(_numbers(problem, "goal", size), *kind, vehicle)
+
+
+def _in_yaml(file: Path) -> Fields:
+    fields = yaml_fields(file, "problem of dynobench", ("name", "environment", "robots"), _BRACKETS)
+    environment, robots = fields.get("environment"), fields.get("robots")
+    if not (isinstance(environment, Mapping) and isinstance(robots, list) and len(robots) == 1):
+        raise ValueError("has no environment with one robot; problems of several are not supported")
+    robot = robots[0]
+    if not isinstance(robot, Mapping):
+        raise ValueError("has a robot without type, start and goal; is it of dynobench?")
+    return {
+        "id": file.stem,
+        "model": robot.get("type"),
+        "start": robot.get("start"),
+        "goal": robot.get("goal"),
+        "bounds": [environment.get("min"), environment.get("max")],
+        "obstacles": environment.get("obstacles"),
+    }
+
+
+def _start(state: list[float], is_car: bool, is_second_order: bool) -> Fields:
+    x, y, heading, *rest = state
+    if is_car:  # the headings of the trailers
+        return {"start": [x, y, heading], "start_hitch": _hitches(heading, rest)}
+    if is_second_order:
+        return {"start": [x, y, heading], "start_speed": rest[0], "start_turn_rate": rest[1]}
+    return {"start": [x, y, heading]}
+
+
+def _goal(state: list[float], is_car: bool, is_second_order: bool, vehicle: Vehicle) -> Fields:
+    """What is asked at the goal: all of it together is within dynobench's distance.
+
+    That is 1 m of place and 0.5 of each heading, and for speeds 0.25 of each. Speeds of the first order are
+    controls and may be any. A turn rate at the goal cannot be asked for.
+    """
+    x, y, heading, *rest = state
+    fields: Fields = {"goal": [x, y, heading], "goal_tolerance": [0.4 * DISTANCE, 1.2 * DISTANCE]}
+    low, high = vehicle.scale * vehicle.min_speed, vehicle.scale * vehicle.max_speed
+    fields["goal_speed"] = [low, high]
+    if is_car:
+        angle = 0.4 * DISTANCE  # of the car, and as much again of the hitch
+        fields |= {"goal_tolerance": [0.4 * DISTANCE, angle], "goal_hitch": _hitches(heading, rest)}
+        fields["goal_hitch_tolerance"] = [angle] * len(rest)
+    if is_second_order:
+        fields["goal_tolerance"] = [0.4 * DISTANCE, 0.6 * DISTANCE]
+        fields["goal_speed"] = [max(rest[0] - 0.4 * DISTANCE, low), min(rest[0] + 0.4 * DISTANCE, high)]
+    return fields
+
+
+def _hitches(heading: float, trailers: list[float]) -> list[float]:
+    """Hitch angles of a car of this heading whose trailers have these."""
+    return [ahead - behind for ahead, behind in zip([heading, *trailers], trailers, strict=False)]
+
+
+def _box(obstacle: Mapping[str, Any]) -> list[list[float]]:
+    if obstacle.get("type", "box") != "box":
+        raise ValueError(f"has an obstacle of type {short(obstacle['type'])}; only boxes are supported")
+    (x, y), (length, width) = (_any_numbers(obstacle, name)[:2] for name in ("center", "size"))
+    return [[x + u * length, y + w * width] for u, w in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))]
+
+
+def _object(file: Path) -> Mapping[str, Any]:
+    fields = parse_json(read_text(file), str(file))
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"holds {short(fields)}, expected an object")
+    return fields
+
+
+def _listed(fields: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    values = fields.get(name)
+    if not isinstance(values, list) or not all(isinstance(each, Mapping) for each in values):
+        raise ValueError(f"has no list of {name}; is it of this format?")
+    return values
+
+
+def _id(fields: Mapping[str, Any]) -> str:
+    return text_of(fields.get("id"), "id")
+
+
+def _any_numbers(fields: Mapping[str, Any], name: str) -> list[float]:
+    values = fields.get(name)
+    if not isinstance(values, list) or len(values) < 2:
+        raise ValueError(f"{name} must be a list of numbers, got {short(values)}")
+    return [number_of(value, name) for value in values]
+
+
+def _numbers(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
+    values = _any_numbers(fields, name)
+    if len(values) != count:
+        raise ValueError(f"{name} must be a list of {count} numbers, got {short(values)}")
+    return values
+
+
+def _corners(bounds: object) -> list[float]:
+    """Least x and y, greatest x and y, of two corners."""
+    if not isinstance(bounds, list) or len(bounds) != 2:
+        raise ValueError(f"bounds must be two corners, got {short(bounds)}")
+    low, high = (_any_numbers({"bounds": corner}, "bounds")[:2] for corner in bounds)
+    return [*low, *high]
+
+
+Reader = Callable[[Path, Vehicle], Iterator[tuple[str, Fields | str]]]
+READERS: Final[dict[str, Reader]] = {
+    "tpcap": tpcap_cases,
+    "bench-mr": bench_mr_scenes,
+    "dynobench": dynobench_problems,
+}
