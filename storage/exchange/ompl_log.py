@@ -13,8 +13,12 @@ from storage.places.files import whole_folder
 def write_ompl_logs(folder: Path, classes: dict[str, Path], origin: Origin) -> None:
     """Make a ``folder`` of logs ``<class>.log``, whole or not at all.
 
-    The rows go through a database for Planner Arena, which sorts them by planner on the disk. ``classes``:
-    folders of attempts by class. ``origin``: of the run.
+    The rows go through a database for Planner Arena, which sorts them by planner on the disk.
+
+    Args:
+        folder: where the logs are written.
+        classes: folder of the attempts of each class.
+        origin: the run that made the attempts.
     """
     with whole_folder(folder) as temporary:
         sorted_rows = temporary / "attempts.db"

@@ -94,7 +94,13 @@ def opened(path: Path) -> Iterator[sqlite3.Connection]:
 def write_planner_arena(path: Path, classes: dict[str, Path], origin: Origin) -> None:
     """Make a database at ``path`` of the attempts below the folder of each class.
 
-    ``classes``: folders by class. ``origin``: of the run. Raises StorageError if a folder has no attempts.
+    Args:
+        path: file of the new database.
+        classes: folder of the attempts of each class.
+        origin: the run that made the attempts.
+
+    Raises:
+        StorageError: a folder has no attempts.
     """
     with opened(path) as database:
         database.executescript(_SCHEMA)

@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from planners.world.alignment import scaled
-from planners.world.arrays import Floats
+from planners.world.alignment import scaled, shifted
+from planners.world.arrays import Floats, Point
+from planners.world.checked_problem import FAR_M, FARTHEST_M
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
@@ -38,6 +39,7 @@ class PlanRecord:
     plan: Plan | None  # in the lengths of its problem, whereas files hold those of the world outside
     vehicle: Vehicle = CAR
     scale: float = 1.0  # metres of the world outside in one of the plan's
+    offset: Point = (0.0, 0.0)  # real metres: where the plan's origin lies in the frame of the file
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
@@ -46,7 +48,7 @@ def write_plan(path: Path, record: PlanRecord) -> None:
     Without a plan, states and controls are empty and lengths null. If the scale is not 1, positions, speeds
     and accelerations are those of a vehicle that is so much larger.
     """
-    plan = record.plan and scaled(record.plan, record.scale)
+    plan = record.plan and shifted(scaled(record.plan, record.scale), record.offset)
     scale = {} if record.scale == 1.0 else {"scale": record.scale}
     write_json(
         path,
@@ -90,7 +92,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
 def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
     scale = scale_for_vehicle(fields.get("scale"), vehicle)
     states, controls = _rows(fields["states"], "states"), _rows(fields["controls"], "controls")
-    plan = None
+    plan, offset = None, (0.0, 0.0)
     if len(states):
         names = state_names(vehicle)
         if (states.shape, controls.shape) != ((len(states), len(names)), (len(states) - 1, 2)):
@@ -102,7 +104,10 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
             raise ValueError(
                 f"has steps of dt {fields['dt']} s; those of {name_of(vehicle)} are {vehicle.dt} s"
             )
-        plan = scaled(Plan(states, controls, vehicle.dt), 1.0 / scale)
+        x, y = states[0, :2].tolist()
+        if FAR_M < max(abs(x), abs(y)) <= FARTHEST_M:
+            offset = float(round(x)), float(round(y))
+        plan = scaled(shifted(Plan(states, controls, vehicle.dt), (-offset[0], -offset[1])), 1.0 / scale)
         if not max(np.abs(plan.states).max(), np.abs(plan.controls).max(initial=0.0)) <= LARGEST_COORDINATE_M:
             raise ValueError(
                 f"has a state or control that is not a finite number up to {LARGEST_COORDINATE_M:.0f}; "
@@ -118,6 +123,7 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
         plan,
         vehicle,
         scale,
+        offset,
     )
 
 

@@ -51,8 +51,12 @@ def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
 def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
     """Where each problem in the file at ``path`` stands, and the problem or what is wrong with it.
 
-    ``vehicle``: that has to have room at the start. Raises StorageError if the file itself is missing,
-    unreadable or of an unknown format.
+    Args:
+        path: file in a format that its ending names.
+        vehicle: the vehicle that has to have room at the start.
+
+    Raises:
+        StorageError: the file itself is missing, unreadable or of an unknown format.
     """
     return _checked(path, raw_problems(path), vehicle)
 
@@ -109,7 +113,13 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
 def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
     """The problem that the contract's object ``fields`` describes, checked for a ``vehicle``.
 
-    ``default_id``: its id if it has none. Raises ValueError, which says what is wrong with it.
+    Args:
+        fields: the fields by name.
+        default_id: its id if it has none.
+        vehicle: the vehicle that drives.
+
+    Raises:
+        ValueError: the fields describe no possible problem; the message says why.
     """
     if not isinstance(fields, Mapping):
         raise ValueError(f"is {type(fields).__name__}, expected an object with {', '.join(_REQUIRED)}")
@@ -180,16 +190,16 @@ def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
 
 def fields_of(problem: Problem, vehicle: Vehicle = CAR) -> dict[str, Any]:
     """The contract's object that describes a ``problem`` for a ``vehicle``, as ``problem_of`` takes it."""
-    obstacles, scale = problem.obstacles, problem.scale
+    obstacles, scale, offset = problem.obstacles, problem.scale, problem.offset
     x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()
     fields: dict[str, Any] = {
         "id": problem.id,
         "class": problem.class_name,
-        "start": [scale * x, scale * y, heading],
+        "start": [scale * x + offset[0], scale * y + offset[1], heading],
         **question_fields(problem, vehicle),
-        "bounds": [scale * bound for bound in problem.bounds],
-        "obstacles": [(scale * piece).tolist() for piece in obstacles.pieces()],
+        "bounds": [scale * bound + by for bound, by in zip(problem.bounds, (*offset, *offset), strict=True)],
+        "obstacles": [(scale * piece + offset).tolist() for piece in obstacles.pieces()],
     }
     scaled = {} if scale == 1.0 else {"scale": scale}
     grouped = {} if all(size == 1 for size in groups) else {"groups": groups}

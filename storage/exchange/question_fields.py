@@ -86,7 +86,7 @@ def question_fields(problem: Problem, vehicle: Vehicle) -> dict[str, Any]:
     hitches = [value for name, value in named.items() if name.startswith("hitch")]
     if hitches:
         start["start_hitch"] = hitches + [0.0] * (len(state_names(vehicle)) - 5 - len(hitches))
-    place = [scale * coordinate for coordinate in problem.goal]
+    place = [scale * coordinate + by for coordinate, by in zip(problem.goal, problem.offset, strict=True)]
     speeds = [
         min(max(scale * speed, -ANY_SPEED), ANY_SPEED) for speed in (arrival.least_speed, arrival.most_speed)
     ]

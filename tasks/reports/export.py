@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+from storage.exchange.dynobench_plans import export_plan
 from storage.exchange.ompl_log import write_ompl_logs
 from storage.exchange.planner_arena import Origin, write_planner_arena
 from storage.places.data_folder import open_run
@@ -18,26 +19,31 @@ from tasks.reports.stage_times import stages_of
 from tasks.settings.checks import check_known, check_outputs
 from tasks.settings.errors import UsageError
 
-ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv"}
+ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv", "dynobench": ".yaml"}
 
 
 def export_run(folder: Path, form: str, out: Path) -> None:
-    """Write the attempts of a run, whole or not at all, in the format of another tool.
+    """Write the attempts of a run, or a plan, whole or not at all, in the format of another tool.
 
     Args:
-        folder: the run's folder.
-        form: ``ompl``, a folder of benchmark logs; ``planner-arena``, a SQLite database; or ``csv``.
+        folder: the run's folder, or for ``dynobench`` a plan's file.
+        form: ``ompl``, a folder of benchmark logs; ``planner-arena``, a SQLite database; ``csv``; or
+            ``dynobench``, a trajectory in YAML.
         out: where to write them.
 
     Raises:
         UsageError: another form, or a path that does not fit the form or lies in the run's folder.
-        StorageError: the folder is not a run, or has no attempts.
+        StorageError: the folder is not a run, or has no attempts; or the file is no plan.
     """
     check_known("format", [form], ENDINGS)
     if ENDINGS[form] and out.suffix != ENDINGS[form]:
         raise UsageError(f"{out} does not end in {ENDINGS[form]}.")
     if form == "ompl" and out.exists():
         raise UsageError(f"{out} is there already; give a new folder for the logs.")
+    if form == "dynobench":
+        check_outputs([folder], [out])
+        export_plan(folder, out)
+        return
     run = open_run(folder)
     check_outputs([folder], [out])
     folders = {path.parent for path in tables_below(run.results, "benchmark")}

@@ -40,6 +40,18 @@ def test_the_file_has_exactly_the_fields_of_the_contract(tmp_path: Path) -> None
     assert found["duration_s"] == pytest.approx(1.9)
 
 
+def test_a_plan_far_from_the_origin_comes_back_in_its_own_frame(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.json", replace(RECORD, offset=(4_484_378_811.0, -354_286_007.0)))
+    assert RECORD.plan is not None
+    written = np.array(json.loads((tmp_path / "plan.json").read_text())["states"])
+    near = written - [4_484_378_811.0, -354_286_007.0, 0.0, 0.0, 0.0]
+    assert np.allclose(near, RECORD.plan.states, rtol=0.0, atol=5e-7)
+    read = read_plan(tmp_path / "plan.json")
+    assert read.plan is not None
+    assert read.offset == tuple(np.round(written[0, :2]).tolist())
+    assert np.allclose(read.plan.states[:, :2] + read.offset, written[:, :2], rtol=0.0, atol=5e-7)
+
+
 def test_a_file_holds_the_lengths_outside_and_says_the_scale(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     write_plan(path, replace(RECORD, scale=0.5))
