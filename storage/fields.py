@@ -21,8 +21,12 @@ LONGEST: Final = 60  # characters of a value that a message quotes
 def parse_json(text: str | bytes, where: str) -> Any:
     """The value that a JSON ``text`` holds, which may be given as its bytes in UTF-8.
 
-    ``where``: it stands, for messages. Raises StorageError if it is not JSON in UTF-8, or if an object in it
-    has a field twice.
+    Args:
+        text: the text.
+        where: where the text stands, for messages.
+
+    Raises:
+        StorageError: it is not JSON in UTF-8, or an object in it has a field twice.
     """
 
     def unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -65,7 +69,9 @@ def _plain_object(text: str | bytes) -> dict[str, Any] | None:
 def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
     """Raise ValueError if one of ``fields`` is not among the supported ``names``, or occurs twice.
 
-    ``fields``: of an object, or the columns of a table. The message says which one, and what is supported.
+    Args:
+        fields: names of the fields of an object, or of the columns of a table.
+        names: those that are supported, which the message lists.
     """
     for field in fields:
         if field not in names:

@@ -20,8 +20,16 @@ _BROKEN: Final = (
 def yaml_fields(file: Path, what: str, names: Sequence[str], most_brackets: int) -> Mapping[str, Any]:
     """The fields of a YAML ``file``, which have to be among ``names``.
 
-    ``what``: the file is, for messages. ``most_brackets``: that it may open; the parser takes the square of
-    the number of unclosed ones. Raises ValueError, the end of a sentence, or StorageError.
+    Args:
+        file: the file to read.
+        what: what the file is, for messages.
+        names: names of the fields that it may have.
+        most_brackets: how many brackets it may open; the parser takes the square of the number of unclosed
+            ones.
+
+    Raises:
+        ValueError: the file has other fields or too many brackets; the message is the end of a sentence.
+        StorageError: the file cannot be read.
     """
     if file.is_file() and file.stat().st_size > LARGEST_YAML:
         raise ValueError(f"is larger than {LARGEST_YAML:,} bytes; is it the YAML of a {what}?")

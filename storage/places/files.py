@@ -25,10 +25,14 @@ REMOVAL_SECONDS: Final = 0.2
 def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
     """Yield a temporary name beside ``path``, and rename the file to ``path`` once it is on the disk.
 
-    ``note``: what it was made from; if ``path`` stands for an object (``mirror.py``), it is put into storage
-    first, with the note. ``mode``: permissions, from which the umask is taken.
+    Args:
+        path: the file to write.
+        note: what the file is made from; if ``path`` stands for an object (``mirror.py``), it is put into
+            storage first, with the note.
+        mode: permissions, from which the umask is taken.
 
-    Raises StorageError if it cannot be written (disk full, no permission); ``path`` is then as it was.
+    Raises:
+        StorageError: it cannot be written (disk full, no permission); ``path`` is then as it was.
     """
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -78,9 +82,13 @@ def whole_folder(path: Path) -> Iterator[Path]:
 def locked(path: Path, what: str) -> Iterator[None]:
     """Hold the lock file ``path`` for this process; a killed process loses it.
 
-    ``what``: is in use while another process holds it, for the message.
+    Args:
+        path: the lock file; it is made if it does not exist.
+        what: what is in use while another process holds the lock, for the message.
 
-    Raises InUseError if another process holds it, and says which; OSError if it cannot be opened.
+    Raises:
+        InUseError: another process holds it; the message says which.
+        OSError: it cannot be opened.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
@@ -120,7 +128,10 @@ def remove_folder(folder: Path) -> None:
 def write_json(path: Path, value: object, indent: int | None = 2) -> None:
     """Write a ``value`` as JSON to ``path``, whole or not at all; the same value gives the same bytes.
 
-    ``indent``: spaces a level; None writes one line, ten times as fast.
+    Args:
+        path: the file to write.
+        value: a value that JSON can hold.
+        indent: spaces a level; None writes one line, ten times as fast.
     """
     text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
     with whole_file(path) as temporary:

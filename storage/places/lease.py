@@ -31,10 +31,15 @@ _LOG = logging.getLogger(__name__)
 def leased(address: Address, owner: str, what: str) -> Iterator[None]:
     """Hold the lease object at ``address`` for as long as this lasts.
 
-    ``owner``: names what outlives a killed command. A command with the same owner takes the lease over at
-    once, and has to know by itself that the other is dead. ``what``: is held, for messages.
+    Args:
+        address: address of the lease object.
+        owner: names what outlives a killed command. A command with the same owner takes the lease over at
+            once, and has to know by itself that the other is dead.
+        what: what is held, for messages.
 
-    Raises InUseError if another command holds it, StorageError if storage does not answer.
+    Raises:
+        InUseError: another command holds it.
+        StorageError: storage does not answer.
     """
     body = json.dumps({"owner": owner, "holder": f"process {os.getpid()} on {platform.node()}"}).encode()
     tag = objects.put_if(address, body, None) or _taken_over(address, body, owner)

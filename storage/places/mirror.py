@@ -95,7 +95,10 @@ def looking_once() -> Iterator[None]:
 def publish(written: Path, path: Path, note: str = "") -> None:
     """Put the file ``written`` for ``path`` into object storage, if ``path`` stands for an object.
 
-    ``note``: what it was made from.
+    Args:
+        written: the file that holds the content.
+        path: the file in the data folder that stands for the object.
+        note: what the content was made from.
     """
     address = object_of(path)
     if address is not None:

@@ -80,7 +80,10 @@ def download(address: Address, path: Path) -> bool:
 def upload(path: Path, address: Address, note: str = "") -> str:
     """Put the file at ``path`` at an ``address``, where it appears whole or not at all, and return its tag.
 
-    ``note``: what it was made from.
+    Args:
+        path: the file that holds the content.
+        address: address of the object.
+        note: what the content was made from.
     """
     with _one_line("written", address):
         extra = {"Metadata": {NOTE: note}}
@@ -92,9 +95,13 @@ def upload(path: Path, address: Address, note: str = "") -> str:
 def put_if(address: Address, body: bytes, etag: str | None) -> str | None:
     """Put an object at an ``address`` on a condition.
 
-    ``body``: its content. ``etag``: the tag of the object that it may replace; None if there must be none.
+    Args:
+        address: address of the object.
+        body: its new content.
+        etag: the tag of the object that it may replace; None if there must be none.
 
-    Returns its tag; None if the condition does not hold.
+    Returns:
+        its tag; None if the condition does not hold.
     """
     condition = {"IfNoneMatch": "*"} if etag is None else {"IfMatch": etag}
     with _one_line("written", address):

@@ -39,10 +39,16 @@ def attempt_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
 def read_attempts(path: Path, without: Sequence[str] = ()) -> pd.DataFrame:
     """All attempts of a file, or of every file below a folder, in the order of their names.
 
-    ``path``: of the file or folder. ``without``: columns to leave out; ``recalled``, which holds one int32
-    array a row, takes most of the time.
+    Args:
+        path: the file or folder.
+        without: columns to leave out; ``recalled``, which holds one int32 array a row, takes most of the
+            time.
 
-    Returns the rows; missing texts are None, missing numbers NaN. Raises StorageError if there are none.
+    Returns:
+        the rows; missing texts are None, missing numbers NaN.
+
+    Raises:
+        StorageError: there are none.
     """
     frame: pd.DataFrame = pa.concat_tables(list(_tables(path, without))).to_pandas()
     pa.default_memory_pool().release_unused()  # the files were decoded there: as much again

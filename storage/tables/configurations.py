@@ -7,10 +7,10 @@ from typing import Final, NamedTuple
 import pandas as pd
 
 ASSISTS: Final = (
-    "none", "closed", "open", "published-open", "repair", "fresh",
-    "random-closed", "random-open", "random-published-open", "random-repair",
+    "none", "closed", "open", "published-open", "repair", "join", "fresh",
+    "random-closed", "random-open", "random-published-open", "random-repair", "random-join",
 )  # fmt: skip
-RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "random")
+RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "sub-plans", "random")
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
 WITHOUT_MEMORY: Final = ("none", "fresh")

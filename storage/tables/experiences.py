@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -25,6 +25,15 @@ _CONTROL = 2
 _VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
 
 
+class SearchedExperience(NamedTuple):
+    """An experience, and the search that found its plan."""
+
+    experience: Experience
+    planner: str
+    seed: int
+    planning_seconds: float
+
+
 def write_experiences(
     path: Path,
     experiences: Sequence[Experience],
@@ -37,8 +46,14 @@ def write_experiences(
 ) -> None:
     """Write ``experiences`` of a ``vehicle``, one a row.
 
-    ``planners``, ``seeds``, ``planning_seconds``: of the searches that found them, one a row. ``key``: what
-    they were made from.
+    Args:
+        path: the file to write.
+        experiences: ``[n]``, all of the vehicle.
+        planners: ``[n]``, the planner that found each.
+        seeds: ``[n]``, the seed of each search.
+        planning_seconds: ``[n]``, what each search took.
+        key: what the experiences were made from.
+        vehicle: the vehicle that drives them.
     """
     plans = [experience.plan for experience in experiences]
     columns = {
@@ -50,6 +65,19 @@ def write_experiences(
     }
     table = pa.table(columns, schema=EXPERIENCES.with_metadata(_metadata(vehicle)))
     write_table(path, table, key)
+
+
+def write_searched(path: Path, searched: Sequence[SearchedExperience], key: str, vehicle: Vehicle) -> None:
+    """Like ``write_experiences``."""
+    write_experiences(
+        path,
+        [each.experience for each in searched],
+        planners=[each.planner for each in searched],
+        seeds=[each.seed for each in searched],
+        planning_seconds=[each.planning_seconds for each in searched],
+        key=key,
+        vehicle=vehicle,
+    )
 
 
 def read_experiences(path: Path, vehicle: Vehicle = CAR, count: int | None = None) -> list[Experience]:
@@ -87,6 +115,19 @@ def _plan(problem: Problem, states: Array, controls: Array, dt: float, vehicle: 
     return plan
 
 
+def read_searched(path: Path, rows: Sequence[int], vehicle: Vehicle) -> list[SearchedExperience]:
+    """Some ``rows`` of the file at ``path``, with their searches; raises as ``read_experiences`` does."""
+    table = read_experience_table(path, vehicle).take(pa.array(rows, pa.int64()))
+    with sound(path):
+        return searched_of(table, vehicle)
+
+
+def searched_of(table: pa.Table, vehicle: Vehicle) -> list[SearchedExperience]:
+    """The experiences in a ``table`` with their searches; raises as ``experiences_of`` does."""
+    searches = [table[name].to_pylist() for name in ("planner", "seed", "planning_seconds")]
+    return [*map(SearchedExperience, experiences_of(table, vehicle), *searches)]
+
+
 def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
     """Like ``read_experiences``, as a table whose rows are not checked."""
     table = read_table(path, EXPERIENCES)
@@ -97,8 +138,14 @@ def read_experience_table(path: Path, vehicle: Vehicle) -> pa.Table:
 def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], key: str = "") -> None:
     """Write some ``rows`` of the ``shards``, numbered through all of them, as one file at ``path``.
 
-    ``key``: what they were made from. Raises StorageError if there are no shards, fewer rows in them, or
-    plans of several vehicles.
+    Args:
+        shards: files of experiences, in order.
+        path: the file to write.
+        rows: rows to take, counted from 0 through all shards.
+        key: what the experiences were made from.
+
+    Raises:
+        StorageError: there are no shards, fewer rows in them, or plans of several vehicles.
     """
     tables = [read_table(shard, EXPERIENCES) for shard in shards]
     if not tables:
@@ -108,7 +155,7 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
             f"{path} would hold plans of several vehicles; run collect with a new data folder."
         )
     merged = pa.concat_tables(tables)
-    if max(rows, default=0) >= merged.num_rows:
+    if max(rows, default=-1) >= merged.num_rows:
         raise StorageError(f"{path} would need more than the {merged.num_rows} rows there are; run collect.")
     write_table(path, merged.take(pa.array(rows, pa.int64())), key)
 

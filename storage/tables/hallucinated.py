@@ -47,9 +47,15 @@ def write_hallucinated(
 ) -> None:
     """Write n ``problems`` that were made around ``plans`` stored plans.
 
-    ``plan_index [n]``: the plan that a problem was made for; -1: for none. ``methods``: how each was made.
-    ``grids [n, 512]``, ``labels [n, ceil(plans / 8)]``: packed bits, as in ``Labelled``. ``key``: what they
-    were made from.
+    Args:
+        path: the file to write.
+        problems: ``[n]``.
+        plan_index: ``[n]``, the plan that a problem was made for; -1 for none.
+        methods: ``[n]``, how each was made.
+        grids: ``[n, 512]``, packed bits, as in ``Labelled``.
+        labels: ``[n, ceil(plans / 8)]``, packed bits, as in ``Labelled``.
+        plans: number of stored plans.
+        key: what the problems were made from.
     """
     schema = hallucinated(plans)
     widths = (schema.field("grid").type.byte_width, schema.field("labels").type.byte_width)

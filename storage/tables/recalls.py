@@ -20,7 +20,15 @@ def write_recalls(path: Path, rows: Sequence[dict[str, Any]], *, plans: int, key
     """Write ``rows`` of ``schemas.recalls`` of a memory of so many ``plans``.
 
     In a row, ``order`` holds the numbers of the first plans, best first, and ``free`` one truth value a plan.
-    ``key``: what they were made from. Raises KeyError if a row lacks a field.
+
+    Args:
+        path: the file to write.
+        rows: values by column.
+        plans: number of plans in the memory.
+        key: what the rows were made from.
+
+    Raises:
+        KeyError: a row lacks a field.
     """
     schema = recalls(plans)
     columns = {name: [row[name] for row in rows] for name in schema.names}

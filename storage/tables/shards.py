@@ -24,9 +24,13 @@ SHARD_KEY: Final = b"key"
 def write_table(path: Path, table: pa.Table, key: str = "") -> None:
     """Write a ``table`` to ``path``, whole or not at all; the same table and key give the same bytes.
 
-    ``key``: says what the rows were made from, so that a finished shard need not be made again.
+    Args:
+        path: the file to write.
+        table: of one of the schemas of ``schemas.py``.
+        key: what the rows were made from, so that a finished shard need not be made again.
 
-    Raises StorageError if it cannot be written; what was at ``path`` is then still there.
+    Raises:
+        StorageError: it cannot be written; what was at ``path`` is then still there.
     """
     write_tables(path, [table], table.schema, key)
 
@@ -34,7 +38,14 @@ def write_table(path: Path, table: pa.Table, key: str = "") -> None:
 def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key: str = "") -> None:
     """Write ``tables`` of one ``schema`` into one file, with one of them in memory at a time.
 
-    ``path``, ``key``: as in ``write_table``. Raises StorageError as ``write_table`` does.
+    Args:
+        path: the file to write.
+        tables: tables of the schema, written one after the other.
+        schema: one of ``schemas.py``.
+        key: as in ``write_table``.
+
+    Raises:
+        StorageError: as for ``write_table``.
     """
     described = schema.with_metadata({**(schema.metadata or {}), SHARD_KEY: key.encode()})
     with (
@@ -48,10 +59,14 @@ def write_tables(path: Path, tables: Iterable[pa.Table], schema: pa.Schema, key:
 def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = None) -> pa.Table:
     """The rows of the file at ``path``, which was written with a ``schema`` of ``schemas.py``.
 
-    ``columns``: those to read; None for all. Columns that a file of an earlier version lacks are left out.
+    Args:
+        path: the file to read.
+        schema: the schema that it was written with.
+        columns: those to read; None for all. Columns that a file of an earlier version lacks are left out.
 
-    Raises StorageError if the file is missing, damaged, of another kind or version, or has a column of
-    another type.
+    Raises:
+        StorageError: the file is missing, damaged, of another kind or version, or has a column of another
+            type.
     """
     wanted = schema.metadata[SCHEMA_KEY].decode()
     name = metadata_of(path).get(SCHEMA_KEY, b"").decode(errors="replace") or "an unknown one"
@@ -97,6 +112,27 @@ def sound(path: Path) -> Iterator[None]:
         ) from None
 
 
+def row_count(path: Path) -> int:
+    """The number of rows in the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
+    with sound(path):
+        try:
+            return int(pq.read_metadata(fetch(path)).num_rows)
+        except FileNotFoundError:
+            raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
+
+
+def columns_of(path: Path) -> dict[str, str]:
+    """The columns of the Parquet file at ``path`` with their Arrow types.
+
+    Raises StorageError if it is missing or damaged.
+    """
+    with sound(path):
+        try:
+            return {field.name: str(field.type) for field in pq.read_schema(fetch(path))}
+        except FileNotFoundError:
+            raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
+
+
 def metadata_of(path: Path) -> dict[bytes, bytes]:
     """The metadata of the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
     with sound(path):
@@ -104,12 +140,6 @@ def metadata_of(path: Path) -> dict[bytes, bytes]:
             return dict(pq.read_schema(fetch(path)).metadata or {})
         except FileNotFoundError:
             raise StorageError(f"{path} does not exist; run the stage that writes it.") from None
-
-
-def columns_of(path: Path) -> list[str]:
-    """The columns of the Parquet file at ``path``. Raises StorageError if it is missing or damaged."""
-    with sound(path):
-        return list(pq.read_schema(fetch(path)).names)
 
 
 def shard_is_done(path: Path, key: str) -> bool:
@@ -126,7 +156,13 @@ def shard_is_done(path: Path, key: str) -> bool:
 def table_of(rows: Sequence[dict[str, Any]], schema: pa.Schema, what: str) -> pa.Table:
     """``rows`` as a table of a ``schema``; fields that the schema marks as optional may be missing.
 
-    ``what``: a row is, for messages. Raises StorageError if a row's fields or types do not fit.
+    Args:
+        rows: values by column.
+        schema: one of ``schemas.py``.
+        what: what a row is, for messages.
+
+    Raises:
+        StorageError: a row's fields or types do not fit.
     """
     names = set(schema.names)
     required = {field.name for field in schema if not (field.metadata or {}).get(b"optional")}

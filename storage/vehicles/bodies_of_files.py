@@ -28,8 +28,14 @@ class Box(NamedTuple):
 def outline_of(polygons: object, where: str) -> tuple[tuple[Corners, ...], Box]:
     """The convex polygons of a body, counter-clockwise, and the box around them.
 
-    There are no polygons if there is just one and it is the box itself. ``where``: the field, for messages.
-    Raises ValueError, the end of a sentence, if a polygon is none or not convex.
+    There are no polygons if there is just one and it is the box itself.
+
+    Args:
+        polygons: what a file holds of them: a list of lists of x, y in metres.
+        where: name of the field, for messages.
+
+    Raises:
+        ValueError: the end of a sentence, if a polygon is malformed or not convex.
     """
     if not isinstance(polygons, list) or not 1 <= len(polygons) <= MOST_POLYGONS:
         raise ValueError(

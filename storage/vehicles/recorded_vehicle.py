@@ -29,8 +29,11 @@ def record_of(vehicle: Vehicle) -> str | dict[str, Any]:
 def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
     """Raise StorageError unless ``made_for``, as ``where`` records it, is the vehicle ``wanted``.
 
-    ``made_for``: a definition, the name of a built-in vehicle, or what earlier versions recorded of one. The
-    message names the first difference. The name of a vehicle that has a file of its own is none.
+    Args:
+        where: the file or folder that records the vehicle.
+        made_for: a definition, the name of a built-in vehicle, or what earlier versions recorded of one; the
+            name of a vehicle that has a file of its own is none of these.
+        wanted: the vehicle that is wanted.
     """
     recorded = vehicle_recorded(made_for)
     if recorded is None:

@@ -28,7 +28,7 @@ def read_vehicle(file: Path) -> Vehicle:
     """
     if not file.is_file():
         raise StorageError(
-            f"{file} is not there; give the file of a vehicle, or one of {', '.join(VEHICLES)}."
+            f"{file} does not exist; give a vehicle's file, or one of the names {', '.join(VEHICLES)}."
         )
     try:
         vehicle = vehicle_of(yaml_fields(file, "vehicle", FIELDS, _MOST_BRACKETS))

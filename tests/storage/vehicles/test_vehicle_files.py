@@ -160,7 +160,7 @@ def test_another_vehicle_cannot_have_the_name_of_a_built_in_one(tmp_path: Path) 
 def test_an_unknown_vehicle_is_refused_with_the_nearest() -> None:
     with pytest.raises(StorageError, match=r"Unknown vehicle 'cat' \(nearest is 'car'\)"):
         text_of_vehicle("cat")
-    with pytest.raises(StorageError, match=r"none\.yaml is not there"):
+    with pytest.raises(StorageError, match=r"none\.yaml does not exist"):
         text_of_vehicle("none.yaml")
 
 
