@@ -30,14 +30,15 @@ from tasks.registry.champion_registry import (
     REFUSED,
     Registry,
     Version,
-    registered_name,
 )
 from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import number_of
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.judge import judged
 from tasks.tracking.artifacts import publish_judgements
-from tasks.tracking.logbook import log_judgement, tracker
+from tasks.tracking.logbook import log_judgement
+from tasks.tracking.mlflow_runs import tracker
+from tasks.tracking.model_names import registered_name
 
 _LOG = logging.getLogger(__name__)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from dashboards.cells import CellTable
+from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.mirror import fetch, local_place
@@ -16,6 +17,7 @@ from tasks.inputs.champion_run import champion_run
 from tasks.inputs.taught_experiences import taught_experiences
 from tasks.registry.champion_registry import Registry
 from tasks.settings.run_settings import COMBINED, RunSettings
+from tasks.stages.collect_gained import candidates_of_gained
 from tasks.stages.curate import chosen
 from tasks.stages.hallucinate import plans_at_once
 
@@ -72,7 +74,8 @@ def _changes(
 ) -> tuple[int, list[int], int]:
     """What a retraining would make anew for one class.
 
-    Curation is done as in a retraining. If the champion's run is no longer here, all plans are new.
+    Candidates are made of what was learned, and chosen among, as in a retraining. If the champion's run is no
+    longer here, all plans are new.
 
     Returns the number of plans that the champion's run does not have, the numbers of their shards, and the
     number of all shards.
@@ -89,7 +92,13 @@ def _changes(
         drawn = [experience for shard in shards for experience in read_experiences(shard, vehicle)]
     except StorageError:
         return settings.taught, list(range(shard_count)), shard_count
-    candidates = [*drawn, *pending.gained[name]]
-    curated = chosen(drawn, pending.gained[name], settings)[: settings.taught]
+    workspace = Workspace()
+    gained = [
+        candidate.experience
+        for each in pending.gained[name]
+        for candidate in candidates_of_gained(each, settings, vehicle, workspace)
+    ]
+    candidates = [*drawn, *gained]
+    curated = chosen(drawn, gained, settings)[: settings.taught]
     new = [index for index, row in enumerate(curated) if candidates[row].problem.id not in taught_ids]
     return len(new), sorted({index // size for index in new}), shard_count

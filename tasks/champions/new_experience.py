@@ -8,18 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from planners.memory.plans.experience import Experience
 from storage.archives.memories import load_memory, save_memory
 from storage.places.data_folder import DataFolder
 from storage.places.scratch import scratch_folder
+from storage.tables.experiences import SearchedExperience
 from storage.tables.gained_experiences import read_gained, snapshot_ids
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import run_folder
 from tasks.inputs.gained_on_the_job import with_gained
-from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version, registered_name
+from tasks.registry.champion_registry import AWAITING, FIRST, PROMOTED, Registry, Version
 from tasks.registry.model_uris import memory_digest
 from tasks.settings.retraining_settings import Champion, Retraining
 from tasks.settings.run_settings import COMBINED, RunSettings, world_class
+from tasks.tracking.model_names import registered_name
 
 WARM_SHARE: Final = 0.5  # of the epochs: an encoder that starts from trained weights needs fewer
 
@@ -41,10 +42,10 @@ class PendingRetraining(NamedTuple):
     without_champion: Sequence[str]  # names of these memories
     champions: Mapping[str, Version]  # by memory
     gained: Mapping[
-        str, list[Experience]
+        str, list[SearchedExperience]
     ]  # all experiences gained on the job, for each class with a champion
     fresh: Mapping[
-        str, list[Experience]
+        str, list[SearchedExperience]
     ]  # those that no judged version has seen; only classes that have some
     last_judged: Mapping[str, Version]  # by memory: the newest judged version, which may be the champion
 
@@ -74,7 +75,7 @@ def pending_retraining(folder: DataFolder, settings: RunSettings, registry: Regi
     gained_folder = folder.gained(settings.vehicle_label)
     all_gained = read_gained(gained_folder, said_vehicle(settings.vehicle))
     gained = {
-        name: [experience for experience in all_gained if experience.problem.class_name == name]
+        name: [each for each in all_gained if each.experience.problem.class_name == name]
         for name in settings.class_names
         if name in champions
     }
@@ -194,10 +195,12 @@ def _is_judged(version: Version, champion: Version | None) -> bool:
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 
 
-def _fresh(folder: Path, gained: Sequence[Experience], snapshots: set[str]) -> list[Experience]:
+def _fresh(
+    folder: Path, gained: Sequence[SearchedExperience], snapshots: set[str]
+) -> list[SearchedExperience]:
     """The experiences that are in none of the named snapshots."""
     seen_ids = {identity for name in snapshots - {""} for identity in snapshot_ids(folder, name)}
-    return [experience for experience in gained if experience.problem.id not in seen_ids]
+    return [each for each in gained if each.experience.problem.id not in seen_ids]
 
 
 def _summary(memory: str, champion: Version, pending: PendingRetraining) -> str:

@@ -11,13 +11,13 @@ from storage.places.mirror import fetch, local_place
 from tasks.registry.champion_registry import (
     AWAITING,
     CHALLENGER,
-    PREFIX,
     PROMOTED,
     ROLLED_BACK,
     Registry,
     Version,
 )
 from tasks.settings.errors import RunError
+from tasks.tracking.model_names import PREFIX
 
 
 class ChampionChange(NamedTuple):

@@ -69,7 +69,7 @@ class Worlds:
     def _worlds(self, purpose: Purpose) -> tuple[Problem, ...]:
         path = fetch(self.run.worlds(self.class_name, PARTS[purpose]))
         if not path.exists():
-            raise RunError(f"{path} is not there; run collect with these worlds first.")
+            raise RunError(f"{path} does not exist; run collect with these worlds first.")
         return _problems(path, path.stat().st_mtime_ns)
 
 

@@ -8,15 +8,13 @@ from typing import Final
 
 from planners.memory.curation import curate
 from planners.memory.plans.experience import Experience
-from storage.places.data_folder import open_data_folder
 from storage.tables.experiences import merge_experiences, read_experiences
-from storage.tables.gained_experiences import extract_class, snapshot_path
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
-from tasks.inputs.problem_sources import held_back, source_of
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.collect import COLLECT
+from tasks.stages.collect_gained import COLLECT_GAINED
 
 
 def curate_chunk(chunk: Chunk) -> None:
@@ -24,8 +22,9 @@ def curate_chunk(chunk: Chunk) -> None:
     run, settings, name = chunk.run, chunk.settings, chunk.class_name
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
     drawn = [each for shard in shards for each in read_experiences(shard, chunk.vehicle)]
-    gained = _gained_of(chunk)
-    shards += [run.shard("learned", name, 0)] if gained else []
+    gained_shards = [*map(COLLECT_GAINED.output, COLLECT_GAINED.chunks_of(chunk.data, settings, name))]
+    gained = [each for shard in gained_shards for each in read_experiences(shard, chunk.vehicle)]
+    shards += gained_shards
     merge_experiences(shards, chunk.shard("curated"), chosen(drawn, gained, settings), chunk.key)
 
 
@@ -34,7 +33,7 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
 
     Args:
         drawn: experiences of problems that the run drew itself.
-        gained: experiences that were gained on the job.
+        gained: candidates of problems that were gained on the job.
         settings: those of the run.
 
     Returns:
@@ -53,23 +52,6 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
     return [rows[i] for i in kept]
 
 
-def _gained_of(chunk: Chunk) -> list[Experience]:
-    """What was gained of the class on the job, but for problems by which the run is measured."""
-    settings, name = chunk.settings, chunk.class_name
-    if not settings.learned:
-        return []
-    sources = [each(chunk.data, settings, name) for each in (source_of, held_back)]
-    tested = {
-        source.problem("test", i).id
-        for source in sources
-        for i in range(source.count("test", settings.test_problems))
-    }
-    snapshot = snapshot_path(open_data_folder(chunk.data).gained(settings.vehicle_label), settings.learned)
-    shard = chunk.shard("learned")
-    extract_class(snapshot, name, tested, shard, chunk.key)
-    return read_experiences(shard, chunk.vehicle)
-
-
 def _by_problem(experiences: Sequence[Experience], first: int) -> list[list[int]]:
     """The positions of the experiences, counted from ``first``, those of one problem together."""
     rows: dict[str, list[int]] = {}
@@ -86,8 +68,9 @@ def _alternating(ours: Sequence[list[int]], theirs: Sequence[list[int]]) -> list
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     candidates = COLLECT.keys(data, settings, name)
-    inputs = [settings.wanted, settings.experiences, settings.learned, *candidates]
-    return Cut(len(candidates), len(candidates), inputs)
+    gained = COLLECT_GAINED.keys(data, settings, name)
+    inputs = [settings.wanted, settings.experiences, *candidates, *gained]
+    return Cut(len(candidates), max(1, len(candidates)), inputs)
 
 
 CURATE: Final = Stage(name="curate", do=curate_chunk, cut=_cut, output=lambda chunk: chunk.shard("curated"))

@@ -26,11 +26,11 @@ from storage.tables.hallucinated import (
     read_methods,
     write_hallucinated,
 )
-from tasks.fan_out.chunk import Chunk, Cut
+from tasks.fan_out.chunk import Chunk, Cut, run_folder
 from tasks.fan_out.stage import Stage
 from tasks.inputs.champion_run import champion_run_of
 from tasks.inputs.problem_sources import Source, source_key, source_of
-from tasks.inputs.taught_experiences import taught_experiences
+from tasks.inputs.taught_experiences import taught_counts, taught_experiences
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.keep_experiences import experiences_key
 
@@ -199,7 +199,8 @@ def plans_at_once(settings: RunSettings) -> int:
 
 def _cut(data: str, settings: RunSettings, name: str) -> Cut:
     inputs = [*_inputs(settings, name), settings.as_published, experiences_key(data, settings, name)]
-    return Cut(settings.taught, plans_at_once(settings), inputs)
+    (taught,) = taught_counts(run_folder(data, settings), settings, name)
+    return Cut(taught, plans_at_once(settings), inputs)
 
 
 HALLUCINATE: Final = Stage(

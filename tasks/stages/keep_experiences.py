@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from storage.tables.experiences import merge_experiences
-from storage.tables.shards import metadata_of
+from storage.tables.shards import metadata_of, row_count
 from tasks.fan_out.chunk import Chunk, Cut, run_folder
 from tasks.fan_out.stage import Stage
 from tasks.settings.run_settings import COMBINED, RunSettings
@@ -16,7 +16,8 @@ def keep_chunk(chunk: Chunk) -> None:
     """Write the experiences of a class into one file."""
     data, settings, name = chunk.data, chunk.settings, chunk.class_name
     shards = [CURATE.output(each) for each in CURATE.chunks_of(data, settings, name)]
-    merge_experiences(shards, chunk.run.experiences(name), range(settings.experiences), chunk.key)
+    kept = min(settings.experiences, sum(map(row_count, shards)))
+    merge_experiences(shards, chunk.run.experiences(name), range(kept), chunk.key)
 
 
 KEEP: Final = Stage(
@@ -31,7 +32,7 @@ def combine_chunk(chunk: Chunk) -> None:
     """Write the experiences of all classes into one file, for the combined memory."""
     run, settings = chunk.run, chunk.settings
     files = [run.experiences(name) for name in settings.class_names]
-    merge_experiences(files, run.experiences(COMBINED), range(settings.experiences * len(files)), chunk.key)
+    merge_experiences(files, run.experiences(COMBINED), range(sum(map(row_count, files))), chunk.key)
 
 
 COMBINE: Final = Stage(

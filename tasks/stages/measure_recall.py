@@ -25,6 +25,7 @@ from storage.tables.recalls import write_recalls
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import source_key, source_of
+from tasks.inputs.taught_experiences import taught_counts
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY, memories_by_seed
 from tasks.stages.relabel import problems_of_memory
@@ -90,7 +91,8 @@ def _held_out(chunk: Chunk) -> Iterator[LabelledProblem]:
     problems = problems_of_memory(chunk.data, settings, name)
     held_out = load_encoder(chunk.run.model(name), chunk.vehicle).held_out
     of_plans = held_out[problems.plan_index[held_out] >= 0]
-    class_numbers = problems.plan_index[of_plans] // settings.taught  # plans are stored class by class
+    ends = np.cumsum(taught_counts(chunk.run, settings, name))  # plans are stored class by class
+    class_numbers = np.searchsorted(ends, problems.plan_index[of_plans], side="right")
     for number, class_name in enumerate(settings.classes_of(name)):
         of_class = of_plans[class_numbers == number]
         every = max(1, -(-len(of_class) // HELD_OUT_PROBLEMS))  # they are sorted by plan

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from planners.world.alignment import to_canonical
+from planners.world.problem import Problem
 from storage.tables.imported_problems import write_imported
 from storage.worlds.importing import ImportSettings, import_part
-from storage.worlds.sources import source_at
+from storage.worlds.sources import Part, source_at
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage, is_marked, mark_done
 from tasks.inputs.problem_sources import PARTS, source_key
+from tasks.inputs.skipped_worlds import summed_up
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import world_class
 
@@ -26,15 +28,21 @@ _LOG = logging.getLogger(__name__)
 class WorldsRead(NamedTuple):
     """What came of a folder of worlds or a map."""
 
-    skipped: list[str]  # worlds that were left out, and why
+    skipped: list[tuple[str, str]]  # worlds that were left out, and why
+    unusable: str | None = None  # why the class has no problems, if it has none
 
 
 def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
-    """Read the worlds of a class, or cut its map into problems; RunError if none of them can be used."""
+    """Read the worlds of a class, or cut its map into problems.
+
+    If a part has no usable problem the class has none. Raises RunError for that if the settings are strict.
+    """
     settings, run = chunk.settings, chunk.run
     source = source_at(next(Path(path) for path in settings.worlds if world_class(path) == chunk.class_name))
     counts = {"collect": CUT_FROM_MAP * settings.wanted, "test": settings.test_problems}
-    skipped: list[str] = []
+    skipped: list[tuple[str, str]] = []
+    unusable: str | None = None
+    problems: dict[Part, list[Problem]] = {}
     whole = (chunk.vehicle, settings.strict)
     for purpose, part in PARTS.items():
         count = counts[purpose] if source.is_map else None
@@ -42,12 +50,15 @@ def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
             source, part, ImportSettings(*whole, count, settings.seed, chunk.vehicle.scale)
         )
         if not imported.problems:
-            raise RunError(f"{source.path} holds no usable problem of part {part} ({imported.explained()}).")
-        problems = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
-        write_imported(run.worlds(chunk.class_name, part), problems)
-        skipped += [f"{path}: {reason}" for path, reason in imported.skipped]
+            unusable = f"{source.path} holds no usable problem of part {part} ({imported.explained()})."
+            if settings.strict:
+                raise RunError(unusable)
+        problems[part] = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]
+        skipped += imported.skipped
+    for part in PARTS.values():
+        write_imported(run.worlds(chunk.class_name, part), [] if unusable else problems[part])
     mark_done(run.worlds_folder(chunk.class_name), chunk.key)
-    return WorldsRead(skipped)
+    return WorldsRead(skipped, unusable)
 
 
 READ_WORLDS: Final = Stage(
@@ -62,8 +73,11 @@ READ_WORLDS: Final = Stage(
 
 
 def log_skipped(results: Iterable[WorldsRead]) -> None:
-    """Warn of the worlds that were left out, each with the reason."""
-    skipped = [line for result in results for line in result.skipped]
+    """Warn of the worlds that were left out, summed up by reason, and of classes without any."""
+    results = list(results)
+    skipped = [(world, reason) for result in results for world, reason in result.skipped]
     if skipped:
-        heading = f"{len(skipped)} worlds skipped (use --strict to stop instead):"
-        _LOG.warning("\n  ".join([heading, *skipped]))
+        _LOG.warning(summed_up(skipped))
+    for result in results:
+        if result.unusable:
+            _LOG.warning(result.unusable)

@@ -10,7 +10,7 @@ from planners.memory.plans.sweeps import sweep_plans
 from storage.tables.hallucinated import Labelled, read_hallucinated_problems, read_labelled, read_methods
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
-from tasks.inputs.taught_experiences import taught_experiences
+from tasks.inputs.taught_experiences import taught_counts, taught_experiences
 from tasks.settings.run_settings import COMBINED, RunSettings
 from tasks.stages.hallucinate import HALLUCINATE, Hallucinated, write_labelled
 from tasks.stages.keep_experiences import experiences_key
@@ -21,7 +21,8 @@ def relabel_chunk(chunk: Chunk) -> None:
     settings = chunk.settings
     origin = HALLUCINATE.chunks(chunk.data, settings)[chunk.index]
     shard = origin.shard("hallucinated")
-    offset = settings.class_names.index(origin.class_name) * settings.taught
+    before = settings.class_names.index(origin.class_name)
+    offset = sum(taught_counts(chunk.run, settings, COMBINED)[:before])
     made_for = read_labelled([shard]).plan_index
     experiences = taught_experiences(chunk.run, settings, COMBINED)
     sweeps = sweep_plans([experience.plan for experience in experiences], chunk.vehicle)

@@ -13,6 +13,7 @@ from tasks.stages import build_memory
 from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.collect import COLLECT
+from tasks.stages.collect_gained import COLLECT_GAINED
 from tasks.stages.curate import CURATE
 from tasks.stages.hallucinate import HALLUCINATE
 from tasks.stages.keep_experiences import COMBINE, KEEP
@@ -23,10 +24,10 @@ from tests.tasks.in_process import collect, run_stage
 
 OPTIONS: Final = [
     "--preset", "paper", "--classes", "random", "trap", "--seed", "3", "--experiences", "4",
-    "--candidates", "20", "--problems-per-experience", "10", "--test-problems", "6", "--epochs", "2",
+    "--candidates", "12", "--problems-per-experience", "10", "--test-problems", "6", "--epochs", "2",
     "--training-seeds", "2", "--continual", "none",
 ]  # fmt: skip
-COLLECTING: Final[tuple[Stage[Any], ...]] = (COLLECT, CURATE, KEEP, COMBINE)
+COLLECTING: Final[tuple[Stage[Any], ...]] = (COLLECT, COLLECT_GAINED, CURATE, KEEP, COMBINE)
 LATER: Final[tuple[Stage[Any], ...]] = (HALLUCINATE, RELABEL, TRAIN, BUILD_MEMORY, MEASURE_RECALL, BENCHMARK)
 
 

@@ -18,13 +18,14 @@ from tasks.champions import conclude as task
 from tasks.champions.dry_run import dry_run
 from tasks.champions.promote import promote_awaiting, roll_back
 from tasks.fan_out.chunk import run_folder
-from tasks.registry.champion_registry import CHALLENGER, Registry, Version, registered_name
+from tasks.registry.champion_registry import CHALLENGER, Registry, Version
 from tasks.registry.model_uris import load_from
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import RunSettings
 from tasks.stages import hallucinate, train
 from tasks.stages.hallucinate import HALLUCINATE
+from tasks.tracking.model_names import registered_name
 from tests.tasks.champions.retrained import CLASS, SETTINGS, learn, retrain
 from tests.tasks.in_process import run_stage
 

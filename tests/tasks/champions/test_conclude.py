@@ -22,7 +22,7 @@ from tasks.reports import report
 from tasks.settings.run_settings import RunSettings
 from tasks.stages import build_memory, hallucinate
 from tasks.stages.judge import judged
-from tasks.tracking import logbook
+from tasks.tracking import mlflow_runs
 from tests.tasks.champions.retrained import CLASS, SETTINGS, timed_by_work
 from tests.tasks.champions.retraining_story import Story
 
@@ -60,7 +60,7 @@ def story(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Iterator[
         told.seen = json.loads(seen.read_text())
         fcntl.flock(lock, fcntl.LOCK_UN)
         yield told
-    logbook.tracker.cache_clear()
+    mlflow_runs.tracker.cache_clear()
 
 
 def _last(state: dict[str, Any]) -> dict[str, Any]:

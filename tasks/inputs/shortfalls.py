@@ -1,0 +1,98 @@
+"""Classes with fewer experiences than wanted: a run goes on with those there are, or without such a class."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
+
+from storage.places.files import read_json
+from storage.places.mirror import is_there
+from storage.tables.shards import row_count
+from tasks.fan_out.chunk import keep_settings, run_folder
+from tasks.settings.errors import RunError
+from tasks.settings.run_settings import RunSettings
+
+_LOG = logging.getLogger(__name__)
+LEAST: Final = 5  # experiences of a class; fewer make no memory, unless no more are wanted
+
+
+class Shortfall(NamedTuple):
+    """A class with too few experiences."""
+
+    class_name: str
+    kept: int  # experiences
+    wanted: int
+    is_left_out: bool  # or the run goes on with those that are kept
+
+    def __str__(self) -> str:
+        found = f"{self.kept} of {self.wanted} wanted experiences, as too few of its problems were solved"
+        does = "is left out of the run" if self.is_left_out else "goes on with fewer"
+        return f"Class {self.class_name} {does}: {found}."
+
+
+def shortfalls(data: str, settings: RunSettings) -> list[Shortfall]:
+    """The classes of a run that have fewer experiences than were wanted.
+
+    Args:
+        data: the data folder.
+        settings: those of the run, whose experiences are curated.
+    """
+    run, least = run_folder(data, settings), min(LEAST, settings.experiences)
+    counted = {}
+    for name in replace(settings, left_out=()).class_names:
+        curated = run.shard("curated", name, 0)
+        counted[name] = row_count(curated) if is_there(curated) else 0
+    return [
+        Shortfall(name, kept, settings.experiences, kept < least)
+        for name, kept in counted.items()
+        if kept < settings.experiences
+    ]
+
+
+def begin_collecting(data: str, settings: RunSettings) -> RunSettings:
+    """Keep the settings of a run in its folder, and return them with all classes."""
+    settings = replace(settings, left_out=())
+    keep_settings(data, settings)
+    return settings
+
+
+def leave_out(data: str, settings: RunSettings) -> RunSettings:
+    """Leave out the classes that have too few experiences, keep that in the run's folder, and warn of it.
+
+    Args:
+        data: the data folder.
+        settings: those of the run, whose experiences are curated.
+
+    Returns:
+        The settings without these classes.
+
+    Raises:
+        RunError: there is a shortfall and the settings are strict, or are those of a retraining, or no class
+            is left.
+    """
+    short = shortfalls(data, settings)
+    left_out = tuple(each.class_name for each in short if each.is_left_out)
+    whole = settings.strict or settings.retraining is not None
+    if short and (whole or len(left_out) == len(settings.class_names)):
+        told = " ".join(map(str, short))
+        raise RunError(f"{told} Ask for fewer experiences, or take easier problems.")
+    settings = replace(settings, left_out=left_out)
+    if left_out:
+        keep_settings(data, settings)
+    log_shortfalls(short)
+    return settings
+
+
+def log_shortfalls(short: Sequence[Shortfall]) -> None:
+    """Warn of classes with too few experiences."""
+    for each in short:
+        _LOG.warning(str(each))
+
+
+def as_collected(data: str, settings: RunSettings) -> RunSettings:
+    """The settings without the classes that collecting has left out."""
+    path = run_folder(data, settings).settings
+    recorded: Any = read_json(path) if is_there(path) else {}
+    return replace(settings, left_out=tuple(recorded.get("left_out", ())))
