@@ -18,11 +18,10 @@ from tasks.registry.model_uris import download, set_mlflow_environment
 from tasks.settings.environment import environment
 from tasks.settings.errors import RunError
 from tasks.settings.redaction import redacted
-from tasks.settings.run_settings import DEFAULT_VEHICLE
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.mlflow_runs import tracking_uri
+from tasks.tracking.model_names import PREFIX
 
-PREFIX: Final = "motion-memory-"
 CHAMPION: Final = "champion"
 CHALLENGER: Final = "challenger"  # a better version that waits for approval
 _TAG: Final = "motion_memory."
@@ -60,11 +59,6 @@ class Version(NamedTuple):
         """The number of the retraining that made this version; 0 if none did."""
         number = self.tag("retraining")
         return int(number) if number.isdecimal() else 0
-
-
-def registered_name(memory: str, vehicle: str) -> str:
-    """The name of a memory in the registry; unless the vehicle is the car, the name ends with the vehicle."""
-    return PREFIX + memory + ("" if vehicle == DEFAULT_VEHICLE else f"-{vehicle}")
 
 
 class Registry:

@@ -14,9 +14,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import Vehicle
-from storage.archives.memories import load_memory
+from storage.archives.libraries import HEADER, load_memory_or_library
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import folders_here
 from storage.places.scratch import scratch_folder
@@ -65,22 +66,23 @@ def memory_digest(folder: Path | None) -> str:
     """A digest of the memories in a folder: of their headers, which hold the checksums of everything else."""
     digest = hashlib.sha256()
     if folder is not None:
-        for header in sorted([folder / "memory.json", *folder.glob("memories/[!.]*/memory.json")]):
+        own = [folder / "memory.json", folder / HEADER]
+        for header in sorted([*own, *folder.glob("memories/[!.]*/memory.json")]):
             if header.is_file():
                 digest.update(f"{header.relative_to(folder)}\0".encode())
                 digest.update(header.read_bytes())
     return digest.hexdigest()
 
 
-def load_from(address: str, vehicle: Vehicle) -> Memory:
-    """The memory at an address: a folder, or a model in MLflow.
+def load_from(address: str, vehicle: Vehicle) -> Memory | PlanLibrary:
+    """The memory or library at an address: a folder, or a model in MLflow.
 
     MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder. Raises RunError if it does not
     answer or holds no such model, and StorageError if the archive is damaged or of another vehicle.
     """
     with memory_folder(address) as folder:  # a mapped file outlives its name
         assert folder is not None  # only an address of None has no folder
-        return load_memory(folder, vehicle)
+        return load_memory_or_library(folder, vehicle)
 
 
 def download(uri: str, scratch: str, server: str) -> Path:

@@ -1,7 +1,8 @@
 """A memory as an MLflow model: problem JSON in; ranked plans out, checked and in the frame of the problem.
 
 The model is saved *from code*: it consists of the archive and ``memory_model_code.py``, which imports this
-file from the installed package. Nothing is pickled, and the archive is checked like any other.
+file from the installed package, and the wheel of that package. Nothing is pickled, and the archive is checked
+like any other.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
+import mlflow
 import pandas as pd
 from mlflow.exceptions import MlflowException
 from mlflow.models import ModelSignature
@@ -29,11 +31,13 @@ from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of, problem_of
 from storage.fields import parse_json
+from storage.places.scratch import scratch_folder
 from storage.vehicles.vehicle_files import said_vehicle
+from tasks.tracking.own_wheel import write_wheel
 
 CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
-REQUIREMENTS: Final = ("motion-memory",)  # given, because it takes MLflow seconds to infer them
+WHEELS: Final = "code"  # the folder of a model where MLflow keeps the wheel of this package
 TOP_K: Final = 5
 MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: other requests wait meanwhile
 MOST_CORNERS_OF_ONE: Final = 1_000  # the time to cut a polygon into convex pieces grows with their square
@@ -143,19 +147,27 @@ def _refuse_too_many_corners(fields: object) -> None:
 def save_memory_model(folder: Path, archive: Path, vehicle: str, model: Model) -> None:
     """Write a memory's archive into a new folder, with the files that MLflow needs to load it as a model.
 
+    The wheel of this package is one of them, and named among the model's requirements, so that MLflow can
+    install what the model needs wherever it is served.
+
     Args:
         folder: the folder to write; it must not exist.
         archive: the memory's folder.
         vehicle: the vehicle's name.
         model: MLflow's description of the model, which this fills.
     """
-    save_model(
-        folder,
-        python_model=str(CODE),
-        artifacts={ARTIFACT: str(archive)},
-        model_config={"vehicle": vehicle},
-        signature=SIGNATURE,
-        input_example=pd.DataFrame({"problem": [json.dumps(fields_of(problem_class("trap").draw(0, 0)))]}),
-        pip_requirements=list(REQUIREMENTS),
-        mlflow_model=model,
-    )
+    with scratch_folder() as scratch:
+        wheel = write_wheel(scratch)
+        save_model(
+            folder,
+            python_model=str(CODE),
+            artifacts={ARTIFACT: str(archive)},
+            model_config={"vehicle": vehicle},
+            signature=SIGNATURE,
+            input_example=pd.DataFrame(
+                {"problem": [json.dumps(fields_of(problem_class("trap").draw(0, 0)))]}
+            ),
+            code_paths=[str(wheel)],
+            pip_requirements=[f"{WHEELS}/{wheel.name}", f"mlflow=={mlflow.__version__}"],
+            mlflow_model=model,
+        )

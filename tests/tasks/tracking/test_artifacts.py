@@ -13,7 +13,7 @@ run = RunFolder(Path.cwd() / "laptop-1")
 run.figures.mkdir(parents=True)
 run.summary("md").write_text("# A run")
 (run.figures / "planning-times.png").write_bytes(b"png")
-publish(run, [])
+publish(run, [], {})
 print("done")
 """
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 from planners.memory.plans.cell_masks import masks_of
@@ -25,6 +28,7 @@ from storage.errors import StorageError
 from storage.exchange.plans import read_plan
 from storage.exchange.problems import fields_of, problem_of
 from storage.places.data_folder import open_data_folder
+from storage.tables.shards import write_table
 from tasks.registry.model_uris import load_from
 from tasks.settings.errors import RunError
 from tests import worlds
@@ -56,6 +60,10 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     tracker = Tracker(open_data_folder(data))
     with tracker.run("r", "train random", {}) as run_id:
         model_id = tracker.memory(run_id, "memory", data.parent / "archive", "car")
+        tracker.metrics(run_id, [{"hit_1": 0.5}], model_id=model_id)
+        table = pa.table({"id": ["a", "b"], "dt": [0.1, 0.1]})
+        write_table(data.parent / "some.parquet", table)
+        tracker.dataset(run_id, "experiences", data.parent / "some.parquet", "digest", "training")
     client = MlflowClient(tracker.uri)
     client.create_registered_model("mine")
     with pytest.MonkeyPatch.context() as patch:  # the registry asks there what the model is
@@ -126,15 +134,33 @@ def test_a_logged_memory_that_was_damaged_is_refused(at_home: dict[str, str]) ->
 
 def test_nothing_of_a_logged_memory_is_pickled(logged: dict[str, str]) -> None:
     endings = {file.suffix for file in Path(logged["data"], "mlartifacts").rglob("*") if file.is_file()}
-    assert endings <= {".npy", ".safetensors", ".json", ".py", ".txt", ".yaml", ""}
+    assert endings <= {".npy", ".safetensors", ".json", ".py", ".txt", ".yaml", ".whl", ""}
     code = list(Path(logged["data"], "mlartifacts").rglob("*.py"))
     assert [file.name for file in code] == ["memory_model_code.py"]
+
+
+def test_a_run_says_who_made_it_from_which_data_and_what_its_model_is_worth(logged: dict[str, str]) -> None:
+    from mlflow import MlflowClient
+
+    client = MlflowClient(logged["uri"])
+    run = client.get_run(logged["run"].split("/")[1])
+    assert {"mlflow.user", "mlflow.source.name", "mlflow.source.git.commit"} <= set(run.data.tags)
+    (used,) = run.inputs.dataset_inputs
+    assert (used.dataset.name, used.dataset.digest) == ("experiences", "digest")
+    columns = json.loads(used.dataset.schema)["mlflow_colspec"]
+    assert [(column["name"], column["type"]) for column in columns] == [("id", "string"), ("dt", "double")]
+    assert json.loads(used.dataset.profile)["num_rows"] == 2
+    model = client.get_logged_model(logged["model"].removeprefix("models:/"))
+    assert [(metric.key, metric.value) for metric in model.metrics] == [("hit_1", 0.5)]
 
 
 ELSEWHERE = """
 import json, sys
 import mlflow
 import pandas as pd
+
+import planners
+assert planners.__file__.startswith(sys.path[1]), "the code is not that of the model's wheel"
 
 uri, problem = sys.argv[1:]
 model = mlflow.pyfunc.load_model(uri)
@@ -145,7 +171,23 @@ print(json.dumps(rows.to_dict("records")))
 """
 
 
-def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
+def _installed(logged: dict[str, str], folder: Path) -> Path:
+    """The package as the wheel in the model has it, with kernels that are compiled already."""
+    (wheel,) = Path(logged["data"], "mlartifacts").rglob("*.whl")
+    (requirements,) = Path(logged["data"], "mlartifacts").rglob("requirements.txt")
+    assert f"code/{wheel.name}" in requirements.read_text().splitlines()
+    with zipfile.ZipFile(wheel) as opened:
+        opened.extractall(folder)
+    for path in folder.rglob("*.py"):
+        original = ROOT / path.relative_to(folder)
+        shutil.copystat(original, path)
+        for compiled in original.parent.glob(f"__pycache__/{original.stem}.*.nb*"):
+            (path.parent / "__pycache__").mkdir(exist_ok=True)
+            shutil.copy2(compiled, path.parent / "__pycache__")
+    return folder
+
+
+def test_the_model_answers_outside_of_the_repository_with_plans_in_the_problems_frame(
     logged: dict[str, str], tmp_path: Path
 ) -> None:
     problem = EASY.draw(901, 3)
@@ -158,7 +200,7 @@ def test_the_model_answers_in_another_process_with_plans_in_the_problems_frame(
     environment = {
         "PATH": "/usr/bin:/bin",
         "HOME": str(tmp_path),
-        "PYTHONPATH": str(ROOT),
+        "PYTHONPATH": str(_installed(logged, tmp_path / "installed")),
         "MLFLOW_TRACKING_URI": logged["uri"],
         "MLFLOW_ALLOW_PICKLE_DESERIALIZATION": "false",
     }
