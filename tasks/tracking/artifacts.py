@@ -1,10 +1,11 @@
-"""Publish a report as artifacts of the Prefect flow that made it; without Prefect only a line is printed."""
+"""Publish a report as artifacts of the Prefect flow that made it, and say in its log where it lies."""
 
 from __future__ import annotations
 
 import base64
 import logging
-from collections.abc import Sequence
+import platform
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -19,10 +20,13 @@ MAX_IMAGE_BYTES: Final = 700_000  # an artifact is one row in the server's datab
 _LOG = logging.getLogger(__name__)
 
 
-def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
-    """Publish a link to the report, its summary, the verdicts on the claims, and each figure as an image.
+def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -> None:
+    """Publish links to the report, its summary, the verdicts on the claims, and each figure as an image.
 
-    ``claims``: by every method that judges them.
+    Args:
+        run: the run's folder.
+        claims: by every method that judges them.
+        pages: addresses of pages about the run that a browser elsewhere can open, by their titles.
     """
     from prefect.artifacts import (
         create_image_artifact,
@@ -32,8 +36,14 @@ def publish(run: RunFolder, claims: Sequence[Claim]) -> None:
     )
 
     table = [claim._asdict() for claim in claims]
+    for title, address in ({"Report": uri_of(run.report)} | dict(pages)).items():
+        _LOG.info("%-8s %s", title, address)
     try:
-        create_link_artifact(uri_of(run.report), "Report", key=_key(run, "report"), description="Whole page")
+        if "Report" not in pages:  # browsers open no file from a page of a server
+            told = f"`{uri_of(run.report)}` on {platform.node()}; `motion-memory dashboard` shows its figures"
+            create_markdown_artifact(told, key=_key(run, "report"), description="Where the report lies")
+        for title, address in pages.items():
+            create_link_artifact(address, title, key=_key(run, title), description=title)
         create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
         create_table_artifact(table, key=_key(run, "claims"), description="Claims of the paper")
         for figure in files_in(run.figures, "*.png"):

@@ -2,45 +2,32 @@
 
 from __future__ import annotations
 
-import functools
+import logging
 import math
 import platform
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import Any
 
 import pandas as pd
 
-from dashboards.statistics.headline import headline, headline_retrieval
+from dashboards.statistics.headline import headline_retrieval
 from dashboards.verdicts.promotion import Judgement
-from storage.places.data_folder import open_data_folder
 from storage.places.scratch import scratch_folder
 from tasks.attempts.attempt_rows import commit
 from tasks.fan_out.chunk import Chunk, run_folder
 from tasks.fan_out.keys import key_of
-from tasks.reports.report import Report
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import Built, figure_names
 from tasks.stages.judge import judged_key
 from tasks.stages.keep_experiences import experiences_key
 from tasks.stages.sweep import swept
 from tasks.stages.train import Trained
-from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, Tracker
+from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
+from tasks.tracking.model_names import registered_name
 from tasks.tracking.parameters import parameters_of
 
-COMPARED: Final = ("controls", "planning-times", "retrieval")  # pictures on the parent run
-
-_SUMMARY_METRICS = (
-    "solved", "mean_ms", "interquartile_mean_ms", "median_ms", "p90_ms", "reduction", "slower", "recalled",
-    "collision_checks", "driving_s", "sooner_s",
-)  # fmt: skip
-
-
-@functools.cache
-def tracker(data: str) -> Tracker:
-    """The tracker of a data folder. The first call starts to connect, in the background."""
-    return Tracker(open_data_folder(data))
+_LOG = logging.getLogger(__name__)
 
 
 @contextmanager
@@ -58,8 +45,11 @@ def run_logged(data: str, settings: RunSettings) -> Iterator[str]:
     tags |= {name: str(getattr(settings, name)) for name in ("preset", "objective", "difficulty")}
     tags["vehicle"] = settings.vehicle_label
     tags |= {"classes": ", ".join(settings.class_names)}
-    with tracker(data).run(settings.run_name, "run", tags) as run_id:
-        tracker(data).parameters(run_id, parameters_of(settings))
+    log = tracker(data)
+    with log.run(settings.run_name, "run", tags) as run_id:
+        log.parameters(run_id, parameters_of(settings))
+        if page := log.page(run_id):
+            _LOG.info("MLflow   %s", page)
         yield run_id
 
 
@@ -73,7 +63,7 @@ def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Train
     """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in trained.items():
-        with _child(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
+        with child_run(data, settings, _stage(settings, chunk.class_name, chunk.index)) as run_id:
             if log.is_logged(run_id, chunk.key):
                 continue
             parameters: dict[str, Any] = parameters_of(settings) | {"class": chunk.class_name}
@@ -99,40 +89,20 @@ def log_memories(
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in built.items():
         name = chunk.class_name
-        with _child(data, settings, _stage(settings, name, result.training_seed)) as run_id:
+        with child_run(data, settings, _stage(settings, name, result.training_seed)) as run_id:
             if not log.is_logged(run_id, chunk.key, "memory"):
-                model_id = log.memory(run_id, "memory", run.memory(name), settings.vehicle)
+                model = registered_name(name, settings.vehicle_label)
+                model_id = log.memory(run_id, model, run.memory(name), settings.vehicle)
                 log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
                 for figure in ("retrieval", *figure_names(name)):
                     log.artifacts(run_id, run.figure(figure, "png"), "figures")
-                log.metrics(run_id, [_retrieval_metrics(retrieval[retrieval["memory"] == name])])
+                of_memory = retrieval_metrics(retrieval[retrieval["memory"] == name])
+                log.metrics(run_id, [of_memory], model_id=model_id)
                 log.mark_logged(run_id, chunk.key, "memory")
-    _log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
+    log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
 
 
-def log_report(data: str, settings: RunSettings, report: Report) -> None:
-    """Log the benchmark as a child run: the summary as metrics, pictures and tables as artifacts."""
-    log, run = tracker(data), run_folder(data, settings)
-    key = key_of([chunk.key for chunk in BENCHMARK.chunks(data, settings)])
-    _log_headline(data, settings, headline(report.summary, report.retrieval), COMPARED)
-    with _child(data, settings, "benchmark") as run_id:
-        log.parameters(run_id, parameters_of(settings))
-        log.artifacts(run_id, run.figures, "figures")
-        for path in (run.summary("csv"), run.summary("md"), run.report):
-            log.artifacts(run_id, path)
-        if log.is_logged(run_id, key):
-            return
-        metrics: dict[str, float] = {}
-        for row in report.summary.to_dict("records"):
-            prefix = f"{row['panel']}/{row['planner']}/{row['configuration'].replace(' ', '-')}"
-            metrics |= {f"{prefix}/{name}": row[name] for name in _SUMMARY_METRICS}
-        metrics |= _retrieval_metrics(report.retrieval)
-        log.metrics(run_id, [{name: value for name, value in metrics.items() if math.isfinite(value)}])
-        log.dataset(run_id, "attempts", run.results, key, "benchmark")
-        log.mark_logged(run_id, key)
-
-
-def _log_headline(
+def log_headline(
     data: str, settings: RunSettings, metrics: Mapping[str, float], pictures: Sequence[str]
 ) -> None:
     """Log metrics, pictures and the experiences on the parent run, if there is one."""
@@ -173,7 +143,7 @@ def log_judgement(
     """
     log, run = tracker(data), run_folder(data, settings)
     key = key_of(judged_key(data, settings, memory))
-    with _child(data, settings, f"judge {memory}") as run_id:
+    with child_run(data, settings, f"judge {memory}") as run_id:
         log.tag(run_id, {"verdict": verdict, "memory": memory})
         if log.is_logged(run_id, key):
             return
@@ -202,7 +172,7 @@ def _judgement_metrics(judgement: Judgement) -> dict[str, float]:
     return metrics
 
 
-def _retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
+def retrieval_metrics(retrieval: pd.DataFrame) -> dict[str, float]:
     """The numbers of the retrieval table, each as a metric with its own name."""
     metrics: dict[str, float] = {}
     for row in retrieval.to_dict("records"):
@@ -228,7 +198,7 @@ def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None
         chunks: the finished chunks of the sweep, one for each variant.
     """
     log = tracker(data)
-    with _child(data, settings, "sweep") as parent:
+    with child_run(data, settings, "sweep") as parent:
         for chunk in chunks:
             row, epochs = swept(chunk)
             stage = f"sweep {chunk.class_name} {chunk.index}"
@@ -245,7 +215,8 @@ def log_sweep(data: str, settings: RunSettings, chunks: Iterable[Chunk]) -> None
 
 
 @contextmanager
-def _child(data: str, settings: RunSettings, stage: str) -> Iterator[str]:
+def child_run(data: str, settings: RunSettings, stage: str) -> Iterator[str]:
+    """Open the child run of a stage while the context lasts, and yield its id."""
     log = tracker(data)
     with log.run(settings.run_name, stage, {}, parent=log.find(settings.run_name, "run")) as run_id:
         yield run_id

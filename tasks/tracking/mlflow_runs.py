@@ -6,20 +6,23 @@ the same MLflow run. A background thread imports MLflow and makes its database, 
 
 from __future__ import annotations
 
+import functools
 import os
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from storage.places.data_folder import DataFolder
+from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
 from storage.places.scratch import scratch_folder
 from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
 from tasks.tracking.mlflow_database import ready_database
+from tasks.tracking.provenance import provenance
+from tasks.tracking.table_shape import table_shape
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -83,6 +86,14 @@ class Tracker:
             raise RuntimeError(redacted(f"MLflow at {self.uri} cannot be used: {reason}")) from self._failure
         return self._connected
 
+    def check_server(self) -> None:
+        """Wait until an MLflow server has answered, if MLFLOW_TRACKING_URI names one.
+
+        Raises RuntimeError if it cannot be used.
+        """
+        if self.uri.startswith("http"):
+            _ = self._client
+
     @contextmanager
     def run(
         self, run_name: str, stage: str, tags: Mapping[str, str], parent: str | None = None
@@ -106,13 +117,26 @@ class Tracker:
             own = {RUN_TAG: run_name, STAGE_TAG: stage} | ({PARENT_TAG: parent} if parent else {})
             name = run_name if stage == "run" else stage
             run_id = str(client.create_run(self._experiment, tags=own, run_name=name).info.run_id)
-        self.tag(run_id, tags)
+        self.tag(run_id, {**provenance(), **tags})
         try:
-            yield run_id
+            with self._monitored(run_id) if stage == "run" else nullcontext():
+                yield run_id
         except BaseException:
             client.set_terminated(run_id, "FAILED")
             raise
         client.set_terminated(run_id, "FINISHED")
+
+    @contextmanager
+    def _monitored(self, run_id: str) -> Iterator[None]:
+        """Log processor, memory, disk and network of this machine every few seconds."""
+        from mlflow.system_metrics.system_metrics_monitor import SystemMetricsMonitor
+
+        monitor = SystemMetricsMonitor(run_id, resume_logging=True, tracking_uri=self.uri)
+        monitor.start()
+        try:
+            yield
+        finally:
+            monitor.finish()
 
     def find(self, run_name: str, stage: str) -> str | None:
         """The id of the MLflow run of a stage, or None."""
@@ -151,13 +175,26 @@ class Tracker:
         new = [Param(name, str(value)[:500]) for name, value in values.items() if name not in logged]
         self._client.log_batch(run_id, params=new)
 
-    def metrics(self, run_id: str, rows: Sequence[Mapping[str, float]], step: str | None = None) -> None:
-        """Log metrics, one row for each step; ``step`` names the column that holds the step's number."""
+    def metrics(
+        self,
+        run_id: str,
+        rows: Sequence[Mapping[str, float]],
+        step: str | None = None,
+        model_id: str | None = None,
+    ) -> None:
+        """Log metrics of a run.
+
+        Args:
+            run_id: the MLflow run.
+            rows: metrics by name, one row for each step.
+            step: names the column that holds the step's number; None if there is one row.
+            model_id: the model that they are figures of, or None.
+        """
         from mlflow.entities import Metric
 
         now = int(time.time() * 1000)
         entries = [
-            Metric(name, float(value), now, int(row[step]) if step else 0)
+            Metric(name, float(value), now, int(row[step]) if step else 0, model_id)
             for row in rows
             for name, value in row.items()
             if name != step and value == value  # NaN is no metric
@@ -199,18 +236,38 @@ class Tracker:
         self._client.finalize_logged_model(logged_model.model_id, "READY")
         return str(logged_model.model_id)
 
+    def model_of(self, run_name: str, memory: str) -> str | None:
+        """The id of the model that a run has logged last of a memory, or None."""
+        condition = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
+        runs = self._client.search_runs([self._experiment], filter_string=condition, max_results=1)
+        return str(runs[0].data.tags[MODEL_TAG]) if runs else None
+
+    def page(self, run_id: str, artifact: str = "") -> str | None:
+        """The address of a run's page, or of an artifact's; None if MLflow is a database and no server."""
+        if not self.uri.startswith("http"):
+            return None
+        shown = f"/artifacts/{artifact}" if artifact else ""
+        return redacted(f"{self.uri.rstrip('/')}/#/experiments/{self._experiment}/runs/{run_id}{shown}")
+
     def dataset(self, run_id: str, name: str, path: Path, digest: str, context: str) -> None:
         """Log which data a run has used.
 
         Args:
             run_id: the MLflow run.
             name: the name of the data.
-            path: where the data lie.
+            path: where the data lie, a Parquet file or a folder of such files.
             digest: of their content.
             context: what the data was used for: "training" or "benchmark".
         """
         from mlflow.entities import Dataset, DatasetInput, InputTag
 
         source = f'{{"uri": "{uri_of(path)}"}}'
-        entry = Dataset(name, digest, "local", source)
+        shards = [path] if path.suffix else files_in(path, "*.parquet", below=True)
+        entry = Dataset(name, digest, "local", source, *(table_shape(shards) if shards else ()))
         self._client.log_inputs(run_id, [DatasetInput(entry, [InputTag("mlflow.data.context", context)])])
+
+
+@functools.cache
+def tracker(data: str) -> Tracker:
+    """The tracker of a data folder. The first call starts to connect, in the background."""
+    return Tracker(open_data_folder(data))

@@ -11,9 +11,9 @@ from tasks.settings.run_settings import RunSettings
 
 def parameters_of(settings: RunSettings) -> dict[str, str]:
     """Each setting under its name; nested settings are joined with a dot, such as ``learning.margin``."""
-    return dict(
-        _leaves("", asdict(settings) | {"hallucination": _shares(settings), "assists": _assists(settings)})
-    )
+    values = asdict(settings) | {"hallucination": _shares(settings), "assists": _assists(settings)}
+    del values["left_out"]  # it is found while the run is done, and parameters stay as they were
+    return dict(_leaves("", values))
 
 
 def _leaves(prefix: str, values: dict[str, Any]) -> Iterator[tuple[str, str]]:

@@ -15,8 +15,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from storage.places.data_folder import DataFolder
 from tasks.servers.prefect_server import set_environment
-from tasks.tracking.logbook import tracker
-from tasks.tracking.mlflow_runs import EXPERIMENT
+from tasks.tracking.mlflow_runs import EXPERIMENT, tracker
 from tests.cluster.machines import answers, free_port
 from tests.dashboards.web.browser import browser, shown_at
 
