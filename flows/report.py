@@ -9,7 +9,7 @@ from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.draw_examples import DRAW_EXAMPLES
 from tasks.tracking.artifacts import publish
-from tasks.tracking.logbook import log_report
+from tasks.tracking.report_log import log_report, pages_of
 
 
 @stage_flow
@@ -18,5 +18,5 @@ def report(settings: RunSettings, data: str) -> None:
     run_stage(DRAW_EXAMPLES, data, settings)
     results, run = report_run(data, settings), run_folder(data, settings)
     log_report(data, settings, results)
-    publish(run, results.claims + results.others)
+    publish(run, results.claims + results.others, pages_of(data, settings))
     log_tables(results, run)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from planners.solve import Attempt
 from planners.world.authority.authority import faults
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.settings.errors import RunError
 
@@ -33,9 +33,24 @@ def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehi
     judged = judged_attempt(problem, attempt, accepted, vehicle)
     if judged.verified is False and attempt.plan is not None:
         planner = f"{attempt.planner}, {attempt.assist} {attempt.top_k}, seed {attempt.seed}"
-        fault = faults(problem, attempt.plan, vehicle)[0]
-        raise PlanFaultError(f"{problem.id} solved by {planner}: {fault}")
+        check_plan(problem, attempt.plan, planner, vehicle)
     return judged
+
+
+def check_plan(problem: Problem, plan: Plan, planner: str, vehicle: Vehicle) -> None:
+    """Have the authority judge a plan, which has to be right.
+
+    Args:
+        problem: what the plan is for.
+        plan: the plan.
+        planner: who made it, for the error.
+        vehicle: who drives.
+
+    Raises:
+        PlanFaultError: the plan does not solve the problem.
+    """
+    for fault in faults(problem, plan, vehicle):
+        raise PlanFaultError(f"{problem.id} solved by {planner}: {fault}")
 
 
 def judged_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:

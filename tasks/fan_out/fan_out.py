@@ -248,7 +248,7 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
                 last_look = time.monotonic()
             show(max(units_done, min(units_begun, sum(sizes))))
             time.sleep(POLL_SECONDS)
-    record_load(job.title, [piece.work for piece in done.values() if piece.work is not None])
+    record_load(job.title, [piece.work for piece in done.values()])
     return [done[i].result for i in range(len(pieces))]
 
 

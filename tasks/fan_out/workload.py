@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import time
@@ -11,6 +12,8 @@ from contextvars import ContextVar
 from typing import NamedTuple
 
 import psutil
+
+_LOG = logging.getLogger(__name__)
 
 
 class Work(NamedTuple):
@@ -90,8 +93,19 @@ def recorded_loads() -> Iterator[list[Load]]:
         _recorded.reset(token)
 
 
-def record_load(what: str, works: Sequence[Work]) -> None:
-    """Add the load of the fan-out named ``what`` to the enclosing ``recorded_loads``, if it did any work."""
-    loads = _recorded.get()
-    if loads is not None and works:
-        loads.append(load_of(what, works))
+def record_load(what: str, works: Sequence[Work | None]) -> None:
+    """Log how many chunks a fan-out did and how many it reused, and record its load.
+
+    Args:
+        what: the name of the fan-out.
+        works: the work on each chunk; None if it was done before. Work is added to the enclosing
+            ``recorded_loads``.
+    """
+    done = [work for work in works if work is not None]
+    load, loads = load_of(what, done), _recorded.get()
+    if done and loads is not None:
+        loads.append(load)
+    by = f", by {load.workers} workers in {load.busy_seconds:,.1f} s of work" if done else ""
+    left = len(works) - len(done)
+    reused = f"; {left:,} reused, as nothing they depend on has changed" if left else ""
+    _LOG.info("%s: %s of %s chunks done%s%s", what, f"{len(done):,}", f"{len(works):,}", by, reused)

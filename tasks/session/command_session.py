@@ -7,17 +7,20 @@ import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
+from typing import Final
 from urllib.parse import urlsplit
 
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import is_there, local_place, shown
-from tasks.servers.prefect_server import LocalServer, local_server
+from tasks.servers.prefect_server import LocalServer, local_server, set_environment
 from tasks.session.folder_lock import locked_folder
 from tasks.settings.environment import default_scheduler
 from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import RunSettings
-from tasks.tracking.mlflow_runs import tracking_uri
+from tasks.tracking.mlflow_runs import tracker, tracking_uri
+
+UNTRACKED: Final = ("collect", "hallucinate", "benchmark")  # flows that log nothing in MLflow
 
 _LOG = logging.getLogger(__name__)
 
@@ -42,38 +45,38 @@ def command_session(
 
     Raises:
         InUseError: another command uses the data folder.
+        RuntimeError: the MLflow server that MLFLOW_TRACKING_URI names cannot be used.
         UsageError: workers of the scheduler could not reach the Prefect server, or the data folder is in
             object storage and no MLflow server is named.
     """
     scheduler = scheduler or default_scheduler()
     _check_reachable(scheduler)
     tracking_uri(DataFolder(local_place(data)))  # raises UsageError early
-    with (
-        locked_folder(data) as folder,
-        local_server(folder.path) as server,
-        _workers_for(name, folder, workers, scheduler, server, settings.vehicle),
-    ):
-        yield folder.place
+    with locked_folder(data) as folder:
+        if name not in UNTRACKED:
+            set_environment(folder.path)  # before MLflow is imported
+            tracker(folder.place).check_server()  # before anything else is started
+        with (
+            local_server(folder.path) as server,
+            _workers_for(name, workers, scheduler, server, settings.vehicle),
+        ):
+            yield folder.place
     _log_locations(folder, settings)
 
 
 @contextmanager
 def _workers_for(
     name: str,
-    folder: DataFolder,
     workers: int,
     scheduler: str | None,
     server: LocalServer | None,
     vehicle: str,
 ) -> Iterator[None]:
-    """Start workers and tracker and compile the kernels while the server starts; then wait for it."""
+    """Start workers and compile the kernels while the server starts; then wait for it."""
     from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
     from tasks.session.warm_up import warm_up
-    from tasks.tracking.logbook import tracker
 
     with ExitStack() as stack:
-        if name not in ("collect", "hallucinate", "benchmark"):
-            tracker(folder.place)
         shared = stack.enter_context(cluster(workers, scheduler))
         local = scheduler is None and name != "report"
         stack.enter_context(warm_up(shared, vehicle) if local else nullcontext())

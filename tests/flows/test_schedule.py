@@ -21,9 +21,10 @@ import pytest
 from dashboards.verdicts.drift import Usefulness
 from storage.places.data_folder import DataFolder
 from tasks.champions.drift_watch import DRIFT, BenchmarkedMemory, report_drift
-from tasks.registry.champion_registry import FIRST, PROMOTED, Registry, registered_name
+from tasks.registry.champion_registry import FIRST, PROMOTED, Registry
 from tasks.servers.prefect_server import running_server
 from tasks.settings.errors import UsageError
+from tasks.tracking.model_names import registered_name
 from tests.tasks.champions.retrained import CLASS, SETTINGS, learn
 
 ROOT = Path(__file__).parents[2]

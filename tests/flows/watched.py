@@ -59,7 +59,7 @@ def watch(
         try:
             while running.poll() is None:
                 if time.monotonic() - looked > LOOK_SECONDS:
-                    watched.ports |= _ports(running)
+                    watched.ports |= ports_of(running)
                     looked = time.monotonic()
                 if not asked and until(log.read_text(errors="replace")):
                     running.send_signal(ending)
@@ -72,7 +72,8 @@ def watch(
     return watched
 
 
-def _ports(command: psutil.Process) -> set[Port]:
+def ports_of(command: psutil.Process) -> set[Port]:
+    """Where a command or a process of it listens now."""
     found = set()
     try:
         processes = [command, *command.children(recursive=True)]

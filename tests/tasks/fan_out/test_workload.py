@@ -47,7 +47,7 @@ def test_a_fan_out_that_does_nothing_is_not_recorded() -> None:
     works = [Work("a", 1.0, 2.0, 5), Work("a", 10.0, 12.0, 6)]
     with recorded_loads() as loads:
         record_load("all", works)
-        record_load("none", [])
+        record_load("none", [None, None])
     (load,) = loads
     assert (load.what, load.chunks, load.busy_seconds) == ("all", 2, 3.0)
     assert load.orchestration == pytest.approx(1.0 - 3.0 / 11.0)
