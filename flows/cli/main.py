@@ -10,9 +10,9 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Final
+from typing import Annotated, Any, Final
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Group, Parameter
 from cyclopts.config import Toml
 
 from flows.cli import map_commands as maps
@@ -22,7 +22,8 @@ from flows.cli import retraining_commands as operations
 from flows.cli import server_commands as serving
 from flows.cli import stage_commands as stages
 from flows.cli.configuration import check_configuration, configuration_file
-from flows.cli.terminal import notices_shown
+from flows.cli.document import Document
+from flows.cli.terminal import notices_shown, telling, write_document, write_error
 from tasks.settings.redaction import redacted
 
 FAILURE: Final = 1
@@ -49,38 +50,64 @@ app = App(
 for command in (
     *(stages.run, stages.collect, stages.hallucinate, stages.train, stages.build_memory, stages.benchmark),
     *(stages.report, stages.sweep, stages.experience_curve),
-    *(problems.plan, problems.optimise, problems.solve),
-    *(maps.import_worlds, maps.route),
+    *(problems.draw, problems.plan, problems.optimise, problems.solve),
+    *(maps.import_worlds, maps.gather, maps.route),
     *(results.verify, results.export, results.compare, serving.dashboard),
     *(serving.serve_memory, serving.servers),
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),
 ):
     app.command(command)
 app.register_install_completion_command(add_to_startup=False)
+app.meta.group_parameters = Group("Output of every command", sort_key=9)
+Flag = Annotated[bool, Parameter(negative=(), show_default=False)]
+
+
+@app.meta.default
+def with_output(
+    *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+    json: Flag = False,
+    quiet: Flag = False,
+    verbose: Flag = False,
+) -> Any:
+    """Run a command that tells things in the way that was asked for.
+
+    Args:
+        tokens: The command and its own options.
+        json: Write one JSON document with all tables, lines and files to the output, and nothing else.
+        quiet: Write no progress and no notices; results, warnings and errors stay.
+        verbose: Also tell how many chunks each stage did and reused, and where in the code an error arose.
+    """
+    told = telling()
+    told.document, told.quiet, told.verbose = Document() if json else None, quiet, verbose
+    return app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
 
 
 def call(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; a failure prints one line to the error stream."""
-    arguments = sys.argv[1:] if arguments is None else arguments
-    debug = os.environ.get("MOTION_MEMORY_DEBUG") == "1"
+    with notices_shown():
+        code = _call(sys.argv[1:] if arguments is None else arguments)
+        write_document(code)
+    return code
+
+
+def _call(arguments: Sequence[str]) -> int:
     try:
         _refuse_null_characters(arguments)
         configured = configuration_file(Path.cwd())
         if configured is not None:
             check_configuration(configured, [name for name in app if not name.startswith("-")])
         app.config = () if configured is None else (Toml(configured),)
-        with notices_shown():
-            app(arguments, exit_on_error=False, print_error=False, result_action="return_none")
+        code = app.meta(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt:
         return INTERRUPTED
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else FAILURE
     except Exception as error:
-        if debug:
+        if telling().verbose or os.environ.get("MOTION_MEMORY_DEBUG") == "1":
             print(redacted(traceback.format_exc()), file=sys.stderr)
-        print(f"motion-memory: {_one_line(error)}", file=sys.stderr)
+        write_error(_one_line(error))
         return WRONG_USE if _is_wrong_use(error) else FAILURE
-    return 0
+    return code if isinstance(code, int) else 0
 
 
 def _refuse_null_characters(arguments: Sequence[str]) -> None:
@@ -106,9 +133,12 @@ def _one_line(error: Exception) -> str:
 def main() -> None:
     """Entry point of the console script."""
     signal.signal(signal.SIGINT, _interrupt)
-    code = call()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    try:
+        code = call()
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except BrokenPipeError:  # whoever read the output, such as `head`, has read enough
+        code = FAILURE
     os._exit(code)  # threads of Prefect and Dask would wait for servers that have ended
 
 
@@ -117,7 +147,10 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
     forced_exit.daemon = True
     forced_exit.start()
-    print("Interrupted; give the same command again to continue.", file=sys.stderr)
+    print(
+        "Interrupted. The same command goes on after the last whole part; plan and gather begin anew.",
+        file=sys.stderr,
+    )
     raise KeyboardInterrupt
 
 

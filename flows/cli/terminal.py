@@ -1,7 +1,8 @@
 """What the command line writes: results and notices to the output, warnings and progress to the error stream.
 
 Nothing else writes to a terminal. Below ``flows.cli`` results are returned, and what has to be told meanwhile
-is logged: as text, as a ``CellTable``, or as the ``Progress`` of work.
+is logged: as text, as a ``CellTable``, or as the ``Progress`` of work. With ``--json`` all of it is
+collected, and written to the output at the end as one document.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
+
+from flows.cli.document import Document
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -22,14 +26,36 @@ if TYPE_CHECKING:
 
 LOGGERS: Final = ("tasks", "storage")
 PROGRESS: Final = "tasks.fan_out.progress"
+DETAILS: Final = ("tasks.fan_out.workload",)  # whose notices are for operators, and here for ``--verbose``
+RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # what a run found, and where it lies
 COLUMNS: Final = 110  # width of tables that are not written to a terminal
+WIDEST: Final = 10_000  # columns of any table
 LINE_SECONDS: Final = 5.0  # between two lines of progress, if the error stream is no terminal
 
 
+@dataclass
+class Telling:
+    """How a command tells what it does and finds; its options ``--json``, ``--quiet`` and ``--verbose``."""
+
+    document: Document | None = None  # collects everything for ``--json``
+    quiet: bool = False  # only results, warnings and errors
+    verbose: bool = False  # also the work of each stage, and where in the code an error arose
+
+
+_telling = Telling()
+
+
+def telling() -> Telling:
+    """How the command that runs tells things."""
+    return _telling
+
+
 def write(*items: str | CellTable) -> None:
-    """Write lines and tables to the output."""
+    """Write lines and tables, which are what a command was asked for, to the output."""
     for item in items:
-        if isinstance(item, str):
+        if _telling.document is not None:
+            _telling.document.add(item)
+        elif isinstance(item, str):
             print(item)
         else:
             _draw(item)
@@ -38,16 +64,36 @@ def write(*items: str | CellTable) -> None:
 
 def write_files(**paths: object) -> None:
     """Write a line for each of ``paths`` that is not None: the name of the argument, then the path."""
-    write(*(f"{name:8} {path}" for name, path in paths.items() if path is not None))
+    written = {name: str(path) for name, path in paths.items() if path is not None}
+    if _telling.document is not None:
+        _telling.document.files.update(written)
+    else:
+        write(*(f"{name:8} {path}" for name, path in written.items()))
+
+
+def write_error(line: str) -> None:
+    """Write to the error stream why a command failed."""
+    print(f"motion-memory: {line}", file=sys.stderr, flush=True)
+    if _telling.document is not None:
+        _telling.document.error = line
+
+
+def write_document(exit_code: int) -> None:
+    """Write the document to the output if there is one: all that was told."""
+    if _telling.document is not None:
+        print(_telling.document.text(exit_code), flush=True)
 
 
 @contextmanager
 def notices_shown() -> Iterator[None]:
     """Show what ``tasks`` and ``storage`` log while this lasts."""
+    global _telling
+    _telling = Telling()
     show_notices()
     try:
         yield
     finally:
+        _telling = Telling()
         for name in (*LOGGERS, PROGRESS):
             logger = logging.getLogger(name)
             logger.setLevel(logging.NOTSET)
@@ -76,10 +122,21 @@ class Notices(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Write a record; its message is a text or a ``CellTable``."""
+        document, message = _telling.document, record.msg
+        if isinstance(message, str):
+            message = record.getMessage()
         if record.levelno >= logging.WARNING:
-            print(record.getMessage(), file=sys.stderr, flush=True)
-        else:
-            write(record.getMessage() if isinstance(record.msg, str) else record.msg)
+            print(message, file=sys.stderr, flush=True)
+            if document is not None:
+                document.warnings.append(message)
+        elif record.name in DETAILS and not _telling.verbose:
+            return
+        elif document is not None:
+            document.add(message)
+            if isinstance(message, str) and not _telling.quiet:
+                print(message, file=sys.stderr, flush=True)
+        elif not _telling.quiet or record.name.startswith(RESULTS):
+            write(message)
 
 
 class ProgressShown(logging.Handler):
@@ -95,6 +152,8 @@ class ProgressShown(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record whose message is a ``Progress``."""
         progress: Progress = record.msg  # type: ignore[assignment]  # a message may be any object
+        if _telling.quiet:
+            return
         if sys.stderr.isatty():
             self._draw_bar(progress)
         elif not progress.over:
@@ -117,6 +176,7 @@ class ProgressShown(logging.Handler):
             self._bars.start()
         self._bars.update(self._bars.task_ids[0], completed=progress.done, total=progress.total)
         if progress.over:
+            self._bars.update(self._bars.task_ids[0], visible=progress.total > 0)  # nothing was to be done
             self._bars.stop()
             self._bars = None
 
@@ -134,10 +194,15 @@ class ProgressShown(logging.Handler):
 
 
 def _draw(table: CellTable) -> None:
-    """Draw a table on the output, as wide as the terminal if it is one."""
+    """Draw a table on the output, as wide as the terminal if it is one, and no column is ever cut off."""
     from rich.console import Console
+    from rich.measure import Measurement
 
-    Console(width=None if sys.stdout.isatty() else COLUMNS, highlight=False).print(rich_table(table))
+    drawn = rich_table(table)
+    console = Console(width=None if sys.stdout.isatty() else COLUMNS, highlight=False)
+    narrowest = Measurement.get(console, console.options.update(max_width=WIDEST), drawn).minimum
+    console.width = max(console.width, narrowest)
+    console.print(drawn)
 
 
 def rich_table(table: CellTable) -> Table:
@@ -155,9 +220,14 @@ def rich_table(table: CellTable) -> Table:
         pad_edge=not table.title,
         padding=(0, 1, 0, 0 if table.title else 1),
     )
-    for heading in table.headings:
+    for i, heading in enumerate(table.headings):
+        is_whole = heading != "verdict"  # verdicts are wrapped
+        widest = max((len(cells[i]) for group in table.groups for cells in group), default=0)
         drawn.add_column(
-            heading, justify="left" if heading in NAMES else "right", no_wrap=heading != "verdict"
+            heading,
+            justify="left" if heading in NAMES else "right",
+            no_wrap=is_whole,
+            min_width=max(widest, len(heading)) if is_whole else None,
         )
     for group in table.groups:
         for i, (first, *others) in enumerate(group):

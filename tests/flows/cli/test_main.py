@@ -14,7 +14,7 @@ from flows.cli.main import app, call
 from flows.cli.run_options import worker_count
 
 COMMANDS = (
-    "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "plan",
+    "run", "collect", "hallucinate", "train", "build-memory", "benchmark", "report", "verify", "draw", "plan",
     "optimise", "solve", "import-worlds", "export", "sweep", "experience-curve", "compare",
     "serve-memory", "servers",
     "retrain", "serve", "promote", "rollback",
@@ -32,7 +32,7 @@ COMMANDS = (
         (["run", "--speed", "3"], 2, "--speed"),
         (["run", "--data"], 2, "--data"),
         (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
-        (["run", "--worlds", "/nowhere"], 2, "/nowhere is no folder of worlds"),
+        (["run", "--worlds", "/nowhere"], 2, "/nowhere does not exist"),
         (["train", "--objective", "luck"], 2, '"luck" for --objective. Choose from'),
         (["train", "--epochs", "0"], 2, "0 epochs: give 1 or more."),
         (["train", "--hidden", "64", "0"], 2, "give 1 or more."),
@@ -52,6 +52,11 @@ COMMANDS = (
         (["plan", "p.json", "--improve-seconds", "-1"], 2, "give 0 or more"),
         (["plan", "p.json", "--picture", "p.bmp"], 2, "p.bmp is not the name of a picture"),
         (["plan", "p.json"], 1, "p.json does not exist"),
+        (["draw", "maze", "--out", "p.jsonl"], 2, '"maze" for NAME. Choose from'),
+        (["draw", "dock", "--out", "p.jsonl"], 2, "dock is not for car; choose parallel"),
+        (["draw", "lot", "--problems", "0", "--out", "p.jsonl"], 2, "0 problems: give 1 or more."),
+        (["draw", "lot", "--out", "p.txt"], 1, "p.txt ends in '.txt'"),
+        (["draw", "lot", "--out", "p.json"], 1, "p.json can hold one problem, got 100"),
         (["plan", "a\0.json"], 2, "'a\\x00.json' holds a null character"),
         (["solve", "p.json", "--out", "a\0.parquet"], 2, "'a\\x00.parquet' holds a null character"),
         (["optimise", "p.json", "--straight", "--planner", "gust"], 2, "--planner and --straight are given"),
