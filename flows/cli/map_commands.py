@@ -1,4 +1,4 @@
-"""Commands for the user's own worlds and maps: import problems, plan a route."""
+"""Commands for the user's own worlds and maps: import problems, gather experience, plan a route."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from flows.cli.choices import AssistName
+from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
 from flows.cli.terminal import write, write_files
 
@@ -34,7 +35,8 @@ def import_worlds(
     Args:
         path: A folder of worlds or problem files, one such file, or a map: .map, .scen, .yaml (ROS), .npy,
             .npz.
-        format: png, polygons, problems, moving-ai, ros or numpy; by default recognised by the files' endings.
+        format: png, polygons, problems, moving-ai, ros, numpy, tpcap, dynobench or bench-mr; by default
+            recognised by the files' endings.
         out: A .parquet, .jsonl or .json file, or a new folder with parts train and test for run --worlds.
         part: train, test, validation, or both of the first two.
         problems: Problems of each part; default 1,000 of a map, all of worlds.
@@ -52,6 +54,39 @@ def import_worlds(
     write_files(picture=picture)
     write(counts)
     write_files(problems=out)
+
+
+def gather(
+    sources: list[str],
+    /,
+    *,
+    out: Path,
+    plans: int = 1000,
+    poses: float = 0.25,
+    vehicle: str = "car",
+    seed: int = 1,
+    workers: int | None = None,
+    reading: MapOptions = _AS_IT_IS,
+) -> None:
+    """Ask general questions in worlds and on maps, and keep the plans as a library for --memory.
+
+    Args:
+        sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
+            and in worlds in their part for training. Files of problems: these are the questions.
+        out: Folder of the library.
+        plans: How many to keep.
+        poses: Share of the drawn questions that ask for a pose, not for a place.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+        seed: Everything random follows from it.
+        workers: Worker processes; default one for each core.
+        reading: How maps are read.
+    """
+    from tasks.requests import gather as task
+    from tasks.requests.import_worlds import import_settings
+
+    settings = import_settings(vehicle, seed, **asdict(reading))
+    write(task.gather(sources, out, plans, poses, settings, worker_count(workers)))
+    write_files(library=out)
 
 
 def route(

@@ -1,4 +1,4 @@
-"""Commands for the user's own problems: plan for one, optimise one, solve many."""
+"""Commands for problems: draw new ones, plan for one, optimise one, solve many."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from flows.cli.choices import AssistName, PlannerName
+from flows.cli.choices import AssistName, Difficulty, PlannerName, SourceName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
 from flows.cli.terminal import write, write_files
@@ -17,6 +17,34 @@ if TYPE_CHECKING:
     from tasks.requests.solve_many import SolvedMany
 
 _USUAL: Final = SolveOptions()
+
+
+def draw(
+    name: SourceName,
+    *,
+    difficulty: Difficulty = "standard",
+    problems: int = 100,
+    seed: int = 1,
+    vehicle: str = "car",
+    out: Path,
+    picture: Path | None = None,
+) -> None:
+    """Draw new problems of a class, or manoeuvres of a family, for any vehicle.
+
+    Args:
+        name: A class (curves, random, trap) or a family: parallel, perpendicular, angled and lot are for
+            vehicles without trailers, dock and yard for those with trailers.
+        difficulty: How hard they are.
+        problems: How many to draw.
+        seed: Everything random follows from it.
+        vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+        out: Where to write them, .json (one), .jsonl or .parquet.
+        picture: Where to draw the first six, .png, .svg or .pdf.
+    """
+    from tasks.requests.draw_problems import draw_problems
+
+    draw_problems(name, difficulty, problems, seed, vehicle, out, picture)
+    write_files(problems=out, picture=picture)
 
 
 def plan(

@@ -22,18 +22,19 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
 
 
 def export(run: Path, *, format: str, out: Path) -> None:
-    """Write the attempts of a run in a format of other tools.
+    """Write the attempts of a run, or a plan, in a format of other tools.
 
     Args:
-        run: Folder of the run, or its name if it is in $MOTION_MEMORY_DATA or ./data.
-        format: ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db) or csv
-            (.csv).
+        run: Folder of the run, or its name if it is in $MOTION_MEMORY_DATA or ./data; for dynobench the
+            .json file of a plan.
+        format: ompl (a folder of OMPL benchmark logs), planner-arena (its SQLite database, .db), csv (.csv)
+            or dynobench (a trajectory, .yaml).
         out: The file or folder to write.
     """
     from tasks.reports.export import export_run
     from tasks.settings.environment import run_named
 
-    export_run(run_named(run), format, out)
+    export_run(run if format == "dynobench" else run_named(run), format, out)
     write(f"exported {out}")
 
 

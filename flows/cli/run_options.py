@@ -40,7 +40,8 @@ class Options:
         data: Data folder, or s3://bucket/folder; default $MOTION_MEMORY_DATA or ./data.
         workers: Worker processes; default one for each core.
         scheduler: Dask scheduler to use instead, such as tls://host:8786; default $MOTION_MEMORY_SCHEDULER.
-        strict: Stop at a bad world instead of skipping it.
+        strict: Stop at a bad world instead of skipping it, and at a class with too few solved problems
+            instead of going on with fewer experiences.
         continual: Also measure with 20, 40 ... % of the experiences; paper: GUST on curves only.
         experiences: Solved problems to keep of each class; the preset gives the default, as for the next
             four.

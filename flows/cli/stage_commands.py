@@ -12,22 +12,25 @@ if TYPE_CHECKING:
     from tasks.settings.run_settings import RunSettings
 
 NO_OPTIONS: Final = Options()
+SHORT: Final = 3  # exit code: done, but with fewer experiences than wanted
 
 
-def run(options: Options = NO_OPTIONS) -> None:
+def run(options: Options = NO_OPTIONS) -> int:
     """Do all stages, draw figures, log to MLflow, and print how much faster planning became."""
     with _session("run", options) as (settings, data):
         from flows.run import run as flow
 
         flow(settings, data)
+    return _exit_code(settings, data)
 
 
-def collect(options: Options = NO_OPTIONS) -> None:
+def collect(options: Options = NO_OPTIONS) -> int:
     """Draw problems, solve them, and keep the most useful plans of each class."""
     with _session("collect", options) as (settings, data):
         from flows.collect import collect as flow
 
         flow(settings, data)
+    return _exit_code(settings, data)
 
 
 def hallucinate(options: Options = NO_OPTIONS) -> None:
@@ -113,6 +116,15 @@ def settings_of(options: Options) -> RunSettings:
     from tasks.inputs.gained_on_the_job import with_gained
 
     return with_gained(settings, options.folder, options.learned)
+
+
+def _exit_code(settings: RunSettings, data: str) -> int:
+    """``SHORT`` if a class has fewer experiences than wanted, which is said once more; else 0."""
+    from tasks.inputs.shortfalls import log_shortfalls, shortfalls
+
+    short = shortfalls(data, settings)
+    log_shortfalls(short)
+    return SHORT if short else 0
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import Final
 
 from dashboards.cells import CellTable
 from planners.explanation import Recollection
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.solve import Attempt
 from planners.world.problem import Plan
@@ -26,7 +27,7 @@ _LOG = logging.getLogger(__name__)
 
 def log_explanation(
     attempt: Attempt,
-    memory: Memory | None,
+    memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
 ) -> None:
@@ -34,7 +35,7 @@ def log_explanation(
 
     Args:
         attempt: the attempt to explain.
-        memory: the memory that was used, or None.
+        memory: the memory or library that was used, or None.
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
         scale: how many metres of the problem are one canonical metre.
     """
@@ -47,13 +48,15 @@ def log_explanation(
 
 
 def _recall_line(
-    attempt: Attempt, memory: Memory | None, recalled: Sequence[tuple[Recollection, Plan]]
+    attempt: Attempt, memory: Memory | PlanLibrary | None, recalled: Sequence[tuple[Recollection, Plan]]
 ) -> str:
     if memory is None:
         return f"recall   no memory was used ({attempt.assist}, {attempt.planner})"
     line = f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
+    if not recalled and attempt.source == "recalled":
+        return f"recall   parts of {len(memory.plans):,} plans of {memory.class_name}, driven again"
     if not recalled:
-        return f"{line}: none is worth trying"
+        return f"{line}: no stored plan seemed likely to fit"
     free = sum(
         not (recollection.blocked.any() or recollection.goal_missed_m > 1e-9) for recollection, _ in recalled
     )

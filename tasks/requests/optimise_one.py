@@ -14,6 +14,7 @@ from planners.optimisation.clearance_field import least_clearance
 from planners.optimisation.guesses import straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise
 from planners.search.registry import PLANNERS, plan
+from planners.world.alignment import shifted
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
@@ -43,7 +44,8 @@ class InitialGuess:
             record = read_plan(self.plan, self.vehicle)
             if record.plan is None or len(record.plan.controls) == 0:
                 raise RunError(f"{self.plan} holds no plan to begin with: its status is {record.status!r}.")
-            return record.plan, record.planner
+            x, y = ((a - b) / problem.scale for a, b in zip(record.offset, problem.offset, strict=True))
+            return shifted(record.plan, (x, y)), record.planner
         if self.planner is None:
             return straight_line(problem, self.vehicle), STRAIGHT
         rng = generator(self.seed, "search", problem.id, self.planner)
@@ -59,9 +61,11 @@ class InitialGuess:
         """Warn if the plan file was made for another problem."""
         record = None if self.plan is None else read_plan(self.plan, self.vehicle)
         if record is not None and (record.problem_id, record.scale) != (problem.id, problem.scale):
-            made_for = f"problem {record.problem_id} of scale {record.scale:g}"
-            wanted = f"{problem.id} of scale {problem.scale:g}"
-            _LOG.warning("only a guess: %s is for %s, not for %s", self.plan, made_for, wanted)
+            made_for = f"problem {record.problem_id} (scale {record.scale:g})"
+            wanted = f"{problem.id} (scale {problem.scale:g})"
+            _LOG.warning(
+                "%s was made for %s; it is taken as a first guess for %s", self.plan, made_for, wanted
+            )
 
 
 class OptimisedOne(NamedTuple):
@@ -164,4 +168,5 @@ def _record(
         optimised.plan,
         vehicle,
         problem.scale,
+        problem.offset,
     )

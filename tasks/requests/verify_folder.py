@@ -49,7 +49,7 @@ from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
 
 LABELS_EVERY: Final = 50  # one hallucinated problem in so many has its grid and labels made again
-COLLECTED: Final[tuple[Table, ...]] = ("candidates", "curated", "experiences")
+COLLECTED: Final[tuple[Table, ...]] = ("candidates", "learned", "curated", "experiences")
 MOST_FAULTS_TOLD: Final = 20
 
 _LOG = logging.getLogger(__name__)
@@ -156,7 +156,7 @@ def _hallucinated(run: RunFolder, settings: RunSettings, name: str, path: Path) 
             wrong.append(f"{path}: {problems[i].id} has a grid that does not fit its obstacles")
     counts = {
         "hallucinated problems read": len(problems),
-        "of these, grids and labels drawn again": len(repeated),
+        "of these, grids and labels computed again": len(repeated),
     }
     return Counter(counts), wrong
 

@@ -70,6 +70,7 @@ _LATER: Final[dict[str, Any]] = {  # fields that were added
     "learned": "",
     "retraining": None,
     "as_published": False,
+    "left_out": (),
 }
 _LATER_IN_LEARNING: Final = ("own_anchors", "batch", "weight_decay", "network")
 
@@ -107,6 +108,7 @@ class RunSettings:
     continual: str = "none"  # whose planning times are measured with fewer experiences too, of CONTINUAL
     retraining: Retraining | None = None  # what it begins from, if it is one
     as_published: bool = False  # plans stay as they were found; no problems but those made around them
+    left_out: tuple[str, ...] = ()  # classes of which collecting found too few experiences
 
     @property
     def wanted(self) -> int:
@@ -115,8 +117,9 @@ class RunSettings:
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """All classes of the run, folders of worlds after the generated ones."""
-        return self.classes + tuple(world_class(folder) for folder in self.worlds)
+        """The classes of the run but those left out, folders of worlds after the generated ones."""
+        every = self.classes + tuple(world_class(folder) for folder in self.worlds)
+        return tuple(name for name in every if name not in self.left_out)
 
     @property
     def title(self) -> str:
@@ -166,7 +169,7 @@ class RunSettings:
     def digest(self) -> str:
         """Eight hexadecimal digits that tell settings with different results apart."""
         values = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
-        del values["strict"], values["continual"]
+        del values["strict"], values["continual"], values["left_out"]
         values["assists"] = [_renamed(each, _DIGESTED) for each in self.assists]
         for name, default in _LATER.items():  # so that runs from before a field was added keep their names
             if values.get(name) == default:
@@ -205,7 +208,7 @@ class RunSettings:
         if version == 1:
             values["assists"] = tuple(_renamed(each, RENAMED["recall"]) for each in values["assists"])
         values["hallucination"] = tuple((name, float(share)) for name, share in values["hallucination"])
-        for name in ("classes", "worlds", "planners"):
+        for name in ("classes", "worlds", "planners", "left_out"):
             values[name] = tuple(values[name])
         values["learning"] = Learning(**values["learning"])
         if values["retraining"] is not None:

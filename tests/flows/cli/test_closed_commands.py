@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import ipaddress
 import json
 import re
 import shutil
 import signal
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import httpx
-import pyarrow.parquet as pq
 import pytest
 
 from storage.exchange.problems import fields_of
@@ -21,10 +17,11 @@ from storage.tables.attempts import read_attempts
 from tasks.requests.assistant import AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows import small_run
+from tests.flows.closed import assert_closed, assert_nowhere_in
 from tests.flows.conftest import SmallRuns
 from tests.flows.planted import PLANTED, SECRET
 from tests.flows.same_rows import equal_but_for_seconds
-from tests.flows.watched import ROOT, Watched, watch
+from tests.flows.watched import watch
 from tests.prepared.prefect_database import with_prefect_database
 from tests.tasks.served import JSON, good_request, problem, write_memory
 from tests.tasks.servers.attacks import EVIL
@@ -38,21 +35,6 @@ from tasks.requests import problem_parts
 problem_parts.PART_PROBLEMS = 1
 main()
 """
-LISTENERS = {  # who a process may be, by command
-    "run": {
-        "server": "Prefect's server",
-        "command": "Dask's scheduler",
-        "child": "Dask's workers and nannies",
-    },
-    "solve": {
-        "server": "Prefect's server",
-        "command": "Dask's scheduler",
-        "child": "Dask's workers and nannies",
-    },
-    "serve-memory": {"command": "the scoring server", "child": "the scoring server"},
-    "servers": {"command": "MLflow's server", "child": "Prefect's server"},
-    "plan": {},
-}
 
 
 @pytest.fixture(scope="module")
@@ -64,20 +46,6 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     lines = [json.dumps(fields_of(problem(i))) for i in range(COUNT)]
     (place / "many.jsonl").write_text("\n".join(lines))
     return place
-
-
-def documented(command: str) -> set[str]:
-    """The listeners that the page knows for a command."""
-    page = (ROOT / "docs" / "security.md").read_text()
-    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines() if "|" in line]
-    return {row[1] for row in rows if f"`{command}`" in row[0]}
-
-
-def assert_closed(command: str, watched: Watched) -> None:
-    assert SECRET not in watched.output
-    for port in watched.ports:
-        assert ipaddress.ip_address(port.address).is_loopback, (command, port)
-        assert LISTENERS[command][port.process] in documented(command), (command, port)
 
 
 @pytest.mark.timeout(600)  # whoever comes first makes the run
@@ -106,6 +74,7 @@ def test_failing_stages_tell_no_secret(small_runs: SmallRuns, place: Path) -> No
     assert "MLflow at http://***@127.0.0.1:9 cannot be used" in failed.output
     assert "Traceback" not in failed.output
     assert SECRET not in failed.output
+    assert failed.ports == set()  # told before a server or a cluster is started
     assert_nowhere_in(data)
 
 
@@ -159,36 +128,6 @@ def test_serving_a_memory(place: Path) -> None:
     assert_closed("serve-memory", watched)
 
 
-def test_servers_for_all(place: Path) -> None:
-    answers = []
-
-    def asked(output: str) -> bool:
-        found = re.findall(r"(?:PREFECT_API_URL|MLFLOW_TRACKING_URI)=(\S+)", output)
-        if "Ctrl-C" not in output:
-            return False
-        prefect, mlflow = found
-        search = f"{mlflow}/api/2.0/mlflow/experiments/search?max_results=5"
-        for auth in (None, ("robot", "wrong"), ("robot", SECRET)):
-            answers.append(httpx.get(f"{prefect}/admin/version", auth=auth).status_code)
-            answers.append(httpx.get(search, auth=auth).status_code)
-        answers.append(httpx.get(f"{mlflow}/health").status_code)
-        for headers in ({"Origin": EVIL}, {"Host": "evil.example"}, {"Host": "hub", "Origin": "http://hub"}):
-            asked = {"auth": ("robot", SECRET), "headers": headers, "json": {"max_results": 5}}
-            answers.append(httpx.post(f"{prefect}/flows/filter", **asked).status_code)
-            answers.append(httpx.post(f"{mlflow}/api/2.0/mlflow/experiments/search", **asked).status_code)
-        return True
-
-    ports = ["--prefect-port", "0", "--mlflow-port", "0"]
-    with_prefect_database(place / "shared")
-    command = ["servers", "--data", str(place / "shared"), *ports]
-    watched = watch(command, place / "all.log", PLANTED | {"MOTION_MEMORY_HOSTS": "hub"}, asked)
-    assert watched.code == 0, watched.output[-2000:]
-    assert answers == [401, 401, 401, 401, 200, 200, 200, 403, 403, 400, 400, 200, 200]
-    assert {port.process for port in watched.ports} >= {"child"}
-    assert_closed("servers", watched)
-    assert_nowhere_in(place / "shared")
-
-
 def test_planning_opens_no_port_and_a_traceback_tells_no_secret(place: Path) -> None:
     arguments = ["plan", str(place / "one.json"), "--assist", "open", "--memory", "models:/x@y"]
     unreached = {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
@@ -198,23 +137,3 @@ def test_planning_opens_no_port_and_a_traceback_tells_no_secret(place: Path) -> 
     assert "Traceback" in watched.output
     assert watched.ports == set()
     assert SECRET not in watched.output
-
-
-def assert_nowhere_in(folder: Path) -> None:
-    """Not in any file as it is, nor in what a table or a database holds compressed."""
-    files = [file for file in folder.rglob("*") if file.is_file()]
-    assert files
-    for file in files:
-        try:
-            assert SECRET.encode() not in file.read_bytes(), file
-        except FileNotFoundError:  # a database's journal, by now a part of it
-            continue
-        if file.suffix == ".parquet":
-            table = pq.read_table(file)
-            assert SECRET not in repr((table.schema.metadata, table.to_pylist())), file
-        if file.suffix == ".db":
-            with closing(sqlite3.connect(file)) as database:
-                names = database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall()
-                for (name,) in names:
-                    rows = database.execute(f'SELECT * FROM "{name}"').fetchall()
-                    assert SECRET not in repr(rows), (file, name)

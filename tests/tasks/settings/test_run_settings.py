@@ -108,7 +108,7 @@ def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_nam
     settings = for_preset("smoke", learning={"origin_weight": 40.0})  # nobody could choose another
     values = _first_version(settings)
     del values["vehicle"], values["learning"], values["hallucination"]
-    del values["learned"], values["retraining"], values["as_published"]
+    del values["learned"], values["retraining"], values["as_published"], values["left_out"]
     assert RunSettings.from_json(json.dumps(values)) == settings
     del values["strict"], values["continual"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
@@ -129,7 +129,7 @@ def test_runs_that_set_the_learning_rate_before_there_was_a_network_keep_their_n
     assert RunSettings.from_json(json.dumps(values)) == settings
     for name in ("vehicle", "hallucination", "learned", "retraining", "strict", "continual"):
         del values[name]
-    del values["as_published"]
+    del values["as_published"], values["left_out"]
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:8]
     assert settings.run_name == f"smoke-labels-{digest}"
 
@@ -203,10 +203,7 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
         ({"learning": {"seeds": 0}}, "0 training seeds: give 1 or more."),
         ({"learning": {"learning_rate": -1.0}}, "learning_rate is -1.0: give a number above 0."),
         ({"learning": {"dimensions": 0}}, "Sizes of the encoder are (16,), (128,), 0: give 1 or more."),
-        (
-            {"worlds": ["/nowhere"]},
-            "/nowhere is no folder of worlds and no map: there is nothing of that name.",
-        ),
+        ({"worlds": ["/nowhere"]}, "/nowhere does not exist; give a folder of worlds or a map."),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_one_line(wrong: dict[str, object], told: str) -> None:
