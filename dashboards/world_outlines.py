@@ -8,13 +8,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.repair import blocked_states
-from planners.world.arrays import Flags, Floats
+from planners.world.arrays import Flags, Floats, Integers
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
-from planners.world.vehicles.vehicle import CAR, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import CAR, Corners, Vehicle, state_size, trailers_of
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
+_STANDING: Final = 1e-6  # m/s, below which a vehicle stands
 _CLEAR_M: Final = 2.0  # between two footprints of a plan, so that a small picture stays readable
 
 
@@ -35,10 +36,14 @@ def checked(plan: Plan, scene: Scene, vehicle: Vehicle = CAR) -> CheckedPlan:
     return CheckedPlan(plan, blocked_states(plan, scene, vehicle)[0])
 
 
-def heading_tip(problem: Problem) -> tuple[float, float]:
-    """The end of the line that shows the heading at the start of ``problem``, x and y."""
+def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]:
+    """The end of the line that shows the heading at the start of ``problem``, x and y.
+
+    On the way to a pose it is shorter: half as long again as the ``vehicle`` is ahead of its axle.
+    """
     x, y, heading = problem.start
-    return x + HEADING_M * math.cos(heading), y + HEADING_M * math.sin(heading)
+    metres = HEADING_M if problem.arrival is None else min(HEADING_M, 1.5 * vehicle.front)
+    return x + metres * math.cos(heading), y + metres * math.sin(heading)
 
 
 def speed_tip(problem: Problem) -> tuple[float, float] | None:
@@ -78,10 +83,37 @@ def shown_states(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
     return shown
 
 
-def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[Floats, Floats]:
-    """Corners ``[n, 4, 2]`` of the bodies at ``states [T, S]``, and ends ``[m, 2, 2]`` of their tow bars."""
+def gears_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
+    """Whether each step ``[T - 1]`` of ``plan`` leads forwards (1) or backwards (-1).
+
+    A step in which ``vehicle`` stands counts to the gear before, or to the first one that follows.
+    """
+    speeds = plan.states[1:, 3] if vehicle.first_order else plan.states[:-1, 3] + plan.states[1:, 3]
+    gears = np.sign(np.where(np.abs(speeds) < _STANDING, 0.0, speeds)).astype(np.int32)
+    moving = np.flatnonzero(gears)
+    if len(moving) == 0:
+        return np.ones_like(gears)
+    last = np.searchsorted(moving, np.arange(len(gears)), side="right") - 1
+    return gears[moving[np.maximum(last, 0)]]
+
+
+def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
+    """The rows of the states at which ``vehicle`` changes gear on ``plan``."""
+    return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
+
+
+def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[list[Floats], Floats]:
+    """Convex polygons ``[n, 2]`` of the bodies at ``states [T, S]``, and ends ``[m, 2, 2]`` of tow bars.
+
+    The polygons come state by state, as many of each: the parts of the first body, then those of trailers.
+    """
     corners = footprints(states, vehicle)
-    bodies = corners.reshape(-1, 4, 2)
+    parts = [
+        part
+        for body, boxes in zip((vehicle, *trailers_of(vehicle)), corners.swapaxes(0, 1), strict=True)
+        for part in _parts(body.about.outline, body.rear, boxes)
+    ]
+    bodies = [part[i] for i in range(len(states)) for part in parts]
     trailers = trailers_of(vehicle)
     if not trailers:
         return bodies, np.empty((0, 2, 2))
@@ -92,3 +124,15 @@ def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[Floats, Floats]:
     lengths = np.array([trailer.hitch_length - trailer.front for trailer in trailers])
     hitches = fronts + lengths[:, np.newaxis] * along
     return bodies, np.stack([fronts, hitches], axis=2).reshape(-1, 2, 2)
+
+
+def _parts(outline: tuple[Corners, ...], rear: float, boxes: Floats) -> list[Floats]:
+    """The polygons ``[T, n, 2]`` of a body whose ``boxes [T, 4, 2]`` begin ``rear`` m behind its axle."""
+    along, across = boxes[:, 1] - boxes[:, 0], boxes[:, 3] - boxes[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    axle = 0.5 * (boxes[:, 0] + boxes[:, 3]) + rear * along
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return [
+        axle[:, np.newaxis] + np.stack([x * along + y * across for x, y in polygon], axis=1)
+        for polygon in outline
+    ] or [boxes]

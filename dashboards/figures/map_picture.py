@@ -35,8 +35,11 @@ def map_picture(
 ) -> Figure:
     """A figure of a map in its own frame, with its blocks and cuts, beside a window of each part.
 
-    ``world``: the map. ``cuts``: problems cut from it, by part. ``scale``: metres of the map in a metre of
-    these problems. ``vehicle``: that stands at their starts.
+    Args:
+        world: the map.
+        cuts: problems cut from it, by part.
+        scale: metres of the map in a metre of these problems.
+        vehicle: the vehicle that stands at their starts.
     """
     parts = [part for part in cuts if cuts[part]]
     figure = new_figure(7.4 + 3.0 * bool(parts), 7.2, f"Problems cut from {world.name}")

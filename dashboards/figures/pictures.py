@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Patch, Rectangle
 
+from dashboards.figures.manoeuvre_picture import draw_manoeuvre, manoeuvre_legend
 from dashboards.figures.style import legend_below, message_figure, new_figure
 from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
@@ -40,6 +41,7 @@ class Example(NamedTuple):
     caption: str
     vehicle: Vehicle = CAR
     collisions: bool = False  # mark every state in collision, not only the first
+    asked_only: bool = False  # nothing was attempted
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -54,15 +56,16 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     pieces = PolyCollection(problem.obstacles.pieces(), facecolor=OBSTACLE, edgecolor=OBSTACLE, linewidth=0.3)
     axes.add_collection(pieces)
     pieces.set_clip_path(frame)
-    goal = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8, zorder=2)
-    axes.add_patch(goal)
     asked = goal_state(problem, vehicle)
-    if asked is not None:
+    if asked is None:
+        disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
+        axes.add_patch(disc).set_zorder(2)
+    else:
         _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
     arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}
-    axes.annotate("", heading_tip(problem), problem.start[:2], arrowprops=arrow, zorder=6)
+    axes.annotate("", heading_tip(problem, vehicle), problem.start[:2], arrowprops=arrow, zorder=6)
     tip = speed_tip(problem)
     if tip is not None:
         speed = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.4}
@@ -84,7 +87,10 @@ def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, colour: str = GREE
 def draw_recalled(axes: Axes, recalled: CheckedPlan, collisions: bool = False) -> None:
     """Draw a ``recalled`` plan: wide and pale if it is free, else dashed to a cross where it first collides.
 
-    ``collisions``: whether every state in collision is marked.
+    Args:
+        axes: where to draw, in metres of the problem.
+        recalled: the plan, with each of its states checked.
+        collisions: whether every state in collision is marked.
     """
     way, first = recalled.plan.states[:, :2], recalled.first_blocked
     if first is None:  # wide and below: a rim around the answer where the recalled plan is the answer
@@ -104,14 +110,24 @@ def gallery(examples: Sequence[Example], title: str = "Recalled, repaired and fo
         return message_figure(title, "No problems to show: run the benchmark first.")
     columns = 2 if len(examples) == 4 else min(3, len(examples))
     rows = math.ceil(len(examples) / columns)
-    figure = new_figure(max(6.4, 3.8 * columns), 3.85 * rows + 0.9, title)
-    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    shares = [_height_share(example.problem) for example in examples]
+    tallest = [max(shares[i : i + columns]) for i in range(0, len(shares), columns)]  # of each row
+    figure = new_figure(max(6.4, 3.8 * columns), 3.85 * sum(tallest) + 0.9, title)
+    grid = figure.subplots(rows, columns, squeeze=False, gridspec_kw={"height_ratios": tallest}).ravel()
     for axes in grid[len(examples) :]:
         axes.set_axis_off()
     for axes, example in zip(grid, examples, strict=False):
         _draw_example(axes, example)
     legend_below(figure, _legend(examples, "recalled"), 5 if columns > 2 else 3)
     return figure
+
+
+def gallery_of_problems(
+    problems: Sequence[Problem], vehicle: Vehicle = CAR, title: str = "Problems"
+) -> Figure:
+    """A figure with a ``title`` of ``problems`` for a ``vehicle``, without plans."""
+    examples = [Example(problem, (), None, problem.id, vehicle, asked_only=True) for problem in problems]
+    return gallery(examples, title)
 
 
 def picture(
@@ -125,10 +141,17 @@ def picture(
 ) -> Figure:
     """A figure of one ``problem``; the other arguments are those of ``Example``.
 
-    ``called``: what the legend calls the ``recalled`` plans.
+    Args:
+        problem: canonical.
+        answer: the plan that was found; None if there is none.
+        caption: text above the picture.
+        recalled: plans that were recalled, best first.
+        vehicle: the vehicle that drives them.
+        called: what the legend calls the ``recalled`` plans.
+        collisions: whether every state in collision is marked.
     """
     example = Example(problem, recalled, answer, caption, vehicle, collisions)
-    figure = new_figure(6.4, 7.2, problem.id or "Problem")
+    figure = new_figure(6.4, 1.2 + 6.0 * _height_share(problem), problem.id or "Problem")
     _draw_example(figure.add_subplot(), example)
     legend_below(figure, _legend([example], called), 3)
     return figure
@@ -137,7 +160,7 @@ def picture(
 def _draw_bodies(axes: Axes, states: Floats, vehicle: Vehicle, **style: Any) -> None:
     """Draw every body at each of ``states [T, S]``, and the bars by which trailers are pulled."""
     bodies, bars = outlines(states, vehicle)
-    axes.add_collection(PolyCollection(list(bodies), **style))
+    axes.add_collection(PolyCollection(bodies, **style))
     if len(bars):
         line = {"color": style["edgecolor"], "linewidth": style["linewidth"], "zorder": style["zorder"]}
         axes.add_collection(LineCollection(list(bars), **line))
@@ -146,24 +169,56 @@ def _draw_bodies(axes: Axes, states: Floats, vehicle: Vehicle, **style: Any) -> 
 def _draw_example(axes: Axes, example: Example) -> None:
     draw_problem(axes, example.problem, example.vehicle)
     scene = scene_of(example.problem)
-    if example.answer is not None:
+    if example.answer is not None and _is_pose(example):
+        draw_manoeuvre(axes, example.answer, example.vehicle)
+    elif example.answer is not None:
         draw_plan(axes, example.answer, example.vehicle)
     for plan in example.recalled:
         draw_recalled(axes, checked(plan, scene, example.vehicle), example.collisions)
-    failed = example.answer is None
+    failed = example.answer is None and not example.asked_only
     title = f"{example.caption}, no plan found" if failed else example.caption
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
 
 
-def _legend(examples: Sequence[Example], called: str) -> list[Line2D]:
+def _is_pose(example: Example) -> bool:
+    """Whether the goal is a pose, and the drive a manoeuvre."""
+    return goal_state(example.problem, example.vehicle) is not None
+
+
+def _height_share(problem: Problem) -> float:
+    """How high the bounds are beside their width, as far as a picture of them should be."""
+    x_min, y_min, x_max, y_max = problem.bounds
+    return min(max((y_max - y_min) / (x_max - x_min), 0.35), 1.0)
+
+
+def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
     """What the examples show; recalled plans only if there are any."""
+    to_poses = [example for example in examples if _is_pose(example)]
+    to_places = [example for example in examples if not _is_pose(example)]
     spacings = {footprint_spacing_m(example.vehicle) for example in examples}
     every = f"{spacings.pop():.0f} m" if len(spacings) == 1 else "few metres"
-    handles = [
-        Line2D([], [], color=INK, marker=">", linestyle="none", label="start"),
-        Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
-               label="goal"),
-        Line2D([], [], color=GREEN, linewidth=1.8, label=f"plan found, with the vehicle every {every}"),
+    handles: list[Line2D | Patch] = [Line2D([], [], color=INK, marker=">", linestyle="none", label="start")]
+    if to_places:
+        handles += [
+            Line2D([], [], color=ORANGE, marker="o", markeredgecolor=INK, markersize=9, linestyle="none",
+                   label="goal"),
+        ]  # fmt: skip
+    if any(speed_tip(example.problem) is not None for example in examples):
+        label = "speed at the start: the way of a second"
+        handles.append(Line2D([], [], color=VERMILLION, linewidth=2.4, label=label))
+    if any(example.answer is not None for example in to_places):
+        label = f"plan found, with the vehicle every {every}"
+        handles.append(Line2D([], [], color=GREEN, linewidth=1.8, label=label))
+    if to_poses:
+        handles.append(
+            Line2D([], [], marker="s", markerfacecolor="none", markeredgecolor=ORANGE, markersize=8,
+                   linestyle="none", label="goal pose")
+        )  # fmt: skip
+    if any(example.answer is not None for example in to_poses):
+        handles += manoeuvre_legend()
+    if not any(example.recalled for example in examples):
+        return handles
+    handles += [
         Line2D([], [], color=SKY, linewidth=4.5, label=f"{called}, free"),
         Line2D([], [], color=VERMILLION, linewidth=1.3, linestyle="--", marker="X", markeredgecolor="white",
                markersize=8, label=f"{called}, collides at the cross"),
@@ -173,4 +228,4 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D]:
         handles.append(
             Line2D([], [], color=VERMILLION, marker="o", markersize=3, linestyle="none", label=label)
         )
-    return handles if any(example.recalled for example in examples) else handles[:3]
+    return handles

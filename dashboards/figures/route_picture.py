@@ -34,8 +34,13 @@ def route_picture(
 ) -> Figure:
     """A figure of a map in its own frame and a route over it.
 
-    ``world``: the map, metres. ``route``: in canonical metres, ``scale`` metres of the map each. ``goals``:
-    x, y in metres of the map. ``caption``: above the map. ``vehicle``: that drives the route.
+    Args:
+        world: the map, in metres.
+        route: the route, in canonical metres.
+        goals: x, y of each goal in metres of the map.
+        scale: metres of the map in a canonical metre.
+        caption: text above the map.
+        vehicle: the vehicle that drives the route.
     """
     width, height = _extent(world)
     figure = new_figure(_WIDTH, min(_WIDTH * height / width, _TALLEST) + 0.9, f"Route over {world.name}")
@@ -48,15 +53,14 @@ def route_picture(
     for leg in route.legs:
         states = leg.states(vehicle)
         points = _placed(world, scale * states[:, :2])
-        last = leg.turning + leg.driving
+        last = leg.driving
         for drawn, colour, linewidth, zorder in (
-            (points[: leg.turning + 1], INK, 1.6, 6),
-            (points[leg.turning : last + 1], COLOURS[leg.source], 2.6, 5),
+            (points[: last + 1], COLOURS[leg.source], 2.6, 5),
             (points[last:], INK, 1.6, 6),
         ):
             axes.plot(*drawn.T, color="white", linewidth=linewidth + 1.6, zorder=4)
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
-        axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=4.5, zorder=7)
+        axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=3.5, zorder=7)
         sources.append(leg.source)
     several = len(goals) > 1
     for number, goal in enumerate(goals, start=1):
@@ -80,7 +84,7 @@ def route_picture(
         Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
                markersize=10, label="goals in order" if several else "goal"),
         Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
-               label="brakes, stops, turns"),
+               label="brakes, or the next leg begins"),
         *(
             Line2D([], [], color=colour, linewidth=2.6, label=_legend_of(source, sources.count(source)))
             for source, colour in COLOURS.items()

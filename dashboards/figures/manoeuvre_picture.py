@@ -1,0 +1,73 @@
+"""How a drive to a pose is drawn: its gears in colour, where they change, and what its bodies sweep."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+
+from dashboards.palette import GREEN, INK, PURPLE, SKY
+from dashboards.world_outlines import cusps_of, gears_of, outlines
+from planners.world.arrays import Floats
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import CAR, Vehicle
+
+FORWARDS: Final = GREEN
+BACKWARDS: Final = PURPLE
+_SWEPT: Final = (SKY, 0.28)
+
+
+def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
+    """Draw the way of the reference point along ``plan``, its ``vehicle`` at changes of gear and the end."""
+    swept = PathPatch(_path_of(swept_by(plan.states, vehicle)), facecolor=_SWEPT, linewidth=0, zorder=2)
+    axes.add_patch(swept)
+    gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
+    steps = np.stack([plan.states[:-1, :2], plan.states[1:, :2]], axis=1)
+    for gear, colour in ((1, FORWARDS), (-1, BACKWARDS)):
+        driven = LineCollection(list(steps[gears == gear]), color=colour, linewidth=1.8, zorder=6.5)
+        axes.add_collection(driven)
+    for row in [*cusps, *[len(gears)] * (len(gears) > 0)]:
+        colour = FORWARDS if gears[row - 1] > 0 else BACKWARDS
+        bodies, _ = outlines(plan.states[row : row + 1], vehicle)
+        drawn = PolyCollection(bodies, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=3)
+        axes.add_collection(drawn)
+    axes.plot(
+        *plan.states[cusps, :2].T, linestyle="none", marker="o", markersize=4, color="white",
+        markeredgecolor=INK, markeredgewidth=1.0, zorder=7,
+    )  # fmt: skip
+
+
+def swept_by(states: Floats, vehicle: Vehicle = CAR) -> shapely.Geometry:
+    """The ground that the bodies of a ``vehicle`` sweep along ``states [T, S]``, in metres."""
+    bodies, _ = outlines(states, vehicle)
+    parts = len(bodies) // len(states)
+    after = bodies[parts:] + bodies[-parts:]  # the same part one state later; at the last there it stays
+    pairs = (np.concatenate(pair) for pair in zip(bodies, after, strict=True))
+    return shapely.union_all([shapely.MultiPoint(corners).convex_hull for corners in pairs])
+
+
+def _path_of(ground: shapely.Geometry) -> Path:
+    """Polygons with holes as a path of Matplotlib's."""
+    rings = [
+        np.asarray(ring.coords)
+        for polygon in shapely.get_parts(ground)
+        for ring in (shapely.get_exterior_ring(shapely.normalize(polygon)), *polygon.interiors)
+    ]
+    return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
+
+
+def manoeuvre_legend() -> list[Line2D | Patch]:
+    """What ``draw_manoeuvre`` draws."""
+    return [
+        Line2D([], [], color=FORWARDS, linewidth=1.8, label="forwards"),
+        Line2D([], [], color=BACKWARDS, linewidth=1.8, label="backwards"),
+        Line2D([], [], color="white", marker="o", markeredgecolor=INK, markersize=5, linestyle="none",
+               label="change of gear"),
+        Patch(facecolor=_SWEPT, label="swept by its bodies"),
+    ]  # fmt: skip
