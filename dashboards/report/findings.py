@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from dashboards.cells import planner_title
+from dashboards.cells import duration, planner_title
+from dashboards.statistics.headline import used_by_default
 from dashboards.statistics.panels import COMBINED
 
-_PREFERRED: Final = ("repair", "open", "closed", "published-open")  # the first that was measured counts
 Row = Mapping[Any, Any]  # of a summary
-_EQUAL: Final = 1.05  # times faster or slower: less is called the same
+_SAME_S: Final = 0.05  # arrivals that differ by less are called the same: they are written to 0.1 s
 
 
 class Finding(NamedTuple):
@@ -35,7 +36,7 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
     found = []
     for panel, rows in summary.groupby("panel", sort=False):
         alone = _by_planner(rows[rows["assist"] == "none"])
-        helped = _by_planner(_used_by_default(rows))
+        helped = _by_planner(used_by_default(rows))
         compared = sorted(alone.keys() & helped.keys(), key=lambda each: (_arrives_s(alone[each]), each))
         if not compared:
             continue
@@ -44,11 +45,11 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
         before, now = alone[first], helped[first]
         sentences = [
             f"With {memory}, {planner_title(first)}, the strongest planner here, has its plan in "
-            f"{duration(now['mean_ms'])} instead of {duration(before['mean_ms'])} ({_times(before, now)}), "
+            f"{duration(now['mean_ms'])} instead of {duration(before['mean_ms'])} ({_planning(now)}), "
             f"and its robot {_arrival(now)}."
         ]
         sentences += [
-            f"{planner_title(planner)}: {_times(alone[planner], helped[planner])}, its robot "
+            f"{planner_title(planner)}: {_planning(helped[planner])}, and its robot "
             f"{_arrival(helped[planner])}."
             for planner in others
         ]
@@ -65,27 +66,14 @@ def findings_markdown(summary: pd.DataFrame) -> str:
     return "\n\n".join(f"## {each.panel}\n\n{each.text}" for each in findings(summary))
 
 
-def duration(milliseconds: float) -> str:
-    """A duration with two digits that count and a unit that suits it: 43 µs, 0.54 ms, 1.2 s."""
-    if math.isnan(milliseconds):
-        return "–"
-    for unit, size in (("s", 1e3), ("ms", 0.1)):
-        if milliseconds >= size:
-            value = milliseconds / (1e3 if unit == "s" else 1.0)
-            return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f} {unit}"
-    return f"{1e3 * milliseconds:.0f} µs"
+def for_pages(found: Sequence[Finding]) -> list[Finding]:
+    """What was ``found``, with no line that ends between a number and its unit."""
+    unit = re.compile(r"(?<=\d) (?=(?:s|ms|µs|%)(?![a-z]))")
+    return [each._replace(text=unit.sub("\N{NO-BREAK SPACE}", each.text)) for each in found]
 
 
 def _by_planner(rows: pd.DataFrame) -> dict[str, Row]:
     return {row["planner"]: row for row in rows.to_dict("records")}
-
-
-def _used_by_default(rows: pd.DataFrame) -> pd.DataFrame:
-    """Of each planner the row of a memory used as by default."""
-    used = rows[rows["assist"].isin(_PREFERRED) & (rows["recall"] != "random")]
-    order = used["assist"].map(_PREFERRED.index)
-    ordered = used.assign(order=order).sort_values(["order", "top_k"], ascending=[True, False])
-    return ordered.drop_duplicates("planner")
 
 
 def _arrives_s(row: Row) -> float:
@@ -94,11 +82,16 @@ def _arrives_s(row: Row) -> float:
     return math.inf if math.isnan(total) else float(total)
 
 
-def _times(alone: Row, helped: Row) -> str:
-    ratio = alone["mean_ms"] / helped["mean_ms"]
-    if 1.0 / _EQUAL < ratio < _EQUAL:
-        return "as fast"
-    return f"{ratio:.1f} times faster" if ratio > 1.0 else f"{1.0 / ratio:.1f} times slower"
+def _planning(row: Row) -> str:
+    """What planning takes, against the same planner alone on the same problems: the figures of the tables."""
+    less, low, high = (100.0 * row[name] for name in ("reduction", "reduction_low", "reduction_high"))
+    if math.isnan(less):
+        return "planning times were not compared"
+    if low > 0.0:
+        return f"{less:.0f} % less planning time, 95 %: {low:.0f} to {high:.0f} %"
+    if high < 0.0:
+        return f"{-less:.0f} % more planning time, 95 %: {-high:.0f} to {-low:.0f} %"
+    return f"no difference in planning time is shown, 95 %: {low:+.0f} to {high:+.0f} % less"
 
 
 def _arrival(row: Row) -> str:
@@ -106,6 +99,8 @@ def _arrival(row: Row) -> str:
     low, high = row["sooner_low_s"], row["sooner_high_s"]
     if math.isnan(row["sooner_s"]):
         return "was not compared on the road"
+    if abs(row["sooner_s"]) < _SAME_S:
+        return f"arrives at the same time (95 %: {low:+.2f} to {high:+.2f} s sooner)"
     if low > 0.0:
         return f"arrives {row['sooner_s']:.1f} s sooner (95 %: {low:.2f} to {high:.2f} s)"
     if high < 0.0:

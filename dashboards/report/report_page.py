@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from dashboards.cells import NAMES
 from dashboards.palette import style_sheet
-from dashboards.report.findings import findings
+from dashboards.report.findings import findings, for_pages
 from dashboards.report.tables import (
     FULL_HEADINGS,
     RETRIEVAL_HEADINGS,
@@ -74,12 +74,19 @@ def page(
 ) -> str:
     """The page as HTML, for light and dark screens from 390 pixels on. It loads nothing and runs nothing.
 
-    ``title``, ``introduction``: its first texts. ``summary``: of ``panels.summarise``. ``retrieval``: of
-    ``retrieval_rates.summarise_retrieval``. ``endings``: of ``distributions.endings``. ``claims``,
-    ``pictures``: in the order of the page. ``others``: the claims as a run by the other method decides them;
-    empty if there is no such run. ``made``: names and values of what made the run, by title.
+    Args:
+        title: the heading of the page.
+        introduction: the text below the heading.
+        summary: table of ``panels.summarise``.
+        retrieval: table of ``retrieval_rates.summarise_retrieval``.
+        endings: table of ``distributions.endings``.
+        claims: the claims, in the order of the page.
+        others: the claims as a run by the other method decides them; empty if there is no such run.
+        pictures: the pictures, in the order of the page.
+        made: names and values of what made the run, by title.
 
-    Raises OSError if a picture cannot be read.
+    Raises:
+        OSError: a picture cannot be read.
     """
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
@@ -95,7 +102,7 @@ def page(
         introduction=introduction,
         words=NAMES,
         keys=("configuration", "class"),  # which stay in sight when a table is scrolled
-        findings=findings(summary),
+        findings=for_pages(findings(summary)),
         claims=judged,
         kinds=_KINDS,
         verdicts=[_counted(each) for each in (claims, others) if each],

@@ -32,7 +32,7 @@ _HEADINGS: Final = (
     "sooner [95 %]",
 )  # fmt: skip
 SOURCES: Final = ("recalled", "repaired", "searched")
-_UNITS: Final = "planning in ms; solved, slower, hits (+ repaired) in %; drives, sooner there in s"
+_UNITS: Final = "planning in ms, drives and sooner in s, the rest in %"
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
@@ -113,7 +113,9 @@ def experience_table(rows: pd.DataFrame) -> CellTable:
 def claims_markdown(claims: Sequence[Claim], others: Sequence[Claim] = ()) -> str:
     """The ``claims`` of the paper and their verdicts, as a Markdown list.
 
-    ``others``: the same claims, judged by the other method, if that was measured too.
+    Args:
+        claims: claims, judged by the method of the run.
+        others: the same claims, judged by the other method, if that was measured too.
     """
     lines = []
     for claim, *other in zip(claims, *([others] if others else []), strict=True):
@@ -134,8 +136,11 @@ def titled_rows(
     """Of each panel in ``summary`` a title, and a group of rows of cells for each planner.
 
     Every planner appears in every panel with every configuration that any panel has for it, so that one sees
-    what was not attempted. ``cells``: gives the cells after the names, from a row of ``summary`` and the
-    number of decimals of times.
+    what was not attempted.
+
+    Args:
+        summary: a table of ``panels.summarise``.
+        cells: gives the cells after the names, from a row of ``summary`` and the number of decimals of times.
     """
     titled = []
     for panel in summary["panel"].unique():
@@ -158,7 +163,9 @@ def titled_rows(
 def full_cells(row: Row, decimals: int) -> list[str]:
     """All figures of a ``row`` of a summary, as in ``FULL_HEADINGS`` after the two names.
 
-    ``decimals``: of times.
+    Args:
+        row: a row of a summary.
+        decimals: how many decimals times have.
     """
 
     def time(name: str) -> str:
@@ -191,7 +198,9 @@ def reduction_cell(row: Row, decimals: int = 1) -> str:
 def driving_cells(row: Row, decimals: int = 1) -> list[str]:
     """Mean driving time in a ``row`` of a summary, and how much sooner the robot is there with its interval.
 
-    ``decimals``: of the latter.
+    Args:
+        row: a row of a summary.
+        decimals: how many decimals the gain in seconds has.
     """
     if math.isnan(row["driving_s"]):
         return [NOTHING, NOTHING]

@@ -16,12 +16,14 @@ K: Final = 5
 def experience_rows(recalls: pd.DataFrame) -> pd.DataFrame:
     """How often one of the first five plans is free, a row a class.
 
-    ``recalls``: rows of one number of experiences, of which those of fresh problems ranked by the encoder
-    count.
+    Args:
+        recalls: rows of one number of experiences, of which those of fresh problems ranked by the encoder
+            count.
 
-    Returns ``panel, plans, problems, seeds, hit, low, high, oracle``: ``hit`` is the share of problems with a
-    free plan among the first five, the mean over training seeds, ``low`` and ``high`` are the ends of its 95
-    % interval over problems, ``oracle`` is the share with any free plan.
+    Returns:
+        ``panel, plans, problems, seeds, hit, low, high, oracle``: ``hit`` is the share of problems with a
+        free plan among the first five, the mean over training seeds, ``low`` and ``high`` are the ends of its
+        95 % interval over problems, ``oracle`` is the share with any free plan.
     """
     rows = []
     fresh = recalls[(recalls["recall"] == "encoder") & (recalls["protocol"] == "fresh")]

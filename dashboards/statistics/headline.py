@@ -1,35 +1,62 @@
 """The few figures that tell runs apart at a glance: means over all planners and classes of a run.
 
 They have the same names in every run, so that a table of runs, such as MLflow's, can put them side by side.
-Times are relative, because the seconds of two machines cannot be compared.
+There are some thirty; all others are in the rows of each class, planner and configuration. Times of planning
+are relative, because the seconds of two machines cannot be compared.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final
 
+import numpy as np
 import pandas as pd
 
 from dashboards.statistics.panels import COMBINED
+
+_PREFERRED: Final = ("repair", "open", "closed", "published-open")  # the first that was measured counts
+
+
+def used_by_default(rows: pd.DataFrame) -> pd.DataFrame:
+    """Of each panel and planner in ``rows`` of a summary the row of a memory used as by default."""
+    used = rows[rows["assist"].isin(_PREFERRED) & (rows["recall"] != "random")]
+    order = used["assist"].map(_PREFERRED.index)
+    ordered = used.assign(order=order).sort_values(["order", "top_k"], ascending=[True, False], kind="stable")
+    return ordered.drop_duplicates(["panel", "planner"])
+
+
+def times_faster(own: pd.DataFrame) -> float:
+    """How many times faster planning is with a memory used as by default: geometric mean over rows."""
+    helped = used_by_default(own).set_index(["panel", "planner"])
+    alone = own[own["assist"] == "none"].set_index(["panel", "planner"]).loc[helped.index]
+    return math.exp(np.log(alone["mean_ms"] / helped["mean_ms"]).mean())
 
 
 def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]:
     """The headline figures of a run, each class with its own memory.
 
-    ``summary``: from ``panels.summarise``. ``retrieval``: from ``retrieval_rates.summarise_retrieval``.
+    Returns, with a memory used as by default: ``times_faster`` (geometric mean), ``sooner_s``, ``solved``,
+    ``recalled``, ``repaired``, ``slower``, ``driving_s`` and ``collision_checks``; without a memory
+    ``alone/solved``, ``alone/driving_s`` and ``alone/collision_checks``; of all configurations
+    ``reduction/<configuration>``, shares of the mean planning time, and ``reduction``, the mean of those with
+    a memory; and the figures of ``headline_retrieval``. Figures that were not measured are left out.
 
-    Returns shares by name: ``reduction/<configuration>`` of the mean planning time,
-    ``solved/<configuration>``,
-    ``hits/<configuration>``; ``reduction``, the mean over all configurations with a memory; and the figures
-    of
-    ``headline_retrieval``. Figures that were not measured are left out.
+    Args:
+        summary: table of ``panels.summarise``.
+        retrieval: table of ``retrieval_rates.summarise_retrieval``.
     """
-    figures: dict[str, float] = {}
     own = summary[summary["panel"] != COMBINED]
-    for configuration, rows in own.groupby("configuration", sort=False):
-        name = str(configuration).replace(" ", "-")
-        for figure, column in (("solved", "solved"), ("reduction", "reduction"), ("hits", "recalled")):
-            figures[f"{figure}/{name}"] = rows[column].mean()
+    helped = used_by_default(own).set_index(["panel", "planner"])
+    alone = own[own["assist"] == "none"].set_index(["panel", "planner"]).loc[helped.index]
+    figures = {name: helped[name].mean() for name in ("sooner_s", "solved", "recalled", "repaired", "slower")}
+    figures["times_faster"] = times_faster(own)
+    for prefix, rows in (("", helped), ("alone/", alone)):
+        for name in ("driving_s", "collision_checks"):
+            figures[prefix + name] = rows[name].mean()
+    figures["alone/solved"] = alone["solved"].mean()
+    for configuration, rows in own[own["assist"] != "none"].groupby("configuration", sort=False):
+        figures[f"reduction/{str(configuration).replace(' ', '-')}"] = rows["reduction"].mean()
     with_memory = own[(own["recall"] != "") & (own["recall"] != "random")]
     figures["reduction"] = with_memory["reduction"].mean()
     return _measured(figures) | headline_retrieval(retrieval)

@@ -29,9 +29,12 @@ def bootstrap(
 ) -> Resampled:
     """Resample problems. A resample draws the same problems for all columns, so hard ones fall on all alike.
 
-    ``values [n, C]``: of n problems, NaN where not attempted. ``baseline [n, C]``: what each column is
-    compared with, in the same unit. ``seed``, ``resamples``: of the drawing, and how often.
-    ``interquartile``: whether interquartile means are wanted, which take longest.
+    Args:
+        values: ``[n, C]``, of n problems, NaN where not attempted.
+        baseline: ``[n, C]``, what each column is compared with, in the same unit.
+        seed: seed of the drawing.
+        resamples: how often the problems are drawn.
+        interquartile: whether interquartile means are wanted, which take longest.
     """
     there = ~np.isnan(values)
     both = there & ~np.isnan(baseline)
@@ -88,8 +91,11 @@ def quantile_interval(values: Floats, share: float) -> tuple[float, float]:
     """Ends of the bootstrap interval of a quantile of ``values [n]``, as infinitely many resamples give it.
 
     The k-th smallest of n draws is at most the j-th smallest value if at least k draws are among the first j.
-    That is a binomial law, so nothing need be drawn. ``share``: which quantile, 0 to 1. NaN values are left
-    out.
+    That is a binomial law, so nothing need be drawn.
+
+    Args:
+        values: ``[n]``; NaN values are left out.
+        share: which quantile, 0 to 1.
     """
     ranked = np.sort(values[~np.isnan(values)])
     n = len(ranked)

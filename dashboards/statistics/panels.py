@@ -103,15 +103,19 @@ def panels(attempts: pd.DataFrame) -> Iterator[Panel]:
 def summarise(attempts: pd.DataFrame, seed: int = 0, resamples: int = RESAMPLES) -> pd.DataFrame:
     """Summarise ``attempts``: a row a panel, planner and configuration, in reading order.
 
-    ``seed``, ``resamples``: of the bootstrap.
+    Args:
+        attempts: rows of attempts, as ``storage.tables.attempts`` reads them.
+        seed: seed of the bootstrap.
+        resamples: how often the bootstrap draws the problems anew.
 
-    Returns the columns of ``COLUMNS``. Times are milliseconds, ``_low`` and ``_high`` the ends of bootstrap
-    95 % intervals, shares and reductions fractions. ``reduction`` is that of the mean planning time against
-    the same planner without memory, on the problems that both attempted (NaN if there are none). ``slower``,
-    ``slowdown`` and ``p_value`` are those of ``sign_tests.Signs``, the last corrected for all comparisons of
-    the table (Holm). ``driving_s`` is the mean driving time of the plans. ``sooner_s`` says how much sooner
-    the robot is there than by the same planner without memory, planning and driving counted, on the problems
-    that both solved.
+    Returns:
+        the columns of ``COLUMNS``. Times are milliseconds, ``_low`` and ``_high`` the ends of bootstrap 95 %
+        intervals, shares and reductions fractions. ``reduction`` is that of the mean planning time against
+        the same planner without memory, on the problems that both attempted (NaN if there are none).
+        ``slower``, ``slowdown`` and ``p_value`` are those of ``sign_tests.Signs``, the last corrected for all
+        comparisons of the table (Holm). ``driving_s`` is the mean driving time of the plans. ``sooner_s``
+        says how much sooner the robot is there than by the same planner without memory, planning and driving
+        counted, on the problems that both solved.
     """
     tables = [_summarise(panel, seed, resamples) for panel in panels(attempts)]
     if not tables:
@@ -139,11 +143,17 @@ def compare(
 ) -> pd.DataFrame:
     """How much less of ``column``, a column of ``attempts``, the second configuration of each pair needs.
 
-    ``pairs``: configurations, the first of a pair is what the second is compared with. ``seed``,
-    ``resamples``: of the bootstrap.
+    Args:
+        attempts: rows of attempts, as ``storage.tables.attempts`` reads them.
+        pairs: configurations, the first of a pair is what the second is compared with.
+        column: name of the column to compare.
+        seed: seed of the bootstrap.
+        resamples: how often the bootstrap draws the problems anew.
 
-    Returns a row a panel, planner and pair of which both were attempted: ``panel, planner, before, after``
-    (labels), ``reduction`` of the mean on the same problems as a fraction, ``reduction_low, reduction_high``.
+    Returns:
+        a row a panel, planner and pair of which both were attempted: ``panel, planner, before, after``
+        (labels), ``reduction`` of the mean on the same problems as a fraction, ``reduction_low,
+        reduction_high``.
     """
     tables = []
     for panel in panels(attempts):

@@ -68,7 +68,10 @@ def summarise_retrieval(curve: pd.DataFrame) -> pd.DataFrame:
 def random_hit(free: Floats, plans: Floats, max_k: int) -> Floats:
     """Chances ``[n, max_k]`` that k of N plans, drawn without replacement, hold one of the F free ones.
 
-    ``free [n]``: F of each problem. ``plans [n]``: N. By the hypergeometric law 1 - C(N - F, k) / C(N, k).
+    Args:
+        free: ``[n]``, F of each problem.
+        plans: ``[n]``, N of each problem.
+        max_k: the largest k.
     """
     taken = np.arange(max_k)
     blocked = np.maximum(plans[:, None] - free[:, None] - taken, 0.0)

@@ -46,7 +46,11 @@ class Statement(NamedTuple):
 def decided(text: str, where: str, rule: str, statements: list[Statement]) -> Claim:
     """Decide a claim by its ``statements``, all of which must hold.
 
-    ``text``, ``where``, ``rule``: as in ``Claim``.
+    Args:
+        text: as in ``Claim``.
+        where: as in ``Claim``.
+        rule: as in ``Claim``.
+        statements: what has to hold for the claim to be confirmed.
     """
     together = sum(statement.estimate is not None for statement in statements)
     truths = [statement.holds(together) for statement in statements]

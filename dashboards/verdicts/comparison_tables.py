@@ -21,9 +21,10 @@ _SHARED: Final = ("planner", "configuration", "ms", "sooner s", "solved %")
 HEADINGS: Final = (*_SHARED, "fewer checks %", "recalled %", "verdict")
 HEADINGS_IN_TURN: Final = (*_SHARED, "less time %", "mostly %", "verdict")
 BY_COUNTS: Final = (
-    "These runs were not measured in turn, so their times say as much of the machine as of the runs: they "
-    "are shown, but not judged. What is judged is problems solved, then seconds of driving, then checks, "
-    "expansions and plans recalled. `compare --measure` measures the memories of both in turn."
+    "These runs were measured one after the other, so a difference in their times may come from how busy "
+    "the machine was: times are shown, but not judged. What is judged is problems solved, then seconds of "
+    "driving, then checks, expansions and plans recalled. `compare --measure` measures the memories of both "
+    "in turn."
 )
 IN_TURN: Final = (
     "The memories of both were measured in turn, in an order that was drawn. What is judged is problems "

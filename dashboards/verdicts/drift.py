@@ -115,8 +115,10 @@ def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
 def usefulness_of(hits: int, planning: Floats, driving: Floats) -> Usefulness:
     """How useful a memory was in ``n`` problems.
 
-    ``hits``: problems that a recalled plan answered. ``planning [n]``: seconds. ``driving [n]``: seconds, NaN
-    where no plan was found.
+    Args:
+        hits: problems that a recalled plan answered.
+        planning: ``[n]``, seconds.
+        driving: ``[n]``, seconds, NaN where no plan was found.
     """
     total = (planning + driving)[~np.isnan(driving)]
     return Usefulness(

@@ -139,9 +139,14 @@ class Evidence:
     def origin_hits(self, class_name: str, memory: str, first: int) -> Estimate | None:
         """How often the plan that a held-out problem was made for is among the ``first`` ones recalled.
 
-        ``class_name``: of the problems. ``memory``: that recalls, as its encoder ranks the plans; by the
-        paper's method that is by nearest centroids. Returns the mean share over training seeds; its interval
-        (Wilson) is that of as many problems.
+        Args:
+            class_name: class of the problems.
+            memory: name of the memory; its encoder ranks the plans, by the paper's method through the nearest
+                centroids.
+            first: how many recalled plans count.
+
+        Returns:
+            the mean share over training seeds; its interval (Wilson) is that of as many problems.
         """
         rows = self._recalls
         rows = rows[(rows["class"] == class_name) & (rows["memory"] == memory)]

@@ -57,10 +57,13 @@ class Judgement(NamedTuple):
 def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Judgement:
     """Apply the rule to attempt rows of ``champion`` and ``challenger``, each with one memory.
 
-    ``seed``: of the bootstrap.
+    Args:
+        champion: attempt rows of the champion.
+        challenger: attempt rows of the challenger.
+        seed: seed of the bootstrap.
 
-    Raises ValueError if the rows are not of the same problems in the same configurations, or if there are
-    none.
+    Raises:
+        ValueError: the rows are not of the same problems in the same configurations, or there are none.
     """
     sides = [list(panels(rows.assign(memory="own"))) for rows in (champion, challenger)]
     if not sides[0] or _attempted(champion) != _attempted(challenger):

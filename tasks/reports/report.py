@@ -43,6 +43,7 @@ from storage.places.run_folder import RunFolder
 from storage.tables.attempts import distinct_values, read_attempts
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import Chunk, run_folder
+from tasks.inputs.shortfalls import shortfalls
 from tasks.reports.report_details import page_of
 from tasks.reports.stage_times import stage_cells, stages_of
 from tasks.settings.recorded_settings import recorded_settings
@@ -56,7 +57,7 @@ NOT_NEEDED: Final = (
 )  # fmt: skip
 MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared by their experiences
     "experiences", "preset", "classes", "worlds", "planners", "assists", "test_problems", "combined",
-    "strict", "candidates", "continual",
+    "strict", "candidates", "continual", "left_out",
 )  # fmt: skip
 ALIKE: Final = ("classes", "worlds", "difficulty", "seed", "vehicle")  # of runs by the two methods
 MEASURED_ON: Final = ["problem_class", "planner"]
@@ -87,7 +88,9 @@ def report_run(data: str, settings: RunSettings) -> Report:
     report = Report(summary, report_retrieval(data, settings), judged, claims_by_other(data, settings))
     _write(run.summary("csv"), as_csv(summary))
     judgement = claims_markdown(report.claims, report.others)
+    short = shortfalls(data, settings)
     texts = [
+        "\n".join(map(str, short)),
         findings_markdown(summary),
         summary_markdown(summary),
         retrieval_markdown(report.retrieval),
@@ -108,7 +111,7 @@ def report_run(data: str, settings: RunSettings) -> Report:
     for name, figure in figures.items():
         save(figure, run.figures, name)
     made_by = {name: distinct_values(run.results, name) for name in ("host", "commit")}
-    _write(run.report, page_of(run, settings, attempts, *report, made_by))
+    _write(run.report, page_of(run, settings, attempts, *report, made_by, short))
     return report
 
 

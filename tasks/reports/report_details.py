@@ -10,11 +10,13 @@ from typing import Final
 
 import pandas as pd
 
+from dashboards.cells import planner_title
 from dashboards.report.report_page import Picture, page
 from dashboards.statistics.distributions import endings
 from dashboards.verdicts.claim_rules import Claim
 from storage.places.mirror import fetch, files_in
 from storage.places.run_folder import RunFolder
+from tasks.inputs.shortfalls import Shortfall
 from tasks.reports.stage_times import stage_cells, stages_of
 from tasks.settings.run_settings import RunSettings
 
@@ -40,6 +42,7 @@ def page_of(
     claims: Sequence[Claim],
     others: Sequence[Claim],
     made_by: Mapping[str, Sequence[str]],
+    short: Sequence[Shortfall],
 ) -> str:
     """The page of a run as HTML: its tables, the figures in its folder, and where its rows come from.
 
@@ -52,12 +55,14 @@ def page_of(
         claims: the paper's claims, with a verdict each.
         others: the same by the other method; empty if that was not measured.
         made_by: "host" and "commit", and all that the rows say of them.
+        short: classes with fewer experiences than wanted.
     """
     problems = attempts["problem_id"].nunique()
     return page(
         f"Motion Memory: {settings.run_name}",
         f"{len(attempts):,} attempts at {problems:,} unseen problems of {', '.join(settings.class_names)}: "
-        f"{', '.join(settings.planners)} without memory and with {settings.experiences} experiences a class.",
+        f"{', '.join(map(planner_title, settings.planners))} without memory and with {settings.experiences} "
+        "experiences a class." + "".join(f" {each}" for each in short),
         summary=summary,
         retrieval=retrieval,
         endings=endings(attempts),

@@ -6,20 +6,26 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dashboards.report.findings import duration, findings
 
 
-def _summary(sooner: tuple[float, float, float], mean_ms: float) -> pd.DataFrame:
+def _summary(
+    sooner: tuple[float, float, float], reduction: tuple[float, float, float] = (0.5, 0.4, 0.6)
+) -> pd.DataFrame:
     alone = {
         "panel": "trap", "planner": "gust", "assist": "none", "recall": "", "top_k": 0, "problems": 50,
         "solved": 1.0, "mean_ms": 1.0, "driving_s": 20.0, "sooner_s": 0.0, "sooner_low_s": 0.0,
-        "sooner_high_s": 0.0, "recalled": 0.0, "repaired": 0.0,
+        "sooner_high_s": 0.0, "recalled": 0.0, "repaired": 0.0, "reduction": 0.0, "reduction_low": 0.0,
+        "reduction_high": 0.0,
     }  # fmt: skip
     value, low, high = sooner
+    less = dict(zip(("reduction", "reduction_low", "reduction_high"), reduction, strict=True))
     helped: dict[str, Any] = alone | {
-        "assist": "repair", "recall": "exhaustive", "top_k": 5, "mean_ms": mean_ms, "recalled": 0.9,
-        "sooner_s": value, "sooner_low_s": low, "sooner_high_s": high,
+        "assist": "repair", "recall": "exhaustive", "top_k": 5, "mean_ms": 1.0 - less["reduction"],
+        "recalled": 0.9, "sooner_s": value, "sooner_low_s": low, "sooner_high_s": high, **less,
     }  # fmt: skip
     lucky = helped | {"assist": "open", "mean_ms": 0.01, "sooner_s": 9.0, "sooner_low_s": 9.0}
     slow = alone | {"planner": "rrt", "driving_s": 40.0}
@@ -27,25 +33,36 @@ def _summary(sooner: tuple[float, float, float], mean_ms: float) -> pd.DataFrame
 
 
 @pytest.mark.parametrize(
-    ("sooner", "mean_ms", "told"),
+    ("sooner", "reduction", "told"),
     [
-        ((2.0, 1.5, 2.5), 0.25, ("4.0 times faster", "2.0 s sooner")),
-        ((-0.4, -0.5, -0.3), 2.0, ("2.0 times slower", "0.4 s later")),
-        ((0.1, -0.1, 0.3), 1.01, ("as fast", "at the same time")),
+        ((2.0, 1.5, 2.5), (0.75, 0.7, 0.8), ("75 % less", "70 to 80 %", "2.0 s sooner")),
+        ((-0.4, -0.5, -0.3), (-1.0, -1.2, -0.9), ("100 % more", "90 to 120 %", "0.4 s later")),
+        ((0.1, -0.1, 0.3), (0.58, -0.28, 0.87), ("no difference", "-28 to +87 %", "at the same time")),
     ],
 )
 def test_gains_and_losses_are_told_alike(
-    sooner: tuple[float, float, float], mean_ms: float, told: tuple[str, str]
+    sooner: tuple[float, float, float], reduction: tuple[float, float, float], told: tuple[str, ...]
 ) -> None:
-    (finding,) = findings(_summary(sooner, mean_ms))
+    (finding,) = findings(_summary(sooner, reduction))
     first = finding.text.partition(" RRT:")[0]
     assert first.startswith("With this memory, GUST")  # the strongest alone, not the one that gains most
     assert all(words in first for words in told)
     assert "9.0 s" not in finding.text  # of the way that is not the default
 
 
+@given(st.lists(st.floats(-3.0, 0.99), min_size=3, max_size=3, unique=True).map(sorted))
+def test_a_gain_in_planning_is_claimed_only_where_its_interval_shows_one(ends: list[float]) -> None:
+    low, less, high = ends
+    (finding,) = findings(_summary((2.0, 1.5, 2.5), (less, low, high)))
+    first = finding.text.partition(" RRT:")[0]
+    assert ("less planning time" in first) == (low > 0.0)
+    assert ("more planning time" in first) == (high < 0.0)
+    assert ("no difference" in first) == (low <= 0.0 <= high)
+    assert all(f"{abs(100.0 * end):.0f}" in first.partition("95 %: ")[2] for end in (low, high))
+
+
 def test_without_a_memory_nothing_is_claimed() -> None:
-    summary = _summary((1.0, 1.0, 1.0), 1.0)
+    summary = _summary((1.0, 1.0, 1.0))
     assert findings(summary[summary["assist"] == "none"]) == []
 
 

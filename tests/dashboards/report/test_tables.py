@@ -52,6 +52,14 @@ def test_the_table_holds_every_planner_configuration_and_class() -> None:
     }
 
 
+def test_no_column_is_cut_however_narrow_the_output() -> None:
+    cells = ["lattice", *(f"{i}2345.678 [1{i}.5, 2{i}.5]" for i in range(8)), "worse: for many reasons " * 4]
+    headings = ("planner", *(f"heading {i}" for i in range(8)), "verdict")
+    text = " ".join(rendered(CellTable("Wide", headings, [[cells]])))
+    assert all(cell in text for cell in (*headings, *cells[:-1]))
+    assert "…" not in text
+
+
 @pytest.mark.parametrize("plans", [1, 4, 30])
 def test_no_share_of_the_retrieval_table_exceeds_all_however_few_the_plans(plans: int) -> None:
     text = retrieval_markdown(summarise_retrieval(retrieval_curve(recalls(("trap",), plans=plans))))

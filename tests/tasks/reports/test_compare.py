@@ -67,7 +67,7 @@ def test_runs_are_compared_and_what_differs_is_said(runs: list[Path], tmp_path: 
     (closed,) = [row for row in found["runs"]["two"] if row["configuration"] == "closed 5 encoder"]
     assert closed["reduction"] == pytest.approx(0.5)
     assert (closed["verdict"], closed["reduction_low"]) == ("no difference", None)  # times of two days
-    assert "not measured in turn" in (tmp_path / "c.md").read_text()
+    assert "one after the other" in (tmp_path / "c.md").read_text()
     with (tmp_path / "c.csv").open(newline="") as text:
         assert [(row["run"], row["first"]) for row in csv.DictReader(text)] == [("two", "one")] * 2
 
