@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -23,6 +24,11 @@ PLANNING_TIME: Final = (
     "problem at a time, one thread, compiled code warm. Failures count with the time they took."
 )
 _PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow", "lattice": "Lattice"}
+
+_NUMBER: Final = r"[+-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?"
+_COUNT: Final = re.compile(rf"({_NUMBER})(?: ([kMG]))?")
+_INTERVAL: Final = re.compile(rf"({_NUMBER}) \[ *({_NUMBER}), *({_NUMBER})\]")
+_SIZES: Final = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 
 Rows = list[list[str]]
 
@@ -64,12 +70,45 @@ def count(value: float) -> str:
     return f"{value:.0f}"
 
 
+def duration(milliseconds: float) -> str:
+    """A duration with two digits that count and a unit that suits it: 43 µs, 0.54 ms, 1.2 s."""
+    if math.isnan(milliseconds):
+        return NOTHING
+    for unit, size in (("s", 1e3), ("ms", 0.1)):
+        if milliseconds >= size:
+            value = milliseconds / (1e3 if unit == "s" else 1.0)
+            return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f} {unit}"
+    return f"{1e3 * milliseconds:.0f} µs"
+
+
 def with_interval(value: float, low: float, high: float, decimals: int = 0) -> str:
     """A fraction and its interval from ``low`` to ``high`` in per cent; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
     ends = (f"{100.0 * end:{4 + decimals}.{decimals}f}" for end in (low, high))  # which align in a column
     return f"{100.0 * value:.{decimals}f} [{', '.join(ends)}]"
+
+
+def value_of(cell: str) -> Any:
+    """What a ``cell`` says, for programs: the functions above, backwards.
+
+    Returns:
+        a number; an object of ``value``, ``low`` and ``high`` for a number with its interval; None for a
+        dash; else the cell itself.
+    """
+    if cell == NOTHING:
+        return None
+    if found := _COUNT.fullmatch(cell):
+        return _number(found[1], found[2] or "")
+    if found := _INTERVAL.fullmatch(cell):
+        return {name: _number(found[i]) for i, name in enumerate(("value", "low", "high"), 1)}
+    return cell
+
+
+def _number(digits: str, unit: str = "") -> int | float:
+    digits = digits.replace(",", "")
+    whole = not unit and digits.lstrip("+-").isdigit()
+    return int(digits) if whole else float(digits) * _SIZES[unit]
 
 
 @dataclass(frozen=True)

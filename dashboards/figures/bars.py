@@ -31,8 +31,9 @@ _CONTROLS_NOTE: Final = (
 def planning_times(summary: pd.DataFrame) -> Figure:
     """The paper's panels: a row a planner, a column a class (and the combined memory), five bars each.
 
-    ``summary``: of ``panels.summarise``. The baseline's bar carries its time, each other bar the change of
-    the mean against the baseline.
+    Args:
+        summary: table of ``panels.summarise``. The baseline's bar carries its time, each other bar the change
+            of the mean against the baseline.
     """
     title = "Mean planning time with and without memory"
     note = "closed, open: with the best or the five best plans that the encoder recalls."
@@ -43,7 +44,8 @@ def planning_times(summary: pd.DataFrame) -> Figure:
 def controls(summary: pd.DataFrame) -> Figure:
     """What the paper does not have: the recall that suits the memory best, repair, a fresh guide.
 
-    ``summary``: of ``panels.summarise``.
+    Args:
+        summary: table of ``panels.summarise``.
     """
     title = "Mean planning time with the best recall and repair, beside a control"
     paper = set(paper_configurations(summary)) - {BASELINE}
@@ -54,7 +56,8 @@ def controls(summary: pd.DataFrame) -> Figure:
 def ablation(summary: pd.DataFrame) -> Figure:
     """Plans picked blindly beside plans recalled, for the planners that were measured with both.
 
-    ``summary``: of ``panels.summarise``.
+    Args:
+        summary: table of ``panels.summarise``.
     """
     title = "Plans recalled or picked blindly"
     blind = summary[summary["recall"] == "random"]
@@ -71,7 +74,8 @@ def ablation(summary: pd.DataFrame) -> Figure:
 def time_split(split: pd.DataFrame) -> Figure:
     """Where the mean planning time goes: a row a planner, a column a class, a stacked bar a configuration.
 
-    ``split``: of ``distributions.time_split``.
+    Args:
+        split: table of ``distributions.time_split``.
     """
     title = "Where planning time goes"
     if split.empty:
@@ -112,9 +116,7 @@ def _panels_of_bars(summary: pd.DataFrame, bars: Sequence[Configuration], title:
     if summary.empty or not bars:
         return message_figure(title, NO_ATTEMPTS)
     size = (max(PANEL_WIDTH, 0.48 * len(bars) + 0.4), 1.9)
-    figure = planner_grid(
-        summary, title, note, partial(_bars, bars=bars), y="mean planning time, ms", size=size
-    )
+    figure = planner_grid(summary, title, note, partial(_bars, bars=bars), y="mean time, ms", size=size)
     for axes in figure.axes:
         axes.tick_params(axis="x", length=0, labelsize=7.5)
     return figure

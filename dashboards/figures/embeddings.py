@@ -19,8 +19,10 @@ _NONE: Final = "#9A9A9A"
 def embedding_map(embeddings: Floats32, plan_index: Integers, centroids: Floats32) -> Figure:
     """Problems and centroids on the two axes along which the embeddings differ most.
 
-    ``embeddings [n, D]``: of problems. ``plan_index [n]``: the plan that a problem was made for, -1 for none.
-    ``centroids [N + 1, D]``: of ``c_0``, the problems that no plan solves, and of the N plans.
+    Args:
+        embeddings: ``[n, D]``, of problems.
+        plan_index: ``[n]``, the plan that a problem was made for, -1 for none.
+        centroids: ``[N + 1, D]``, of ``c_0``, the problems that no plan solves, and of the N plans.
     """
     plane = embedding_plane(embeddings)
     places, centres = plane.places(embeddings), plane.places(centroids)

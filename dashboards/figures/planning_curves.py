@@ -25,7 +25,8 @@ from storage.tables.configurations import BASELINE, Configuration, configuration
 def continual_improvement(summary: pd.DataFrame) -> Figure:
     """Mean planning time against the number of experiences: a row a planner, a column a class.
 
-    ``summary``: of ``panels.summarise_continual``.
+    Args:
+        summary: table of ``panels.summarise_continual``.
     """
     title = "Mean planning time as experience grows"
     if summary.empty:
@@ -53,7 +54,8 @@ def continual_improvement(summary: pd.DataFrame) -> Figure:
 def solved_against_time(curve: pd.DataFrame) -> Figure:
     """Share of all problems solved within a time.
 
-    ``curve``: of ``distributions.solved_against_time``.
+    Args:
+        curve: table of ``distributions.solved_against_time``.
     """
     title = "Problems solved within a time"
     note = "Share of all problems. A failure never counts as solved, however long it took."
@@ -63,7 +65,8 @@ def solved_against_time(curve: pd.DataFrame) -> Figure:
 def performance_profile(curve: pd.DataFrame) -> Figure:
     """Share of problems solved within multiples of the fastest time.
 
-    ``curve``: of ``distributions.performance_profile``.
+    Args:
+        curve: table of ``distributions.performance_profile``.
     """
     title = "Performance profile"
     note = (

@@ -26,7 +26,8 @@ _STYLES: Final[dict[str, Any]] = {  # of the curves of a protocol
 def retrieval_curves(curve: pd.DataFrame) -> Figure:
     """Share of problems with a free plan among the first k, against k: a panel a class (and memory).
 
-    ``curve``: of ``retrieval_rates.retrieval_curve``.
+    Args:
+        curve: table of ``retrieval_rates.retrieval_curve``.
     """
     title = "How often a recalled plan is free"
     if curve.empty:
@@ -70,7 +71,8 @@ def retrieval_curves(curve: pd.DataFrame) -> Figure:
 def training_curves(epochs: pd.DataFrame) -> Figure:
     """The loss, and hit@k and oracle on held-out problems, epoch by epoch.
 
-    ``epochs``: columns ``epoch, loss, hit_1, hit_5, oracle``, as ``planners.memory.encoder.training.Epoch``.
+    Args:
+        epochs: columns ``epoch, loss, hit_1, hit_5, oracle``, as ``planners.memory.encoder.training.Epoch``.
     """
     title = "Training of the encoder"
     if epochs.empty:
@@ -90,7 +92,8 @@ def training_curves(epochs: pd.DataFrame) -> Figure:
 def experience_chart(rows: pd.DataFrame) -> Figure:
     """Hit@5 with its interval, and the oracle, against the number of experiences: a panel a class.
 
-    ``rows``: of ``experience_recall.experience_rows``, for several numbers of experiences.
+    Args:
+        rows: rows of ``experience_recall.experience_rows``, for several numbers of experiences.
     """
     panels = list(rows["panel"].unique())
     note = (

@@ -48,6 +48,7 @@ def new_figure(width: float, height: float, title: str, note: str = "") -> Figur
     figure.suptitle(title, x=0.012, ha="left", fontsize=13, fontweight="bold", color=INK)
     if note:
         letters = int(_NOTE_LETTERS_AN_INCH * (width - 0.2))
+        note = note.replace(" %", "\N{NO-BREAK SPACE}%")
         note = "\n".join(textwrap.fill(paragraph, letters) for paragraph in note.splitlines())
         figure.supxlabel(note, x=0.012, ha="left", fontsize=_NOTE_SIZE, color="#555555", linespacing=1.4)
     return figure
@@ -75,9 +76,15 @@ def planner_grid(
 ) -> Figure:
     """A figure with a row of panels for each planner and a column for each class.
 
-    ``table``: rows with columns ``planner, panel``, and ``problems`` if panels are to say how many there are.
-    ``title``, ``note``, ``x``, ``y``: texts of the figure and its axes. ``draw``: draws a planner's rows of a
-    class. ``size``: width and height of a panel, inches. ``entries``: what a legend shows, by label.
+    Args:
+        table: rows with columns ``planner, panel``, and ``problems`` if panels are to say how many there are.
+        title: title of the figure.
+        note: text below it, wrapped.
+        draw: draws a planner's rows of a class.
+        x: name of the horizontal axes.
+        y: name of the vertical axes.
+        size: width and height of a panel, inches.
+        entries: what a legend shows, by label.
     """
     planners, panels = ranked(table["planner"], PLANNERS), list(table["panel"].unique())
     width = max(5.6, size[0] * len(panels) + 0.6)

@@ -45,8 +45,10 @@ class Attempts:
     def chosen(self, filters: Mapping[str, str], show: str, words: str = "") -> pd.DataFrame:
         """Choose some of the rows.
 
-        ``filters``: wanted values by column; empty ones allow any. ``show``: one of ``SHOWS``. ``words``:
-        must occur in the problem's id.
+        Args:
+            filters: wanted values by column; empty ones allow any.
+            show: one of ``SHOWS``.
+            words: what must occur in the problem's id.
         """
         rows = self.rows
         keep = np.ones(len(rows), bool)
@@ -80,7 +82,9 @@ def ordered(rows: pd.DataFrame, sort: str, descending: bool) -> pd.DataFrame:
 def attempts_of(frame: pd.DataFrame, faults: Sequence[str]) -> Attempts:
     """What pages need to know of a run.
 
-    ``frame``: ``COLUMNS``, texts as categories. ``faults``: a line for each file that cannot be read.
+    Args:
+        frame: ``COLUMNS``, texts as categories.
+        faults: a line for each file that cannot be read.
     """
     for name in ("memory", "recall", "source", "vehicle"):
         if frame[name].isna().all():

@@ -10,7 +10,7 @@ import pandas as pd
 
 from dashboards.palette import GREY
 from dashboards.statistics.embedding_plane import axis_ends
-from dashboards.web.svg import Scale, element, linked, points, short, span, text, tooltip
+from dashboards.web.svg import LogScale, Scale, element, linked, points, short, span, text, tooltip
 from planners.world.arrays import Floats
 
 FAINT: Final = "var(--line)"  # a colour that hardly shows, on a light screen or a dark one
@@ -72,14 +72,24 @@ class Mark(NamedTuple):
     address: str | None = None
 
 
-def dots(title: str, rows: Sequence[Dot], axis: str, ends: tuple[float, float]) -> Drawing:
-    """Dots with their intervals, one a row, and a line at 0; an arrow stands for a dot beyond the axis.
+def dots(
+    title: str, rows: Sequence[Dot], axis: str, ends: tuple[float, float], ratios: bool = False
+) -> Drawing:
+    """Dots with their intervals, one a row, and a line where nothing differs: at 0, or at 1 for ratios.
 
-    ``title``: of the drawing. ``axis``: name of the axis, which goes from one of the ``ends`` to the other.
+    An arrow stands for a dot beyond the axis, and for an interval that goes on beyond it.
+
+    Args:
+        title: title of the drawing.
+        rows: the dots, from top to bottom.
+        axis: name of the axis.
+        ends: lowest and highest value on the axis.
+        ratios: whether the values are ratios, whose axis is logarithmic.
     """
-    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends)
-    if ends[0] < 0.0 < ends[1]:
-        marks.append(element("line", x1=scale.at(0.0), x2=scale.at(0.0), y1=4.0, y2=bottom, class_="zero"))
+    scale, bottom, marks = _rows_with_axis([row.label for row in rows], axis, ends, ratios)
+    same = 1.0 if ratios else 0.0
+    if ends[0] < same < ends[1]:
+        marks.append(element("line", x1=scale.at(same), x2=scale.at(same), y1=4.0, y2=bottom, class_="zero"))
     for i, row in enumerate(rows):
         y = 8.0 + _ROW * (i + 0.5)
         value, low, high = row.estimate
@@ -90,6 +100,10 @@ def dots(title: str, rows: Sequence[Dot], axis: str, ends: tuple[float, float]) 
         if np.isfinite([low, high]).all():
             bar = {"x1": scale.at(low), "x2": scale.at(high), "y1": y, "y2": y}
             parts.append(element("line", **bar, class_="interval", stroke=row.colour))
+            for x, length, is_cut in ((scale.first, -4, low < ends[0]), (scale.last, 4, high > ends[1])):
+                if is_cut:
+                    arrow = f"M{x:.1f} {y - 3.5:.1f}l{length} 3.5l{-length} 3.5z"
+                    parts.append(element("path", d=arrow, fill=row.colour))
         if np.isfinite(value):
             x, beyond = scale.at(value), not ends[0] <= value <= ends[1]
             length = 7 if value > ends[1] else -7
@@ -111,9 +125,12 @@ def stacks(
 ) -> Drawing:
     """Bars made of parts, one a row.
 
-    ``title``: of the drawing. ``rows``: names and sizes of the parts by label. ``colours``: by name of the
-    part.
-    ``axis``: its name. ``unit``: of the sizes, in tooltips.
+    Args:
+        title: title of the drawing.
+        rows: names and sizes of the parts by label.
+        colours: colour of each part, by its name.
+        axis: name of the axis.
+        unit: unit of the sizes, in tooltips.
     """
     end = 1.05 * max((sum(size for _, size in parts) for parts in rows.values()), default=1.0)
     scale, bottom, marks = _rows_with_axis(list(rows), axis, (0.0, end))
@@ -144,10 +161,16 @@ def lines(
 ) -> Drawing:
     """Lines over a common axis.
 
-    ``title``: of the drawing. ``drawn``: the lines. ``x_axis``, ``y_axis``: names of the axes. ``height``:
-    pixels.
-    ``x_ends``, ``y_ends``, ``x_ticks``: of the axes; else they follow from the lines. ``has_cursor``: whether
-    there is a vertical line that the page's script moves.
+    Args:
+        title: title of the drawing.
+        drawn: the lines.
+        x_axis: name of the x axis.
+        y_axis: name of the y axis.
+        height: pixels.
+        x_ends: lowest and highest x; None if the lines decide.
+        y_ends: lowest and highest y; None if the lines decide.
+        x_ticks: the ticks of the x axis; None if the lines decide.
+        has_cursor: whether there is a vertical line that the page's script moves.
     """
     bands = [band for line in drawn for band in (line.y, line.low, line.high) if band is not None]
     x_low, x_high = x_ends or span(np.concatenate([line.x for line in drawn]).tolist(), margin=0.0)
@@ -181,7 +204,11 @@ def lines(
 def map_of(marks: Sequence[Mark], x_axis: str, y_axis: str, size: float = 560.0) -> Drawing:
     """A square map of ``marks``, ``size`` pixels wide; one mark in a hundred may lie beyond an axis.
 
-    ``x_axis``, ``y_axis``: names of the axes.
+    Args:
+        marks: what is drawn, in order.
+        x_axis: name of the horizontal axis.
+        y_axis: name of the vertical axis.
+        size: width and height in pixels.
     """
     places = np.array([mark.place for mark in marks])
     left, right, top, bottom = 46.0, size - 10.0, 10.0, size - 36.0
@@ -226,15 +253,16 @@ def _drawn(mark: Mark, x: float, y: float) -> str:
 
 
 def _rows_with_axis(
-    labels: Sequence[str], axis: str, ends: tuple[float, float]
-) -> tuple[Scale, float, list[str]]:
+    labels: Sequence[str], axis: str, ends: tuple[float, float], ratios: bool = False
+) -> tuple[Scale | LogScale, float, list[str]]:
     """The scale beside the labels of some rows, where it lies, and its marks."""
     left = 14.0 + _LETTER * max((len(label) for label in labels), default=0)
-    scale, bottom = Scale(*ends, left, WIDTH - 16.0), 8.0 + _ROW * len(labels)
+    of_axis: type[Scale] | type[LogScale] = LogScale if ratios else Scale
+    scale, bottom = of_axis(*ends, left, WIDTH - 16.0), 8.0 + _ROW * len(labels)
     return scale, bottom, [_x_axis(scale, bottom, axis)]
 
 
-def _x_axis(scale: Scale, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
+def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
     room = scale.last - scale.first
     marks = [element("line", x1=scale.first, x2=scale.last, y1=y, y2=y, class_="axis")]
     for value in scale.ticks(max(2, int(room / 62.0))) if ticks is None else ticks:

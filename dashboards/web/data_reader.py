@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from io import StringIO
@@ -157,6 +157,12 @@ class DataReader:
                 if identity in worlds:
                     return worlds[identity]
         raise MissingError(f"Run {run.path.name} has no problem {identity[:80]!r}.")
+
+
+def class_names(settings: Mapping[str, Any]) -> list[str]:
+    """The classes of a run by its ``settings``: the generated ones, then its worlds and maps."""
+    worlds = [Path(str(world)) for world in settings["worlds"]]
+    return [*settings["classes"], *(path.name if path.is_dir() else path.stem for path in worlds)]
 
 
 def stamp_of(path: Path) -> Stamp:

@@ -31,9 +31,11 @@ PageOf = Callable[["DataReader", "Parameters"], Page]  # from the data and what 
 def menu(name: str, title: str, options: Mapping[str, str] | Sequence[str], value: str) -> dict[str, Any]:
     """A menu of a form, for the template's macro of that name.
 
-    ``name``: of the parameter. ``title``: of the menu. ``options``: values, with their titles if these
-    differ.
-    ``value``: the one that is chosen.
+    Args:
+        name: name of the parameter.
+        title: title of the menu.
+        options: values, with their titles if these differ.
+        value: the one that is chosen.
     """
     titles = options if isinstance(options, Mapping) else {option: option for option in options}
     return {"name": name, "title": title, "options": list(titles.items()), "value": value}

@@ -37,9 +37,17 @@ def replay(
 ) -> Replay:
     """Solve a canonical ``problem`` again, with what a row says of the attempt.
 
-    ``memory``: ignored by a configuration that uses none. ``seed``, ``limits``: of the search.
+    Args:
+        problem: canonical.
+        planner: name of the planner.
+        configuration: assist and recall of the attempt.
+        memory: the memory; ignored by a configuration that uses none.
+        seed: seed of the search.
+        vehicle: the vehicle that drives.
+        limits: limits of the search.
 
-    Raises ValueError if memory and problem do not fit each other.
+    Raises:
+        ValueError: memory and problem do not fit each other.
     """
     used = None if configuration.assist in WITHOUT_MEMORY else memory
     assist, recall, top_k = configuration

@@ -70,6 +70,28 @@ class Scale(NamedTuple):
         return [i * step for i in range(first, last + 1)]
 
 
+class LogScale(NamedTuple):
+    """Like ``Scale``, with as many pixels from 1 to 2 as from 2 to 4: for ratios, all above 0."""
+
+    low: float
+    high: float
+    first: float
+    last: float
+
+    def at(self, value: float) -> float:
+        """The pixel of a ``value``; one beyond an end is put at the end."""
+        ends = Scale(math.log(self.low), math.log(self.high), self.first, self.last)
+        return ends.at(math.log(max(value, self.low)))
+
+    def ticks(self, about: int = 5) -> list[float]:
+        """1, 2, 5, 10 … on the scale, or powers of ten alone if these are more than ``about``."""
+        powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+        steps = [factor * 10.0**power for power in powers for factor in (1.0, 2.0, 5.0)]
+        shown = [value for value in steps if 0.999 * self.low <= value <= 1.001 * self.high]
+        rare = [value for value in shown if f"{value:e}"[0] == "1"]
+        return rare if len(shown) > about and len(rare) > 1 else shown
+
+
 def span(values: Iterable[float], margin: float = 0.05) -> tuple[float, float]:
     """Ends of an axis for ``values``, beyond them by the share ``margin`` of their range."""
     finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]

@@ -32,7 +32,7 @@ def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
     place = {"x": x_min, "y": y_min, "width": x_max - x_min, "height": y_max - y_min}
     inner = f"M{x_min:g} {y_min:g}H{x_max:g}V{y_max:g}H{x_min:g}Z"
     beyond = f"M{x_min - 99:g} {y_min - 99:g}H{x_max + 99:g}V{y_max + 99:g}H{x_min - 99:g}Z{inner}"
-    (goal_x, goal_y), (x, y, _), (tip_x, tip_y) = problem.goal, problem.start, heading_tip(problem)
+    (goal_x, goal_y), (x, y, _), (tip_x, tip_y) = problem.goal, problem.start, heading_tip(problem, vehicle)
     marks = [
         element("rect", **place, class_="bounds"),
         element("g", *_obstacles(problem), class_="obstacles"),
@@ -77,8 +77,11 @@ def answer_layer(plan: Plan, vehicle: Vehicle) -> str:
 def recalled_layer(recalled: CheckedPlan, number: int, order: int, is_answer: bool = False) -> str:
     """A ``recalled`` plan: a wide pale line if it is free, else dashed, every state in collision marked.
 
-    ``number``: of the plan in its memory. ``order``: of recall, from 1. ``is_answer``: whether the plan was
-    driven as it is.
+    Args:
+        recalled: the plan, with each of its states checked.
+        number: its number in its memory.
+        order: its place among the recalled plans, from 1.
+        is_answer: whether the plan was driven as it is.
     """
     way, first = recalled.plan.states[:, :2], recalled.first_blocked
     collisions = way[recalled.blocked].tolist()

@@ -44,9 +44,13 @@ def map_chart(
 ) -> Chart:
     """Hallucinated problems and centroids on the two axes along which embeddings differ most.
 
-    ``run``, ``name``: of the run and of its ``memory``. ``plan``: the only one that is coloured; -1 for
-    several.
-    ``embedding [D]``: of a problem to mark.
+    Args:
+        run: name of the run.
+        name: name of its memory.
+        memory: the memory itself.
+        problems: hallucinated problems with their embeddings.
+        plan: the only plan whose problems are coloured; -1 to colour those of several.
+        embedding: ``[D]``, embedding of a problem to mark; None for none.
     """
     plane = embedding_plane(problems.embeddings)
     places = plane.places(problems.embeddings)

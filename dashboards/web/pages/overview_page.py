@@ -9,13 +9,22 @@ from typing import Any, Final
 
 import pandas as pd
 
-from dashboards.cells import PLANNING_TIME, decimals_of, panel_title, percent, planner_title, with_interval
+from dashboards.cells import (
+    PLANNING_TIME,
+    decimals_of,
+    duration,
+    panel_title,
+    percent,
+    planner_title,
+    with_interval,
+)
 from dashboards.palette import TIME_COLOURS, colour_of
+from dashboards.report.findings import findings, for_pages
 from dashboards.report.tables import driving_cells, reduction_cell
 from dashboards.statistics.distributions import TIME_PARTS, time_split
 from dashboards.statistics.panels import COMBINED
 from dashboards.web.charts import Chart, Dot, Drawing, dots, stacks
-from dashboards.web.data_reader import DataReader, stamp_of
+from dashboards.web.data_reader import DataReader, class_names, stamp_of
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters, link
@@ -43,6 +52,8 @@ def overview(data: DataReader, params: Parameters) -> Page:
         "places": list(_places(data, run)),
         "views": [(key, title, params.also(view=key)) for key, title in VIEWS.items()],
         "view": view,
+        "found": [],
+        "classes": class_names(data.settings(run)),
         "notice": "",
         "faults": (),
         "tables": [],
@@ -62,8 +73,25 @@ def overview(data: DataReader, params: Parameters) -> Page:
             case _:
                 charts = [_reduction_chart(summary, name, origin)]
         data.read_ahead(run)
-        values |= {"tables": _tables(summary, name), "origin": origin, "best": _best(summary)}
+        values |= {
+            "tables": _tables(summary, name),
+            "origin": origin,
+            "best": _best(summary),
+            "found": for_pages(findings(summary)),
+        }
     return Page("overview.html.jinja", name, "Overview", name, values, charts)
+
+
+def _faster(reduction: float) -> float:
+    """How many times faster planning is whose mean time is less by a share."""
+    return 1.0 / max(1.0 - reduction, 1e-4)
+
+
+def _faster_ends(rows: pd.DataFrame) -> tuple[float, float]:
+    """Ends of an axis of times faster, for the ``rows`` of a summary."""
+    low, high = (_faster(each) for each in (rows["reduction_low"].min(), rows["reduction_high"].max()))
+    finite = [each if each == each else 1.0 for each in (low, high)]
+    return max(0.1, min(0.8, finite[0])), max(2.0, 1.1 * finite[1])
 
 
 def reduction_ends(lows: pd.Series[float]) -> tuple[float, float]:
@@ -72,9 +100,9 @@ def reduction_ends(lows: pd.Series[float]) -> tuple[float, float]:
     return max(-100.0, min(-10.0, lowest if lowest == lowest else -10.0)), 100.0
 
 
-def reduction_of(row: Row) -> tuple[float, float, float]:
-    """The reduction in a ``row`` and the ends of its interval, per cent."""
-    return 100.0 * row["reduction"], 100.0 * row["reduction_low"], 100.0 * row["reduction_high"]
+def _times_faster(row: Row) -> tuple[float, float, float]:
+    """How many times faster the planner of a ``row`` is with memory, and the ends of the interval."""
+    return _faster(row["reduction"]), _faster(row["reduction_low"]), _faster(row["reduction_high"])
 
 
 def _problems_address(run: str, row: Row, **more: str) -> str:
@@ -110,22 +138,26 @@ def _dots(
 
 
 def _reduction_chart(summary: pd.DataFrame, run: str, origin: str) -> Chart:
-    """Less planning time with each configuration, a drawing a planner and class."""
+    """How many times faster planning is with each configuration, a drawing a planner and class."""
     rows = summary[summary["configuration"] != BASELINE.label]
-    ends = reduction_ends(rows["reduction_low"])
-    panels = _dots(
-        rows, run, reduction_of, lambda row: f"{reduction_cell(row)} % less time, {row['mean_ms']:.3g} ms"
-    )
+    ends = _faster_ends(rows)
+
+    def words(row: Row) -> str:
+        times, low, high = _times_faster(row)
+        return f"{times:.3g} times faster [{low:.3g}, {high:.3g}], {duration(row['mean_ms'])}"
+
+    panels = _dots(rows, run, _times_faster, words)
     legend = {
         colour_of(each): "random plans" if each.recall == "random" else f"{each.assist} {each.top_k or ''}"
         for each in configurations_in(rows)
     }
     return Chart(
         "reduction",
-        "How much less time planning takes with memory",
-        "Reduction of the mean planning time against the same planner without memory, paired by problem, "
-        f"with 95 % bootstrap intervals; right of the line at 0 is faster. {PLANNING_TIME} {origin}",
-        [dots(title, of_panel, "less mean planning time, %", ends) for title, of_panel in panels],
+        "How many times faster planning is with memory",
+        "Mean planning time of the same planner without memory over that with memory, paired by problem, "
+        "with 95 % bootstrap intervals; right of the line at 1 is faster. Arrows: the interval goes on. "
+        f"{PLANNING_TIME} {origin}",
+        [dots(title, of_panel, "times faster", ends, ratios=True) for title, of_panel in panels],
         rows,
         list(legend.items()),
     )
@@ -201,11 +233,12 @@ def _best(summary: pd.DataFrame) -> list[dict[str, str]]:
     for panel, rows in summary.groupby("panel", sort=False):
         row = min(rows.to_dict("records"), key=lambda row: row["mean_ms"])
         less = with_interval(row["reduction"], row["reduction_low"], row["reduction_high"])
+        less = " ".join(less.split()).replace("[ ", "[")  # nothing is aligned here
         less = "" if row["configuration"] == BASELINE.label else f": {less} % less"
         best.append(
             {
                 "panel": "combined memory" if panel == COMBINED else str(panel),
-                "time": f"{row['mean_ms']:.3g} ms",
+                "time": duration(row["mean_ms"]),
                 "how": f"{planner_title(row['planner'])}, {row['configuration']}{less}",
             }
         )

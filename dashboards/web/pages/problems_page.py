@@ -87,8 +87,11 @@ def problems(data: DataReader, params: Parameters) -> Page:
 def problem_address(run: str, row: Mapping[Any, Any], values: dict[str, str], position: int) -> str:
     """The page of one attempt, which knows the selection it was opened from.
 
-    ``run``: its name. ``row``: of the attempt. ``values``: parameters of the selection. ``position``: in it,
-    from 0.
+    Args:
+        run: name of the run.
+        row: row of the attempt.
+        values: parameters of the selection.
+        position: place of the attempt in the selection, from 0.
     """
     of_row = {
         "problem": row["problem_id"], "by": row["planner"], "how": row["configuration"],

@@ -63,7 +63,8 @@ def retraining_rows(versions: Sequence[MemoryVersion], runs: set[str]) -> list[d
 def watched_charts(seen: pd.DataFrame) -> Iterator[Chart]:
     """Hits at work beside the benchmark's, one file of problems after another.
 
-    ``seen``: rows of ``storage.tables.watched``.
+    Args:
+        seen: rows of ``storage.tables.watched``.
     """
     if not len(seen):
         return

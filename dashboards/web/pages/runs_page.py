@@ -5,7 +5,10 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import Any
 
-from dashboards.web.data_reader import DataReader
+from dashboards.cells import NOTHING, planner_title
+from dashboards.statistics.headline import times_faster, used_by_default
+from dashboards.statistics.panels import COMBINED
+from dashboards.web.data_reader import DataReader, class_names
 from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters
 from planners.world.vehicles.vehicle import name_of
@@ -27,16 +30,40 @@ def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:
         stages = list(dict.fromkeys(str(stage.get("stage")) for stage in data.stages(run)))
     except StorageError as error:
         return row | {"fault": str(error)}
-    worlds = [str(world).rstrip("/").rpartition("/")[2] for world in settings["worlds"]]
     return row | {
-        "classes": ", ".join([*settings["classes"], *worlds]),
-        "planners": ", ".join(settings["planners"]),
+        "classes": ", ".join(class_names(settings)),
+        "planners": ", ".join(map(planner_title, settings["planners"])),
         "experiences": settings["experiences"],
+        "seed": settings.get("seed"),
+        "objective": settings.get("objective"),
+        "result": _result(data, run),
+        "took": _took(data, run),
         "problems": settings.get("test_problems"),
         "vehicle": vehicle,
-        "stages": ", ".join(stages) or "none yet",
         "state": _state(run, stages),
     }
+
+
+def _result(data: DataReader, run: RunFolder) -> str:
+    """How many times faster planning became and how much sooner robots arrive, means over classes."""
+    if not run.summary("csv").is_file():  # to make it here would take seconds
+        return NOTHING
+    try:
+        summary, _ = data.summary(run)
+    except StorageError:
+        return NOTHING
+    own = summary[summary["panel"] != COMBINED]
+    if own.empty or used_by_default(own).empty:
+        return NOTHING
+    faster, sooner_s = times_faster(own), used_by_default(own)["sooner_s"].mean()
+    arrives = "sooner" if sooner_s >= 0.0 else "later"
+    return f"{faster:.1f} × faster" + ("" if sooner_s != sooner_s else f", {abs(sooner_s):.1f} s {arrives}")
+
+
+def _took(data: DataReader, run: RunFolder) -> str:
+    """Seconds that all stages took together, in the unit that suits them."""
+    seconds = sum(float(stage.get("seconds", 0.0)) for stage in data.stages(run))
+    return f"{seconds / 60.0:.1f} min" if seconds >= 100.0 else f"{seconds:.0f} s" if seconds else NOTHING
 
 
 def _state(run: RunFolder, stages: list[str]) -> str:

@@ -17,7 +17,7 @@ from planners.memory.memory import Memory, scale_fault
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
 from planners.solve import Attempt, solve
-from planners.world.alignment import from_canonical, to_canonical
+from planners.world.alignment import from_canonical, shifted, to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Plan, Problem, start_state
@@ -106,7 +106,7 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
     answers = []
     for use, used in [("none", None), (assist, memory)][: 1 if memory is None else 2]:
         attempt, milliseconds = _median(canonical, planner, use, used, vehicle)
-        plan = attempt.plan and from_canonical(attempt.plan, alignment)
+        plan = attempt.plan and shifted(from_canonical(attempt.plan, alignment), problem.offset)
         answers.append(_answer(use, attempt, milliseconds, plan, vehicle))
     return {"answers": answers}
 
@@ -167,9 +167,11 @@ def _problem(fields: Any, vehicle: Vehicle) -> Problem:
 
 
 def _at_start(problem: Problem, vehicle: Vehicle) -> list[Any]:
-    return _corners(start_state(problem, vehicle)[np.newaxis], vehicle)
+    standing = start_state(problem, vehicle)[np.newaxis]
+    standing[:, :2] += problem.offset
+    return _corners(standing, vehicle)
 
 
 def _corners(states: Floats, vehicle: Vehicle) -> list[Any]:
-    """The corners ``[n, 4, 2]`` of each body at each of ``states [T, S]``, to a millimetre."""
-    return list(np.round(outlines(states, vehicle)[0], 3).tolist())
+    """The corners of each part of a body at each of ``states [T, S]``, to a millimetre."""
+    return [np.round(corners, 3).tolist() for corners in outlines(states, vehicle)[0]]
