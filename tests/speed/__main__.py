@@ -1,7 +1,8 @@
 """All that is measured of speed, one table after another: what ``make speed`` prints.
 
-``python -m tests.speed [SECTION]...`` prints some of them. What a section is about stands at the top of its
-file. Problems have seeds of their own: they are neither collected from nor tested on.
+``python -m tests.speed [SECTION]...`` prints some of them, ``python -m tests.speed SECTION --OPTION...`` one
+with options of its own. What a section is about stands at the top of its file.
+Problems have seeds of their own: they are neither collected from nor tested on.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ SECTIONS: Final = {
     "connections": "tests.speed.connections",
     "planners": "tests.speed.planners",
     "vehicles": "tests.speed.vehicles",
+    "manoeuvres": "tests.speed.manoeuvres",
     "peers": "tests.speed.peers.comparison",
     "assists": "tests.speed.assists",
     "latency": "tests.speed.latency",
@@ -33,6 +35,10 @@ SECTIONS: Final = {
 
 def main(asked: list[str]) -> int:
     """Print the sections that are asked for, all of them by default; 2 for one that is not known."""
+    options = next((i for i, word in enumerate(asked) if word.startswith("-")), len(asked))
+    if options == 1 < len(asked) and asked[0] in SECTIONS:
+        importlib.import_module(SECTIONS[asked[0]]).main(asked[1:])
+        return 0
     unknown = [name for name in asked if name not in SECTIONS]
     if unknown:
         print(f"No section {unknown[0]!r}: choose some of {', '.join(SECTIONS)}.", file=sys.stderr)

@@ -27,7 +27,7 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
 from tasks.settings.presets import for_preset
-from tasks.stages.collect import candidates_of
+from tasks.stages.collect import VARIANTS, candidates_of
 from tests.planners.memories import memory_of_plans
 from tests.speed.statistics import with_interval
 
@@ -43,8 +43,8 @@ def collected(source: ProblemClass, count: int) -> list[list[Experience]]:
     found: list[list[Experience]] = []
     index = 0
     while len(found) < count:
-        made = candidates_of(source.draw(COLLECTING, index), settings, CAR, workspace)
-        found += [[experience for experience, _ in made]] if made else []
+        made = candidates_of(source.draw(COLLECTING, index), VARIANTS, settings, CAR, workspace)
+        found += [[each.experience for each in made]] if made else []
         index += 1
     return found
 

@@ -1,0 +1,313 @@
+"""How fast manoeuvres are planned from scratch, cold, on one core, and how long the drives take.
+
+``python -m tests.speed manoeuvres [--families …] [--difficulties …] [--vehicles …] [--questions 100]
+[--planners …] [--optimise] [--ompl] [--given]`` draws questions of the families and prints for each family
+and planner the solved share, planning times (failures included), driving times and changes of gear of what
+all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
+Bench-MR instead, where they lie beside the repository, and prints each beside the best driving time that is
+published. ``--memory LIBRARY`` also has the planners join plans of a library, of the one vehicle that
+``--vehicles`` names; "recalled" is the share of questions answered by a plan of which a part was stored.
+``--optimise`` has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over
+Reeds-Shepp curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame
+of its problem.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from dashboards.world_outlines import cusps_of
+from planners.memory.library.plan_library import PlanLibrary
+from planners.optimisation.optimise import DEFAULT_SETTINGS, optimise
+from planners.search.registry import PLANNERS
+from planners.solve import Attempt, solve
+from planners.world.alignment import from_canonical, to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
+from planners.world.classes.problem_classes import DIFFICULTIES
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle, trailers_of
+from planners.world.workspace import Workspace
+from storage.archives.libraries import load_library
+from storage.vehicles.vehicle_files import said_vehicle
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import source_at
+from tasks.attempts.timing import OtherWork, no_garbage_collection
+from tests.worlds import SHARED
+
+SEED: Final = 79
+OMPL: Final = "OMPL RRT-Connect, paths"
+OMPL_LIMIT_S: Final = 5.0
+REPEATS: Final = 3  # of each given problem, with other seeds
+GIVEN: Final = SHARED / "manoeuvres"
+VEHICLES: Final = Path("docs/vehicles/benchmarks")
+_GIVEN: Final = (  # collection, file, its vehicles
+    ("tpcap", "tpcap/cases.json", ("tpcap-car",)),
+    ("bench-mr", "bench_mr/parking.json", ("bench-mr-car",)),
+    (
+        "dynobench",
+        "dynobench/problems.json",
+        tuple(f"dynobench-{model}" for model in ("car1-v0", "unicycle1-v0", "unicycle1-v1", "unicycle2-v0")),
+    ),
+)
+
+
+class Row(NamedTuple):
+    """What a planner made of one problem."""
+
+    attempt: Attempt
+    gear_changes: int
+    fault: str | None  # the authority's first
+
+
+class Peer(NamedTuple):
+    """How a problem is attempted: a planner, its help, and whether the plan is optimised."""
+
+    planner: str
+    optimised: bool
+    library: PlanLibrary | None = None  # plans to recall and to join
+
+    def __str__(self) -> str:
+        name = self.planner if self.library is None else f"{self.planner}, join"
+        return f"{name}, optimised" if self.optimised else name
+
+
+def attempted(problem: Problem, peer: Peer, vehicle: Vehicle, workspace: Workspace, seed: int) -> Row:
+    """Attempt a problem in its own frame and have the plan judged there."""
+    canonical, alignment = to_canonical(problem)
+    attempt = solve(
+        canonical,
+        peer.planner,
+        "none" if peer.library is None else "join",
+        memory=peer.library,
+        vehicle=vehicle,
+        workspace=workspace,
+        seed=seed,
+    )
+    if attempt.plan is not None and peer.optimised:
+        better = optimise(canonical, attempt.plan, DEFAULT_SETTINGS, vehicle)
+        plan = better.plan or attempt.plan  # where it does not converge the plan stays as it is
+        seconds = attempt.planning_seconds + better.seconds
+        attempt = replace(attempt, plan=plan, duration_s=plan.duration_s, planning_seconds=seconds)
+    if attempt.plan is None:
+        return Row(attempt, 0, None)
+    plan = from_canonical(attempt.plan, alignment)
+    found = faults(problem, plan, vehicle)
+    return Row(attempt, len(cusps_of(plan, vehicle)), found[0] if found else None)
+
+
+def measured(
+    problems: Sequence[Problem], planners: Sequence[Peer], vehicle: Vehicle
+) -> dict[Peer, list[Row]]:
+    """Rows of each planner, cold: other data fill the caches before each attempt."""
+    workspace, other_work = Workspace(), OtherWork()
+    rows: dict[Peer, list[Row]] = {peer: [] for peer in planners}
+    for name in planners:
+        attempted(problems[0], name, vehicle, workspace, SEED + 1)  # compiles
+    with no_garbage_collection():
+        for number, problem in enumerate(problems):
+            at = number % len(planners)
+            for name in [*planners[at:], *planners[:at]]:
+                other_work()
+                rows[name].append(attempted(problem, name, vehicle, workspace, SEED))
+    return rows
+
+
+def family_table(asked: argparse.Namespace) -> tuple[Table, list[str]]:
+    """The table of the families, and what the authority refused."""
+    title = f"Manoeuvres from scratch, {asked.questions} questions each, seed {SEED}"
+    table = _table(title, ("family", "difficulty", "vehicle", "planner"))
+    refused = []
+    for name, difficulty, vehicle in _asked_families(asked):
+        drawn = family(name, difficulty, vehicle)
+        problems = [drawn.draw(SEED, index) for index in range(asked.questions)]
+        rows = measured(problems, _peers(asked, vehicle), vehicle)
+        by_all = np.all([[row.attempt.solved for row in found] for found in rows.values()], axis=0)
+        for planner, found in rows.items():
+            refused += [f"{row.attempt.problem_id} {planner}: {row.fault}" for row in found if row.fault]
+            label = name, difficulty, vehicle.about.name.decode()
+            table.add_row(*label, str(planner), *_cells(found, by_all))
+        if asked.ompl and not trailers_of(vehicle):
+            table.add_row(*label, OMPL, *_ompl_cells(problems, vehicle))
+        table.add_section()
+    return table, refused
+
+
+def _peers(asked: argparse.Namespace, vehicle: Vehicle | None = None) -> list[Peer]:
+    """The planners alone, and with what is known of the vehicle's plans."""
+    libraries = (
+        [None] if asked.memory is None or vehicle is None else [None, load_library(asked.memory, vehicle)]
+    )
+    return [
+        Peer(name, optimised, library)
+        for name in asked.planners
+        for library in libraries
+        for optimised in [False, True][: 1 + asked.optimise]
+    ]
+
+
+def _ompl_cells(problems: Sequence[Problem], vehicle: Vehicle) -> list[str]:
+    """Solved and times of OMPL's paths, and no more, since they are no plans."""
+    from tests.speed.peers.reeds_shepp import reeds_shepp_path  # late: OMPL may not be installed
+
+    paths = [reeds_shepp_path(problem, vehicle, "RRTConnect", SEED, OMPL_LIMIT_S) for problem in problems]
+    ms = 1e3 * np.array([path.seconds for path in paths])
+    times = (np.median(ms), ms.mean(), np.quantile(ms, 0.99))
+    return [
+        f"{np.mean([path.solved for path in paths]):.1%}",
+        "-",
+        *(f"{each:.1f}" for each in times),
+        *4 * ["-"],
+    ]
+
+
+def _asked_families(asked: argparse.Namespace) -> Iterator[tuple[str, str, Vehicle]]:
+    vehicles = [said_vehicle(name) for name in asked.vehicles]
+    for name in asked.families:
+        for vehicle in vehicles:
+            if bool(trailers_of(vehicle)) == (name in WITH_TRAILERS):
+                yield from ((name, difficulty, vehicle) for difficulty in asked.difficulties)
+
+
+def _cells(rows: list[Row], by_all: np.ndarray) -> list[str]:
+    """Solved, planning times, then of what all planners solve driving, gear changes and the total."""
+    solved = np.mean([row.attempt.solved for row in rows])
+    ms = 1e3 * np.array([row.attempt.planning_seconds for row in rows])
+    common = [row for row, each in zip(rows, by_all, strict=True) if each]
+    driving = np.array([row.attempt.duration_s or 0.0 for row in common])
+    planning = np.array([row.attempt.planning_seconds for row in common])
+    gears = [row.gear_changes for row in common]
+    of_all = (
+        [f"{driving.mean():.2f}", f"{np.mean(gears):.1f}", f"{(planning + driving).mean():.2f}"]
+        if common
+        else ["-", "-", "-"]
+    )
+    times = (np.median(ms), ms.mean(), np.quantile(ms, 0.99))
+    refused = sum(row.fault is not None for row in rows)
+    stored = np.mean([row.attempt.source in ("recalled", "repaired") for row in rows])
+    return [f"{solved:.1%}", f"{stored:.1%}", *(f"{each:.1f}" for each in times), *of_all, str(refused)]
+
+
+def _table(title: str, names: tuple[str, ...]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for column in names:
+        table.add_column(column, no_wrap=True)
+    for column in (
+        "solved",
+        "recalled",
+        "median ms",
+        "mean",
+        "99 %",
+        "driving s",
+        "gears",
+        "total s",
+        "refused",
+    ):
+        table.add_column(column, justify="right")
+    return table
+
+
+def given_problems() -> Iterator[tuple[str, Vehicle, list[Problem]]]:
+    """The problems of each collection and vehicle, in the order of their files."""
+    for form, file, names in _GIVEN:
+        for name in names:
+            vehicle = said_vehicle(str(VEHICLES / f"{name}.yaml"))
+            settings = ImportSettings(vehicle=vehicle)
+            parts = [import_part(source_at(GIVEN / file, form), part, settings) for part in ("train", "test")]
+            yield form, vehicle, sorted((p for part in parts for p in part.problems), key=lambda p: p.id)
+
+
+def published_seconds() -> dict[str, float]:
+    """The best driving time that is published for a problem, by its id."""
+    with np.load(GIVEN / "tpcap" / "reference_trajectories.npz") as trajectories:
+        best = {name: float(trajectories[name][-1, -1]) for name in trajectories}
+    for problem in json.loads((GIVEN / "dynobench" / "problems.json").read_text())["problems"]:
+        best[problem["id"]] = min(problem["published_cost_s"].values())
+    return best
+
+
+def given_table(planners: Sequence[Peer]) -> tuple[Table, list[str], list[str]]:
+    """A row for each given problem and planner, what the authority refused, and a line for each planner."""
+    table = Table(title=f"Given problems, cold, median of {REPEATS} attempts", title_justify="left")
+    for column in ("collection", "problem", "planner"):
+        table.add_column(column)
+    for column in ("solved", "ms", "driving s", "published s", "ratio", "gear changes"):
+        table.add_column(column, justify="right")
+    best, refused = published_seconds(), []
+    workspace, other_work = Workspace(), OtherWork()
+    milliseconds: dict[Peer, list[float]] = {planner: [] for planner in planners}
+    solved = dict.fromkeys(planners, 0)
+    for form, vehicle, problems in given_problems():
+        for planner in planners:
+            attempted(problems[0], planner, vehicle, workspace, SEED - 1)
+        for problem in problems:
+            for planner in planners:
+                rows = []
+                with no_garbage_collection():
+                    for repeat in range(REPEATS):
+                        other_work()
+                        rows.append(attempted(problem, planner, vehicle, workspace, SEED + repeat))
+                refused += [f"{problem.id} {planner}: {row.fault}" for row in rows if row.fault]
+                ms = 1e3 * float(np.median([row.attempt.planning_seconds for row in rows]))
+                milliseconds[planner].append(ms)
+                good = [row for row in rows if row.attempt.solved and row.fault is None]
+                solved[planner] += len(good) == REPEATS
+                driving = float(np.median([row.attempt.duration_s or 0.0 for row in good])) if good else None
+                known = best.get(problem.id)
+                table.add_row(
+                    *(form, problem.id, str(planner), f"{len(good)}/{REPEATS}", f"{ms:.1f}"),
+                    "-" if driving is None else f"{driving:.2f}",
+                    "-" if known is None else f"{known:.2f}",
+                    "-" if known is None or driving is None else f"{driving / known:.2f}",
+                    f"{np.median([row.gear_changes for row in good]):.0f}" if good else "-",
+                )
+        table.add_section()
+    lines = [
+        f"{planner}: {solved[planner]} of {len(times)} solved, planning median {np.median(times):.1f} ms, "
+        f"mean {np.mean(times):.1f} ms"
+        for planner, times in milliseconds.items()
+    ]
+    return table, refused, lines
+
+
+def report(console: Console, asked: argparse.Namespace | None = None) -> None:
+    """Measure and print; AssertionError where the authority refused a plan."""
+    asked = asked or _parser().parse_args([])
+    if asked.given:
+        table, refused, lines = given_table(_peers(asked))
+    else:
+        (table, refused), lines = family_table(asked), []
+    console.print(table)
+    for line in lines:
+        console.print(line)
+    assert not refused, f"The authority refused {len(refused)} plans; the first: {refused[0]}"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="manoeuvres", description=__doc__)
+    parser.add_argument("--families", nargs="+", choices=FAMILIES, default=list(FAMILIES))
+    parser.add_argument("--difficulties", nargs="+", choices=DIFFICULTIES, default=["standard"])
+    parser.add_argument(
+        "--vehicles", nargs="+", default=["car", "car-1-trailer"], help="names or .yaml files"
+    )
+    parser.add_argument("--questions", type=int, default=100, help="of each family")
+    parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=["lattice"])
+    parser.add_argument("--memory", type=Path, help="a library of `gather`, of the one vehicle that is asked")
+    parser.add_argument("--optimise", action="store_true", help="optimise each plan too")
+    parser.add_argument("--ompl", action="store_true", help="beside OMPL's paths of Reeds-Shepp curves")
+    parser.add_argument("--given", action="store_true", help="ask the problems of others instead")
+    return parser
+
+
+def main(arguments: list[str]) -> None:
+    """Read the options and report."""
+    report(Console(width=150), _parser().parse_args(arguments))
