@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 TORCH := torch==2.13.0
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
 
-.PHONY: run smoke prepared test test-slow test-cluster wheel check speed format clean
+.PHONY: run smoke prepared test test-slow test-cluster wheel site check speed format clean
 
 run: $(READY)  ## the main job: every stage on the three classes, under 10 minutes on 2 cores
 	$(BIN)/motion-memory run --preset laptop
@@ -28,6 +28,9 @@ test-cluster: prepared  ## more than one machine, all of them here: needs the Po
 
 wheel: prepared  ## build the wheel, install it alone in a new environment, and plan with it
 	$(BIN)/python -m tests.wheel
+
+site: $(READY)  ## the documentation as pages in build/site; a broken link is an error
+	$(BIN)/mkdocs build -f mkdocs.yaml
 
 check: $(READY)  ## lint, types, import contracts
 	$(BIN)/ruff check .
