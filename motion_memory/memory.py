@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from planners.attempt import SUB_PLANS
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.ranked_plans import RankedPlan, ranked_plans
 from planners.memory.recall import RECALLS, default_recall
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, SUB_PLANS, solve
+from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planners.attempt import Attempt
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
 from planners.search.help import PATIENCE
 from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
-from planners.solve import Attempt, least_blocked
+from planners.solve import least_blocked
 from planners.world.arrays import Flags
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle

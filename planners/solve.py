@@ -6,12 +6,13 @@ Planning time is measured once, around everything between receiving a problem an
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from functools import partial
 from time import perf_counter
 
 import numpy as np
 
+from planners.attempt import PARTS, SUB_PLANS, Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
@@ -34,49 +35,7 @@ from planners.world.workspace import Workspace
 _WITH_MEMORY = ("closed", "open", "repair", "join", "published-open")
 _JOINS = ("open", "repair", "join")  # the assists that aim a search at the ends of stored plans
 ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
-SUB_PLANS = "sub-plans"  # what recall from a library is called
 WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
-
-
-@dataclass(frozen=True, eq=False)
-class Attempt:
-    """An attempt at a problem: what an attempt row holds, and the plan itself."""
-
-    problem_id: str
-    problem_class: str
-    planner: str
-    assist: str
-    recall: str | None  # the strategy, one of ``RECALLS``, or ``SUB_PLANS``; None without
-    top_k: int  # 0 without memory
-    status: str
-    solved: bool
-    source: str | None  # "recalled", "repaired" or "searched"; None if not solved
-    planning_seconds: float
-    occupancy_seconds: float
-    encode_seconds: float
-    recall_seconds: float
-    scene_seconds: float  # making the obstacles ready for collision checks
-    check_seconds: float
-    guide_seconds: float  # finding a path over the grid and making the guide
-    repair_seconds: float  # repairing a recalled plan, successfully or not
-    roadmap_seconds: float
-    search_seconds: float
-    recalled: tuple[int, ...]  # plans of the memory, best first
-    collision_checks: int
-    expansions: int
-    nodes: int
-    length_m: float | None  # None if not solved
-    duration_s: float | None  # None if not solved
-    seed: int
-    plan: Plan | None
-    verified: bool | None  # what the authority said of the plan; None: it was not asked
-
-
-_PARTS = tuple(
-    field.name.removesuffix("_seconds")
-    for field in fields(Attempt)
-    if field.name.endswith("_seconds") and field.name != "planning_seconds"
-)
 
 
 def help_with(
@@ -252,7 +211,7 @@ def solve(
         solved=answer is not None,
         source=source if answer is not None else None,
         planning_seconds=planning_seconds,
-        **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in _PARTS},
+        **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in PARTS},
         recalled=recalled.plans,
         collision_checks=int(work[0]),
         expansions=int(work[1]),

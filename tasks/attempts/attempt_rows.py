@@ -10,7 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, Final
 
-from planners.solve import Attempt
+from planners.attempt import Attempt
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.tables.schemas import ATTEMPTS
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from planners.solve import Attempt
+from planners.attempt import Attempt
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle

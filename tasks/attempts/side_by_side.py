@@ -10,8 +10,9 @@ import gc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+from planners.attempt import Attempt
 from planners.memory.memory import Memory
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.workspace import Workspace

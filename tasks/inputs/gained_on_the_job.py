@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
-from planners.solve import Attempt
 from planners.world.problem import Problem, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
 from storage.places.data_folder import open_data_folder

@@ -9,13 +9,14 @@ from pathlib import Path
 from time import perf_counter
 from typing import Final, NamedTuple
 
+from planners.attempt import Attempt
 from planners.explanation import recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.memory.recall import RECALLS
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
+from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem
 from planners.world.workspace import Workspace

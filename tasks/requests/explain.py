@@ -8,10 +8,10 @@ from dataclasses import fields
 from typing import Final
 
 from dashboards.cells import CellTable
+from planners.attempt import Attempt
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
-from planners.solve import Attempt
 from planners.world.problem import Plan
 
 USES: Final = {

@@ -6,8 +6,9 @@ from dataclasses import fields
 
 import pytest
 
+from planners.attempt import Attempt
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, Attempt, solve
+from planners.solve import ASSISTS, solve
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.workspace import Workspace
 from tests.planners.memories import memory_of

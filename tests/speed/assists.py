@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from planners.attempt import Attempt
 from planners.memory.build_memory import build_memory
 from planners.memory.encoder.training import TrainingSettings, train
 from planners.memory.hallucination.mixture import hallucinate
@@ -31,7 +32,7 @@ from planners.memory.plans.experience import Experience
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
 from planners.search.registry import PLANNERS
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, ProblemClass, problem_class
 from planners.world.geometry.collision import scene_of

@@ -19,10 +19,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from planners.attempt import Attempt
 from planners.maps.questions import question_in
 from planners.memory.library.plan_library import PlanLibrary
 from planners.search.registry import PLANNERS
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, problem_class

@@ -20,8 +20,9 @@ from rich.progress import track
 from rich.table import Table
 
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
+from planners.attempt import Attempt
 from planners.memory.memory import Memory
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem

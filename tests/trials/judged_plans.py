@@ -26,10 +26,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from planners.attempt import Attempt
 from planners.memory.memory import Memory
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, WITHOUT_MEMORY, Attempt, improved, solve
+from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
 from planners.world.problem import Problem

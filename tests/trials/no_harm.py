@@ -24,13 +24,14 @@ from unittest import mock
 import numpy as np
 from rich.console import Console
 
+from planners.attempt import Attempt
 from planners.memory.curation import curate
 from planners.memory.memory import Memory
 from planners.memory.plans.experience import Experience
 from planners.optimisation.polish import polish
 from planners.search.outcome import work_of
 from planners.search.registry import PLANNERS
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class

@@ -13,10 +13,11 @@ from dashboards.web.notices import BadRequestError
 from dashboards.web.page import Page, menu
 from dashboards.web.parameters import Parameters
 from dashboards.world_outlines import outlines, shown_states
+from planners.attempt import Attempt
 from planners.memory.memory import Memory, scale_fault
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.alignment import from_canonical, shifted, to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class

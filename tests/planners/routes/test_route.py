@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from planners.attempt import Attempt
 from planners.maps.cutting import cut_problems
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
@@ -18,7 +19,7 @@ from planners.memory.memory import Memory
 from planners.routes.manoeuvres import braking, is_free_drive
 from planners.routes.path_ahead import PathAhead
 from planners.routes.route import Route, Router, Stuck
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import GOAL_RADIUS, Problem

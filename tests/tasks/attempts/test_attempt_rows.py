@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from planners.solve import Attempt, solve
+from planners.attempt import Attempt
+from planners.solve import solve
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR

@@ -8,7 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from planners.solve import Attempt, solve
+from planners.attempt import Attempt
+from planners.solve import solve
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-from planners.solve import Attempt, solve
+from planners.attempt import Attempt
+from planners.solve import solve
 from planners.world.classes.problem_classes import problem_class
 from planners.world.vehicles.vehicle import CAR
 from storage.places.data_folder import open_data_folder

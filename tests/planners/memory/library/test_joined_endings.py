@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
-from planners.solve import Attempt, solve
+from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from planners.attempt import SUB_PLANS
 from planners.maps.questions import question_in
 from planners.memory.library.driving import drive_again
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
@@ -23,7 +24,7 @@ from planners.memory.library.sub_plans import (
     speed_cell,
     turn_cell,
 )
-from planners.solve import SUB_PLANS, solve
+from planners.solve import solve
 from planners.world.alignment import mirrored, to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class

@@ -1,0 +1,50 @@
+"""An attempt at a problem: what was tried, what it cost, and the plan that came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from planners.world.problem import Plan
+
+SUB_PLANS = "sub-plans"  # what recall from a library is called
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """An attempt at a problem: what an attempt row holds, and the plan itself."""
+
+    problem_id: str
+    problem_class: str
+    planner: str
+    assist: str
+    recall: str | None  # the strategy, one of ``RECALLS``, or ``SUB_PLANS``; None without
+    top_k: int  # 0 without memory
+    status: str
+    solved: bool
+    source: str | None  # "recalled", "repaired" or "searched"; None if not solved
+    planning_seconds: float
+    occupancy_seconds: float
+    encode_seconds: float
+    recall_seconds: float
+    scene_seconds: float  # making the obstacles ready for collision checks
+    check_seconds: float
+    guide_seconds: float  # finding a path over the grid and making the guide
+    repair_seconds: float  # repairing a recalled plan, successfully or not
+    roadmap_seconds: float
+    search_seconds: float
+    recalled: tuple[int, ...]  # plans of the memory, best first
+    collision_checks: int
+    expansions: int
+    nodes: int
+    length_m: float | None  # None if not solved
+    duration_s: float | None  # None if not solved
+    seed: int
+    plan: Plan | None
+    verified: bool | None  # what the authority said of the plan; None: it was not asked
+
+
+PARTS = tuple(
+    field.name.removesuffix("_seconds")
+    for field in fields(Attempt)
+    if field.name.endswith("_seconds") and field.name != "planning_seconds"
+)
