@@ -37,7 +37,15 @@ from tasks.session.folder_lock import locked_folder
 
 _KEYWORD: Final = inspect.Parameter.KEYWORD_ONLY
 _ELSEWHERE: Final = ("workers", "scheduler")  # options of a command that a deployment has otherwise
-_ABOUT: Final = ("preset", "classes", "worlds", "problem", "path", "planner")  # parameters that name a run
+_ABOUT: Final = (
+    "preset",
+    "classes",
+    "worlds",
+    "sources",
+    "problem",
+    "path",
+    "planner",
+)  # parameters that name a run
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
@@ -154,4 +162,5 @@ retrain = _stage(retrain_flow)
 plan = _command(problem_commands.plan)
 solve = _command(problem_commands.solve)
 import_worlds = _command(map_commands.import_worlds)
+gather = _command(map_commands.gather)
 route = _command(map_commands.route)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
@@ -12,6 +12,9 @@ from flows.cli.choices import AssistName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
 from flows.cli.terminal import write, write_files
+
+if TYPE_CHECKING:
+    from tasks.requests.gather_pieces import Gathered, GatherRequest
 
 _AS_IT_IS: Final = MapOptions()
 _USUAL: Final = SolveOptions()
@@ -70,6 +73,8 @@ def gather(
 ) -> None:
     """Ask general questions in worlds and on maps, and keep the plans as a library for --memory.
 
+    A repeated command continues where it stopped.
+
     Args:
         sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
             and in worlds in their part for training. Files of problems: these are the questions.
@@ -85,8 +90,14 @@ def gather(
     from tasks.requests.import_worlds import import_settings
 
     settings = import_settings(vehicle, seed, **asdict(reading))
-    write(task.gather(sources, out, plans, poses, settings, worker_count(workers)))
+    write(task.gather(sources, out, plans, poses, settings, worker_count(workers), _gather_pieces))
     write_files(library=out)
+
+
+def _gather_pieces(request: GatherRequest) -> list[Gathered]:
+    from flows.gather import gather as flow  # late: Prefect reads its environment when it is imported
+
+    return flow(request)
 
 
 def route(

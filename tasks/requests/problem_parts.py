@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,7 +14,6 @@ from storage.errors import StorageError
 from storage.exchange.plans import write_plan
 from storage.exchange.problem_files import ProblemSlice, slices_of
 from storage.exchange.problems import problems_or_faults_of
-from storage.places.files import locked, remove_folder, remove_leftovers
 from storage.tables.attempts import write_attempts
 from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.timing import no_garbage_collection
@@ -23,6 +21,7 @@ from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
+from tasks.requests.part_folder import parts_folder
 
 PART_PROBLEMS: Final = 500  # a killed worker loses one part, which is seconds of work
 PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
@@ -45,7 +44,7 @@ class SolveRequest:
     @property
     def folder(self) -> Path:
         """The folder that keeps finished parts until all parts are finished."""
-        return self.out.with_name(f"{self.out.name}.parts")
+        return parts_folder(self.out)
 
 
 @dataclass(frozen=True)
@@ -109,24 +108,6 @@ def _parts_of(request: SolveRequest, _file_state: tuple[int, int] | None) -> lis
 def _identity(part: ProblemSlice) -> tuple[str, int, int, int]:
     """What makes a slice the same as before; not its offset in a text, which moves with earlier lines."""
     return part.digest, part.first, part.count, part.offset if part.path.suffix == ".parquet" else 0
-
-
-@contextmanager
-def unfinished(request: SolveRequest) -> Iterator[None]:
-    """Lock the folder of finished parts while the context lasts; remove it at the end if it holds none."""
-    with ExitStack() as stack:
-        try:
-            request.folder.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(locked(request.folder / ".lock", str(request.out)))
-        except OSError as error:
-            reason = f"{request.folder} cannot be written: {error.strerror}"
-            raise StorageError(f"{reason}; give another --out.") from None
-        remove_leftovers(request.folder)
-        try:
-            yield
-        finally:
-            if not any(request.folder.glob("[0-9]*.parquet")):
-                remove_folder(request.folder)
 
 
 def solve_part(chunk: FilePart) -> PartResult:

@@ -20,6 +20,7 @@ from storage.tables.attempts import attempt_columns, join_attempts
 from tasks.fan_out.progress import progress
 from tasks.registry.model_uris import memory_digest, memory_folder
 from tasks.requests.assistant import Assistant, AssistantSettings
+from tasks.requests.part_folder import part_workers, unfinished
 from tasks.requests.problem_parts import (
     SOLVE,
     FilePart,
@@ -27,9 +28,7 @@ from tasks.requests.problem_parts import (
     SolveRequest,
     parts_of,
     solve_part_reporting,
-    unfinished,
 )
-from tasks.servers.prefect_server import local_server
 from tasks.settings.checks import check_outputs
 from tasks.settings.errors import UsageError
 
@@ -108,12 +107,13 @@ def solve_many(
         settings = settings._replace(memory=None if memory is None else str(memory))
         request = SolveRequest(problems, out, settings, memory_digest(memory), plans, learn)
         parts = parts_of(request)
-        with unfinished(request):
+        with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             if flow is None or workers == 1 or len(left) <= FEW_PARTS:
                 results = _in_this_process(left)
             else:
-                results = _in_workers(request, workers, flow)
+                with part_workers(out, workers):
+                    results = flow(request)
             faults = [result.fault for result in results if result.fault]
             if faults:
                 raise _malformed(faults)
@@ -131,17 +131,6 @@ def _in_this_process(parts: Sequence[FilePart]) -> list[PartResult]:
     numbers = count(1)  # of the problems, as they are solved
     with progress("solve", sum(part.problem_slice.count for part in parts), end_is_told=False) as show:
         return [solve_part_reporting(part, lambda: show(next(numbers))) for part in parts]
-
-
-def _in_workers(request: SolveRequest, workers: int, flow: SolveFlow) -> list[PartResult]:
-    """Solve the parts that are not solved yet in worker processes."""
-    with local_server(request.folder.absolute()) as server:
-        from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
-
-        with cluster(workers):
-            if server is not None:
-                server.wait()
-            return flow(request)
 
 
 def _malformed(faults: Sequence[str]) -> StorageError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,9 @@ import pytest
 from flows.cli.main import call
 from storage.archives.libraries import load_library
 from storage.exchange.problems import write_problems
+from storage.worlds.importing import ImportSettings
+from tasks.requests import gather
+from tasks.requests import gather_pieces as pieces
 from tests.storage.worlds.samples import town_cells, write_map
 from tests.worlds import strewn, walled_goal
 
@@ -42,6 +47,36 @@ def test_the_questions_of_a_file_are_asked_as_they_stand(
     assert not (tmp_path / "library").exists()
     assert call([*asked, "--plans", "2"]) == 0
     assert load_library(tmp_path / "library").questions == ("strewn-1-10", "strewn-2-10")
+
+
+def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pieces, "PIECE", 4)
+    monkeypatch.setattr(gather, "FEW_PLANS", 0)
+    done: list[int] = []
+
+    def backwards(some: Sequence[pieces.GatherPiece]) -> list[pieces.Gathered]:
+        left = [piece for piece in some if pieces.GATHER.kept(piece) is None]
+        for piece in left[::-1]:
+            pieces.GATHER.run(piece)
+            done.append(piece.index)
+            if len(done) == 2:
+                raise KeyboardInterrupt
+        kept = [pieces.GATHER.kept(piece) for piece in some]
+        return [each.result for each in kept if each is not None]
+
+    def gathered(name: str, workers: int) -> None:
+        out = tmp_path / name
+        flow = partial(pieces.gather_pieces, do=backwards)
+        gather.gather(["random"], out, 14, 0.5, ImportSettings(), workers, flow)
+
+    with pytest.raises(KeyboardInterrupt):
+        gathered("interrupted", workers=2)
+    gathered("interrupted", workers=2)
+    assert len(done) == len(set(done))
+    gathered("whole", workers=1)
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["interrupted", "whole"]
+    for file in (tmp_path / "whole").iterdir():
+        assert file.read_bytes() == (tmp_path / "interrupted" / file.name).read_bytes()
 
 
 @pytest.mark.parametrize(

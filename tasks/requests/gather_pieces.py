@@ -1,0 +1,184 @@
+"""Pieces of gathering: some questions are drawn, answered, polished and judged, and kept in a file."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from planners.memory.plans.experience import Experience
+from planners.optimisation.polish import polish
+from planners.search.manoeuvres.endings import endings_of
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Plan, Problem
+from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
+from storage.tables.experiences import write_experiences
+from storage.vehicles.definitions import definition_of
+from storage.worlds.importing import ImportSettings
+from storage.worlds.sources import source_at
+from tasks.attempts.judged_attempts import check_plan
+from tasks.fan_out.keys import key_of
+from tasks.fan_out.stage import Job
+from tasks.requests.part_folder import parts_folder
+from tasks.requests.question_sources import QuestionSource, is_drawn, question_source
+
+COLLECTOR: Final = "lattice"
+MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
+PIECE: Final = 50  # numbers of questions: a killed worker loses some two seconds of work
+GIVE_UP: Final = 5  # questions asked for each wanted plan
+
+
+@dataclass(frozen=True)
+class GatherRequest:
+    """Which questions to ask, and how many answers to keep."""
+
+    sources: tuple[str, ...]  # names of classes and families, and paths
+    out: Path  # the library
+    plans: int
+    poses: float  # the share of drawn questions that ask for a pose
+    settings: ImportSettings
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """A digest of all that decides which question has which number, and what is kept of its answer."""
+        settings = self.settings
+        how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
+        contents = [_content(name) for name in self.sources]
+        return key_of("gather", how, self.plans, self.poses, self.sources, contents)
+
+
+@dataclass(frozen=True)
+class GatherPiece:
+    """Some consecutive numbers of questions; the sources take turns, number by number."""
+
+    request: GatherRequest
+    index: int  # counted from 0
+    class_name: str = "questions"  # for messages
+
+    @property
+    def key(self) -> str:
+        """A digest of everything that its plans depend on."""
+        return key_of(self.request.digest, self.index)
+
+    @property
+    def result(self) -> Path:
+        """The file that keeps its ``Gathered``."""
+        return parts_folder(self.request.out) / f"{self.index:06d}-{self.key}.json"
+
+    @property
+    def shard(self) -> Path:
+        """The file with its plans."""
+        return parts_folder(self.request.out) / f"{self.index:06d}.parquet"
+
+
+class Gathered(NamedTuple):
+    """What became of a piece."""
+
+    asked: list[int]  # the numbers that gave a question
+    rows: list[int]  # for each plan in the shard the number of its question
+
+
+def gather_piece(chunk: GatherPiece) -> Gathered:
+    """Answer the questions of a piece, and write what is kept of the answers.
+
+    Raises JudgementError if the authority refuses a plan.
+    """
+    request = chunk.request
+    sources, vehicle, workspace = _sources(request), request.settings.vehicle, Workspace()
+    asked, rows, kept = [], [], []
+    for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
+        drawn = _question(sources, number)
+        if drawn is None:
+            continue
+        question = to_canonical(drawn)[0]
+        asked.append(number)
+        plans = _variants(question, vehicle, request.settings.seed, workspace)
+        rows += [number] * len(plans)
+        kept += [Experience(question, plan, vehicle) for plan in plans]
+    write_experiences(
+        chunk.shard,
+        kept,
+        planners=[COLLECTOR] * len(kept),
+        seeds=[request.settings.seed] * len(kept),
+        planning_seconds=[0.0] * len(kept),
+        key=chunk.key,
+        vehicle=vehicle,
+    )
+    return Gathered(asked, rows)
+
+
+GATHER: Final = Job(
+    name="gather",
+    do=gather_piece,
+    result=Gathered,
+    output=lambda piece: piece.shard,
+    units=lambda piece: PIECE,
+    unit="questions",
+)
+
+
+def gather_pieces(
+    request: GatherRequest, do: Callable[[Sequence[GatherPiece]], Sequence[Gathered]]
+) -> list[Gathered]:
+    """Do as many pieces as it takes to answer enough questions, or to see that it would take too many.
+
+    Args:
+        request: which questions to ask, and how many answers to keep.
+        do: does pieces and returns their results in order; what is done already need not be done again.
+
+    Returns:
+        the results of all pieces from the first on. They do not depend on who does how many at a time.
+    """
+    longest = max(source.most for source in _sources(request)) * len(request.sources)
+    results: list[Gathered] = []
+    answered = asked = 0
+    while answered < request.plans and asked < GIVE_UP * request.plans and len(results) * PIECE < longest:
+        missing = -(-(request.plans - answered) // PIECE)
+        found = do([GatherPiece(request, len(results) + i) for i in range(missing)])
+        answered += sum(len(set(each.rows)) for each in found)
+        asked += sum(len(each.asked) for each in found)
+        results += found
+    return results
+
+
+@functools.lru_cache(maxsize=1)
+def _sources(request: GatherRequest) -> list[QuestionSource]:
+    """The sources of this process, which keeps the worlds that it has read."""
+    return [question_source(name, request.plans, request.poses, request.settings) for name in request.sources]
+
+
+def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:
+    source, own = sources[number % len(sources)], number // len(sources)
+    return source.draw(own) if own < source.most else None
+
+
+def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
+    """What is kept for a question: a polished plan, perhaps that of the search too, or nothing."""
+    attempt = solve(question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
+    if attempt.plan is None:
+        return []
+    scene = scene_of(question)
+    margin = MARGIN_M if question.arrival is None else 0.0  # a pose may be in a tight slot
+    polished = polish(question, attempt.plan, vehicle, scene, workspace, margin_m=margin).plan
+    variants = [polished or attempt.plan]
+    stops = endings_of([(attempt.plan.states, attempt.plan.controls)], vehicle).follows
+    if polished is not None and len(stops) > 1:  # of which the start is one
+        variants.append(attempt.plan)
+    for plan in variants:
+        check_plan(question, plan, COLLECTOR, vehicle)
+    return variants
+
+
+def _content(name: str) -> str:
+    """A digest of the files of a source; empty if it is drawn."""
+    digest = hashlib.sha256()
+    for file in [] if is_drawn(name) else source_at(Path(name)).contents():
+        digest.update(f"{file}\0".encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()

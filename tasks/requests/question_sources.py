@@ -1,0 +1,67 @@
+"""Where questions to gather experience from come from: each source gives them by their numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from planners.maps.questions import question_in
+from planners.world.classes.families import FAMILIES, family
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.problem import Problem
+from storage.exchange.problems import read_problems
+from storage.worlds.importing import ImportSettings, import_part
+from storage.worlds.sources import source_at
+
+
+@dataclass(frozen=True)
+class QuestionSource:
+    """Any number of questions, or those of a file."""
+
+    draw: Callable[[int], Problem | None]  # by number, from 0; None where there was no room for a question
+    most: float = math.inf  # how many there are
+
+
+def is_drawn(name: str) -> bool:
+    """Whether the source of this name is a class or a family, and nothing that lies on the disk."""
+    return name in (*CLASSES, *FAMILIES) and not Path(name).exists()
+
+
+def question_source(name: str, plans: int, poses: float, settings: ImportSettings) -> QuestionSource:
+    """The questions of a source; the same arguments give the same ones.
+
+    Args:
+        name: of a class or a family, or the path of a map, of worlds or of a file of problems.
+        plans: how many plans are wanted: into as many windows is a map cut.
+        poses: the share of drawn questions that ask for a pose.
+        settings: how worlds and maps are read, for which vehicle, and the seed of everything.
+
+    Raises:
+        StorageError: there is nothing at the path, or nothing that can be read.
+    """
+    seed, vehicle = settings.seed, settings.vehicle
+    if is_drawn(name) and name in FAMILIES:
+        manoeuvres = family(name, vehicle=vehicle)
+        return QuestionSource(lambda number: manoeuvres.draw(2 * seed, number))
+    if is_drawn(name):
+        drawn = problem_class(name, vehicle=vehicle)
+        return _asked_in(lambda number: drawn.draw(2 * seed, number), poses, settings)
+    source = source_at(Path(name))
+    if source.format == "problems" and source.path.is_file():
+        problems = read_problems(source.path, vehicle)
+        return QuestionSource(lambda number: problems[number], len(problems))
+    most = min(settings.count or plans, plans) if source.is_map else settings.count
+    worlds = import_part(source, "train", replace(settings, count=most)).problems
+    return _asked_in(lambda number: worlds[number % len(worlds)], poses, settings)
+
+
+def _asked_in(world_of: Callable[[int], Problem], poses: float, settings: ImportSettings) -> QuestionSource:
+    """One question in each world, again and again."""
+
+    def draw(number: int) -> Problem | None:
+        pose = math.floor((number + 1) * poses) > math.floor(number * poses)
+        return question_in(world_of(number), number, settings.seed, settings.vehicle, pose)
+
+    return QuestionSource(draw)
