@@ -89,6 +89,7 @@ class LatticeSettings(NamedTuple):
     alone: int = 2000  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many
+    head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
@@ -249,9 +250,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     level, tried = levels[0], 0
     ahead = Ahead(go, NOWHERE, NO_TABLE)
     manoeuvring: Manoeuvring | None = None
+    joining: Manoeuvring | None = None
+    joined = False
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead, manoeuvring
+        nonlocal level, tried, ahead, manoeuvring, joining
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             occupied = query.occupied
@@ -260,6 +263,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
             if suits(goal, vehicle):
                 manoeuvring = Manoeuvring(query, goal, occupied)
+                if query.endings is not None:
+                    joining = manoeuvring.joining(query, query.endings)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle)
         tried += 1
         if improving:
@@ -272,19 +277,42 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
             return
         here, there = settings.if_tight if manoeuvring.is_tight else settings.by_turns
+        now = here
         if counts[trees.EXPANSIONS] == 0:
-            here = 0 if manoeuvring.is_tight else settings.alone
+            now = 0 if manoeuvring.is_tight else settings.alone
         while counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < until:
-            before = counts[trees.EXPANSIONS]
-            grow_lattice(tree, goal, min(before + here, until), frontier, ahead, level, vehicle, scene)
+            if join(tree, manoeuvring.is_tight):
+                return
+            before = int(counts[trees.EXPANSIONS])
+            grow_lattice(tree, goal, min(before + now, until), frontier, ahead, level, vehicle, scene)
             if counts[trees.GOAL_VERTEX] < 0:
-                manoeuvring.advance(tree, min(counts[trees.EXPANSIONS] + there, until))
+                expansions, checks = manoeuvring.expansions, manoeuvring.checks
+                manoeuvring.advance(tree, min(there, until - int(counts[trees.EXPANSIONS])))
+                counts[trees.EXPANSIONS] += manoeuvring.expansions - expansions
+                counts[trees.CHECKS] += manoeuvring.checks - checks
             if counts[trees.EXPANSIONS] == before:
                 return
-            here = settings.if_tight[0] if manoeuvring.is_tight else settings.by_turns[0]
+            now = here
+
+    def join(tree: trees.Tree, is_tight: bool) -> bool:
+        """Aim at known endings with as much work as all else has had: what is found alone is found still."""
+        nonlocal joined
+        if joining is None:
+            return False
+        more = int(tree.counts[trees.EXPANSIONS]) + (settings.head_start if is_tight else 0)
+        found = joining.advance(tree, more - joining.expansions)
+        joined = found and joining.joined
+        return found
 
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
     outcome = attempt(
         query, settings.restart_after, prepare, grow, towards_anywhere(query), explore_from=explore_from
     )
-    return replace(outcome, joined=manoeuvring is not None and manoeuvring.joined)
+    if joining is None:
+        return outcome
+    return replace(
+        outcome,
+        expansions=outcome.expansions + joining.expansions,
+        collision_checks=outcome.collision_checks + joining.checks,
+        joined=joined,
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Final
 
@@ -12,13 +13,12 @@ from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.goal_tree import CHECKS, allocate_goal_tree, plant_goal
+from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, allocate_goal_tree, plant_goal
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.shots import FromStart
-from planners.search.query import Query
+from planners.search.query import Endings, Query
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
-from planners.search.structures.tree import CHECKS as TREE_CHECKS
-from planners.search.structures.tree import EXPANSIONS, Tree
+from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED
@@ -76,6 +76,11 @@ def allocate_way_from_start() -> CostToGo:
     return allocate_cost_to_go()
 
 
+def allocate_joining_tree(state_size: int) -> GoalTree:
+    """Buffers of its own for the search that aims at known endings, since it takes turns with another."""
+    return allocate_goal_tree(state_size)
+
+
 class Manoeuvring:
     """A search for a manoeuvre, which goes on each time it is told to."""
 
@@ -95,38 +100,50 @@ class Manoeuvring:
         go = query.workspace.buffers(allocate_way_from_start)
         fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
         start = start_state(problem, vehicle)[np.newaxis]
-        endings = query.endings or no_endings(size)
-        self._known = FromStart(start, go, seconds_to_pose(_alone(vehicle)), endings, word_radius(vehicle))
-        self._nodes = np.empty(len(endings.follows), np.int32)
-        self._level = self._spent = 0
-        self.joined = False  # whether the drive that was found ends with a known ending
-        self._begin()
+        known = seconds_to_pose(_alone(vehicle)), no_endings(size), word_radius(vehicle)
+        self._known = FromStart(start, go, *known)
+        self._level = self._spent = self.expansions = 0
+        self._begin_at_coarsest()
         # whether there is so little room around the goal that other searches have small hopes
         self.is_tight = bool(room_around(self._tree.states, vehicle, query.scene) < TIGHT)
         self._grow(0)  # compiled, if need be, before the planner's clock runs
+
+    def joining(self, query: Query, endings: Endings) -> Manoeuvring:
+        """The same search from its beginning, which goes on from known endings too, in buffers of its own."""
+        other = copy.copy(self)
+        other._tree = query.workspace.buffers(allocate_joining_tree, state_size(query.vehicle))
+        other._known = self._known._replace(endings=endings)
+        other._begin_at_coarsest()
+        if not np.any(other._nodes >= 0):
+            other._level = len(LEVELS)  # nothing that is known is free here
+        return other
 
     @property
     def is_over(self) -> bool:
         """Whether nothing is left to try."""
         return self._level == len(LEVELS)
 
-    def advance(self, tree: Tree, until: int) -> None:
-        """Search until there is a drive, which is added to ``tree``, or the tree has ``until`` expansions."""
-        counts = tree.counts
-        while counts[EXPANSIONS] < until and not self.is_over:
-            most, _ = LEVELS[self._level]
-            more = min(until - int(counts[EXPANSIONS]), most - self._spent)
-            checks = self._checks()
+    def advance(self, tree: Tree, most: int) -> bool:
+        """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
+        until = self.expansions + most
+        while self.expansions < until and not self.is_over:
+            level_ends = LEVELS[self._level][0] - self._spent
+            more = min(until - self.expansions, level_ends)
             found, used = self._grow(more)
-            counts[EXPANSIONS] += used
-            counts[TREE_CHECKS] += self._checks() - checks
+            self.expansions += used
             self._spent += used
             if found and add_to_tree(self._drive, tree, self._vehicle):
-                self.joined = bool(self._drive.counts[2])
-                return
-            if used < more or self._spent >= most:
+                return True
+            if used < more or more == level_ends:
                 self._level, self._spent = self._level + 1, 0
                 self._begin()
+        return False
+
+    def _begin_at_coarsest(self) -> None:
+        self._nodes = np.empty(len(self._known.endings.follows), np.int32)
+        self._level = self._spent = self.expansions = 0
+        self._checks_before = int(self._tree.counts[CHECKS])
+        self._begin()
 
     def _begin(self) -> None:
         """Plant the tree of the present level, if there is one."""
@@ -142,5 +159,12 @@ class Manoeuvring:
             *(_suited(LEVELS[self._level][1], self._vehicle), self._vehicle, self._scene),
         )
 
-    def _checks(self) -> int:
-        return int(self._tree.counts[CHECKS])
+    @property
+    def checks(self) -> int:
+        """How often obstacles were looked at so far."""
+        return int(self._tree.counts[CHECKS]) - self._checks_before
+
+    @property
+    def joined(self) -> bool:
+        """Whether the drive that was found ends with a known ending."""
+        return bool(self._drive.counts[2])

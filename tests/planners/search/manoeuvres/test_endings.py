@@ -22,8 +22,8 @@ from planners.world.workspace import Workspace
 WORKSPACE = Workspace()
 
 
-def asked(problem: Problem, endings: Endings | None = None) -> Outcome:
-    query = Query(problem, np.random.default_rng(0), scene_of(problem), WORKSPACE, limits=Limits(4000))
+def asked(problem: Problem, endings: Endings | None = None, most: int = 4000) -> Outcome:
+    query = Query(problem, np.random.default_rng(0), scene_of(problem), WORKSPACE, limits=Limits(most))
     return PLANNERS["lattice"](replace(query, endings=endings))
 
 
@@ -52,6 +52,36 @@ def test_known_endings_spare_expansions() -> None:
         alone += asked(problem).expansions
         with_endings += answer.expansions
     assert with_endings < 0.75 * alone
+
+
+def test_what_is_solved_alone_is_solved_with_known_endings_too() -> None:
+    parallel, perpendicular = family("parallel"), family("perpendicular", "hard")
+    slots = [to_canonical(perpendicular.draw(3, number))[0] for number in range(30)]
+    known = [asked(to_canonical(parallel.draw(4, number))[0]).plan for number in range(4)]
+    known += [asked(slot).plan for slot in slots[:6]]
+    endings = endings_of([(plan.states, plan.controls) for plan in known if plan is not None], CAR)
+    solved = 0
+    for slot in slots[6:]:
+        alone = asked(slot, most=150)
+        solved += alone.plan is not None
+        if alone.plan is not None:
+            answer = asked(slot, endings, most=150).plan
+            assert answer is not None
+            assert faults(slot, answer) == []
+    assert 0 < solved < len(slots[6:])  # some need all that they may have
+
+
+def test_endings_that_do_not_fit_change_no_plan() -> None:
+    slot = to_canonical(family("perpendicular", "hard").draw(3, 1))[0]
+    through = np.zeros((41, 5))
+    through[:, 0] = np.linspace(0.0, 6.0, 41)  # out to the front, where a wall is
+    through[1:-1, 3] = 1.0
+    endings = endings_of([(through[::-1].copy(), np.zeros((40, 2)))], CAR)
+    assert len(endings.follows) == 1
+    alone, answer = asked(slot).plan, asked(slot, endings).plan
+    assert alone is not None
+    assert answer is not None
+    assert np.array_equal(alone.states, answer.states)
 
 
 def test_a_vehicle_that_never_stood_knows_no_ending() -> None:
