@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +28,18 @@ _PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow", "lattice":
 
 _NUMBER: Final = r"[+-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?"
 _COUNT: Final = re.compile(rf"({_NUMBER})(?: ([kMG]))?")
-_INTERVAL: Final = re.compile(rf"({_NUMBER}) \[ *({_NUMBER}), *({_NUMBER})\]")
+_FORMS: Final = tuple(  # of cells with several numbers, each "#", and what these are
+    (re.compile(form.replace("#", f"({_NUMBER})")), names)
+    for form, names in (
+        (r"# \[ *#, *#\]", ("value", "low", "high")),
+        (r"# \[ *#, *#\] of #", ("value", "low", "high", "of")),
+        (r"# of #", ("value", "of")),
+        (r"#±#", ("value", "deviation")),
+        (r"#→#", ("first", "other")),
+        (r"#\+#", ("recalled", "repaired")),
+        (r"\(#, #\)", ("x", "y")),
+    )
+)
 _SIZES: Final = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 
 Rows = list[list[str]]
@@ -93,15 +105,15 @@ def value_of(cell: str) -> Any:
     """What a ``cell`` says, for programs: the functions above, backwards.
 
     Returns:
-        a number; an object of ``value``, ``low`` and ``high`` for a number with its interval; None for a
-        dash; else the cell itself.
+        a number; an object with the names of ``_FORMS`` for several; None for a dash; else the cell itself.
     """
     if cell == NOTHING:
         return None
     if found := _COUNT.fullmatch(cell):
         return _number(found[1], found[2] or "")
-    if found := _INTERVAL.fullmatch(cell):
-        return {name: _number(found[i]) for i, name in enumerate(("value", "low", "high"), 1)}
+    for form, names in _FORMS:
+        if found := form.fullmatch(cell):
+            return {name: _number(digits) for name, digits in zip(names, found.groups(), strict=True)}
     return cell
 
 
@@ -118,15 +130,27 @@ class CellTable:
     title: str
     headings: Sequence[str]  # one of ``NAMES`` aligns its column to the left
     groups: Sequence[Rows]  # rows that belong together stand together
+    name: str = ""  # what programs know it by (docs/commands.md)
+    fields: Sequence[str] = ()  # what programs know its columns by, with units; by default its headings
+    panel: str | None = None  # the class that all its rows are of
 
     def __str__(self) -> str:
         rows = [cells for group in self.groups for cells in group]
         return f"### {self.title}\n\n{markdown_table(self.headings, rows)}"
 
 
-def titled_tables(headings: Sequence[str], titled: Iterable[tuple[str, Sequence[Rows]]]) -> list[CellTable]:
-    """Tables under the same ``headings``, of pairs of a title and groups of rows."""
-    return [CellTable(title, headings, groups) for title, groups in titled]
+def titled_tables(
+    headings: Sequence[str],
+    titled: Iterable[tuple[str, Sequence[Rows]]],
+    name: str = "",
+    fields: Sequence[str] = (),
+    panels: Iterable[str | None] = repeat(None),
+) -> list[CellTable]:
+    """Tables under the same ``headings``, of pairs of a title and groups of rows, each with a panel."""
+    return [
+        CellTable(title, headings, groups, name, fields, panel)
+        for (title, groups), panel in zip(titled, panels, strict=False)  # panels may never end
+    ]
 
 
 def as_markdown(tables: Iterable[CellTable]) -> str:

@@ -32,6 +32,10 @@ _HEADINGS: Final = (
     "sooner [95 %]",
 )  # fmt: skip
 SOURCES: Final = ("recalled", "repaired", "searched")
+_FIELDS: Final = (
+    "planner", "configuration", "solved_percent", "planning_mean_ms", "reduction_percent", "slower_percent",
+    "hits_percent", "driving_s", "sooner_s",
+)  # fmt: skip
 _UNITS: Final = "planning in ms, drives and sooner in s, the rest in %"
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
@@ -42,19 +46,36 @@ FULL_HEADINGS: Final = (
 _SWEEP_HEADINGS: Final = (
     "class", "rate", "channels", "hidden", "parameters", "hit@1", "hit@5", "seconds"
 )  # fmt: skip
+_SWEEP_FIELDS: Final = (
+    "class", "learning_rate", "channels", "hidden", "parameters", "hit_1_percent", "hit_5_percent", "seconds"
+)  # fmt: skip
 RETRIEVAL_HEADINGS: Final = (
     "class", "memory", "protocol", "recall", "origin@1", "origin@5", "hit@1", "hit@5", "oracle", "none",
     "count",
 )  # fmt: skip
+_RETRIEVAL_FIELDS: Final = (
+    "class", "memory", "protocol", "recall", "origin_1_percent", "origin_5_percent", "hit_1_percent",
+    "hit_5_percent", "oracle_percent", "none_percent", "problems",
+)  # fmt: skip
 STAGE_HEADINGS: Final = (
     "stage", "seconds", "chunks", "workers", "between chunks %", "worker's MB at first", "at last",
 )  # fmt: skip
+_STAGE_FIELDS: Final = (
+    "stage",
+    "seconds",
+    "chunks",
+    "workers",
+    "between_chunks_percent",
+    "worker_first_mb",
+    "worker_last_mb",
+)
 
 
 def summary_tables(summary: pd.DataFrame) -> list[CellTable]:
     """What fits 110 columns of the ``summary`` of ``panels.summarise``: a table for each panel."""
     titled = titled_rows(summary, _cells)
-    return titled_tables(_HEADINGS, [(f"{title}; {_UNITS}", groups) for title, groups in titled])
+    told = [(f"{title}; {_UNITS}", groups) for title, groups in titled]
+    return titled_tables(_HEADINGS, told, "summary", _FIELDS, summary["panel"].unique())
 
 
 def summary_markdown(summary: pd.DataFrame) -> str:
@@ -64,7 +85,8 @@ def summary_markdown(summary: pd.DataFrame) -> str:
 
 def retrieval_table(retrieval: pd.DataFrame) -> CellTable:
     """The rows of ``retrieval_rates.summarise_retrieval``, in per cent of the problems."""
-    return CellTable("Retrieval, % of problems", RETRIEVAL_HEADINGS, retrieval_groups(retrieval))
+    groups = retrieval_groups(retrieval)
+    return CellTable("Retrieval, % of problems", RETRIEVAL_HEADINGS, groups, "retrieval", _RETRIEVAL_FIELDS)
 
 
 def retrieval_markdown(retrieval: pd.DataFrame) -> str:
@@ -75,7 +97,7 @@ def retrieval_markdown(retrieval: pd.DataFrame) -> str:
 
 def stages_table(rows: Sequence[Sequence[str]]) -> CellTable:
     """The stages of a run; ``rows`` of cells under ``STAGE_HEADINGS``."""
-    return CellTable("Stages", STAGE_HEADINGS, [[list(row)] for row in rows])
+    return CellTable("Stages", STAGE_HEADINGS, [[list(row)] for row in rows], "stages", _STAGE_FIELDS)
 
 
 def sweep_table(rows: pd.DataFrame) -> CellTable:
@@ -91,7 +113,8 @@ def sweep_table(rows: pd.DataFrame) -> CellTable:
         ]
         for name, of_class in rows.groupby("class", sort=False)
     ]  # fmt: skip
-    return CellTable("Validation problems, % of what the stored plans solve", _SWEEP_HEADINGS, groups)
+    title = "Validation problems, % of what the stored plans solve"
+    return CellTable(title, _SWEEP_HEADINGS, groups, "sweep", _SWEEP_FIELDS)
 
 
 def experience_table(rows: pd.DataFrame) -> CellTable:
@@ -107,7 +130,7 @@ def experience_table(rows: pd.DataFrame) -> CellTable:
         ]
         lines.append([str(plans), *cells])
     title = "Fresh hit@5 [95 %] and oracle, % of problems"
-    return CellTable(title, ["experiences", *panels], [[line] for line in lines])
+    return CellTable(title, ["experiences", *panels], [[line] for line in lines], "experience-curve")
 
 
 def claims_markdown(claims: Sequence[Claim], others: Sequence[Claim] = ()) -> str:

@@ -20,6 +20,9 @@ from dashboards.cells import (
 _SHARED: Final = ("planner", "configuration", "ms", "sooner s", "solved %")
 HEADINGS: Final = (*_SHARED, "fewer checks %", "recalled %", "verdict")
 HEADINGS_IN_TURN: Final = (*_SHARED, "less time %", "mostly %", "verdict")
+_SHARED_FIELDS: Final = ("planner", "configuration", "planning_ms", "sooner_s", "solved_percent")
+FIELDS: Final = (*_SHARED_FIELDS, "fewer_checks_percent", "recalled_percent", "verdict")
+FIELDS_IN_TURN: Final = (*_SHARED_FIELDS, "less_time_percent", "mostly_percent", "verdict")
 BY_COUNTS: Final = (
     "These runs were measured one after the other, so a difference in their times may come from how busy "
     "the machine was: times are shown, but not judged. What is judged is problems solved, then seconds of "
@@ -39,7 +42,9 @@ def headings_of(rows: pd.DataFrame) -> tuple[str, ...]:
 
 def comparison_tables(rows: pd.DataFrame) -> list[CellTable]:
     """The ``rows`` of ``compare_runs``: a table for each panel."""
-    return titled_tables(headings_of(rows), comparison_cells(rows))
+    headings = headings_of(rows)
+    fields = FIELDS_IN_TURN if headings == HEADINGS_IN_TURN else FIELDS
+    return titled_tables(headings, comparison_cells(rows), "comparison", fields, rows["panel"].unique())
 
 
 def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:

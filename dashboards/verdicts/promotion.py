@@ -36,6 +36,11 @@ HEADINGS: Final = (
     "planner", "configuration", "champion ms", "challenger ms", "champion drives s", "drives s",
     "sooner s [95 %]", "champion solved %", "solved %", "champion hits %", "hits %", "verdict",
 )  # fmt: skip
+FIELDS: Final = (
+    "planner", "configuration", "champion_planning_ms", "planning_ms", "champion_driving_s", "driving_s",
+    "sooner_s", "champion_solved_percent", "solved_percent", "champion_hits_percent", "hits_percent",
+    "verdict",
+)  # fmt: skip
 SOONER: Final = "sooner"
 LATER: Final = "later"
 FEWER: Final = "fewer solved"
@@ -111,7 +116,8 @@ def judgement_line(judged: Judgement) -> str:
 
 def judgement_tables(judged: Judgement) -> list[CellTable]:
     """The columns by which it was ``judged``: a table for each class."""
-    return titled_tables(HEADINGS, _titled(judged))
+    panels = judged.columns["panel"].unique()
+    return titled_tables(HEADINGS, _titled(judged), "judgement", FIELDS, panels)
 
 
 def judgement_markdown(judged: Judgement) -> str:

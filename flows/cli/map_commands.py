@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
-from flows.cli.terminal import write, write_files
+from flows.cli.terminal import write, write_answer, write_files
 
 if TYPE_CHECKING:
     from tasks.requests.gather_pieces import Gathered, GatherRequest
@@ -133,5 +133,6 @@ def route(
     assistant = Assistant(options.settings(assist, without_memory="fresh"))
     settings = import_settings(options.vehicle, options.seed, **asdict(reading))
     driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
-    write(driven.legs, *driven.summary)
+    write(driven.legs)
+    write_answer(*driven.summary, **driven.answer)
     write_files(plan=out, picture=picture)

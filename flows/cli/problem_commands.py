@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty, PlannerName, SourceName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
-from flows.cli.terminal import write, write_files
+from flows.cli.terminal import write, write_answer, write_files
 
 if TYPE_CHECKING:
     from tasks.requests.problem_parts import PartResult, SolveRequest
@@ -72,12 +72,18 @@ def plan(
         options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant, plan_one
+    from tasks.settings.errors import RunError
 
     assistant = Assistant(options.settings(assist, improve_seconds))
-    attempt, found = plan_one(assistant, problem, out, picture, explain, learn)
-    times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
-    write(f"{attempt.source}, {times}")
+    attempt, found, answer, failure = plan_one(assistant, problem, out, picture, explain, learn)
+    lines = []
+    if found is not None:
+        times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
+        lines.append(f"{attempt.source}, {times}")
+    write_answer(*lines, **answer)
     write_files(plan=out, picture=picture)
+    if failure is not None:
+        raise RunError(failure)
 
 
 def optimise(
@@ -109,9 +115,10 @@ def optimise(
 
     initial = initial_guess(plan, planner, straight, vehicle, seed)
     found = optimise_one(initial, problem, clearance_weight, out, picture)
-    write(
+    write_answer(
         f"{found.summary}, {found.length_m:.1f} m, {found.duration_s:.1f} s"
-        f" (guess: {found.guess_duration_s:.1f} s), {found.clearance_m:.2f} m clear"
+        f" (guess: {found.guess_duration_s:.1f} s), {found.clearance_m:.2f} m clear",
+        **found.answer,
     )
     write_files(plan=out, picture=picture)
 
@@ -160,9 +167,17 @@ def _write_summary(solved: SolvedMany) -> None:
     count, with_plan = len(seconds), sum(n for name, n in outcomes.items() if not name.startswith("("))
     named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
     speed = f"{solved.solved_now / solved.seconds:,.0f} problems/s"
-    mean_ms, median_ms, ninth_ms = (1e3 * each for each in solved.planning_seconds)
-    write(
+    mean_s, median_s, ninth_s = solved.planning_seconds
+    write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
-        f"planning mean {mean_ms:.2f} ms, median {median_ms:.2f} ms, 90 % {ninth_ms:.2f} ms",
+        f"planning mean {1e3 * mean_s:.2f} ms, median {1e3 * median_s:.2f} ms, 90 % {1e3 * ninth_s:.2f} ms",
         f"speed    {speed}: {solved.solved_now:,} in {solved.seconds:,.1f} s",
+        problems=count,
+        solved=with_plan,
+        outcomes=dict(outcomes),
+        planning_mean_seconds=mean_s,
+        planning_median_seconds=median_s,
+        planning_p90_seconds=ninth_s,
+        solved_now=solved.solved_now,
+        seconds=solved.seconds,
     )

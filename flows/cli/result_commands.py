@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flows.cli.run_options import worker_count
-from flows.cli.terminal import write
+from flows.cli.terminal import write, write_answer, write_files
 
 
 def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) -> None:
@@ -18,7 +18,9 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
     """
     from tasks.requests.verify import verify as task
 
-    task(folder, sample, worker_count(workers))
+    checked = task(folder, sample, worker_count(workers))
+    lines = [f"{count:9,} {what}" for what, count in checked.items()]
+    write_answer(*lines, "No fault found.", checked=dict(checked))
 
 
 def export(run: Path, *, format: str, out: Path) -> None:
@@ -35,7 +37,7 @@ def export(run: Path, *, format: str, out: Path) -> None:
     from tasks.settings.environment import run_named
 
     export_run(run if format == "dynobench" else run_named(run), format, out)
-    write(f"exported {out}")
+    write_files(exported=out)
 
 
 def compare(*runs: Path, out: Path | None = None, measure: bool = False, problems: int | None = None) -> None:
@@ -51,5 +53,4 @@ def compare(*runs: Path, out: Path | None = None, measure: bool = False, problem
     from tasks.settings.environment import run_named
 
     write(*task([run_named(run) for run in runs], out, measure, problems).told())
-    if out is not None:
-        write(f"compared {out}")
+    write_files(compared=out)

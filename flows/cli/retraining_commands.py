@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -10,7 +11,7 @@ from cyclopts import Parameter
 
 from flows.cli.run_options import Options, worker_count
 from flows.cli.stage_commands import settings_of
-from flows.cli.terminal import write
+from flows.cli.terminal import write, write_answer
 
 if TYPE_CHECKING:
     from prefect import Flow
@@ -84,8 +85,7 @@ def promote(*, memory: str | None = None, data: Path | None = None) -> None:
     from tasks.champions.promote import promote_awaiting
     from tasks.settings.environment import default_data
 
-    for name, before, now in promote_awaiting(data or default_data(), memory):
-        write(f"{name}: version {now} is champion, was {before}")
+    _write_champions(promote_awaiting(data or default_data(), memory), "champion")
 
 
 def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
@@ -98,8 +98,15 @@ def rollback(*, memory: str | None = None, data: Path | None = None) -> None:
     from tasks.champions.promote import roll_back
     from tasks.settings.environment import default_data
 
-    for name, before, now in roll_back(data or default_data(), memory):
-        write(f"{name}: version {now} is champion again, was {before}")
+    _write_champions(roll_back(data or default_data(), memory), "champion again")
+
+
+def _write_champions(changed: Iterable[tuple[str, object, object]], what: str) -> None:
+    """Write each memory's name, and the numbers of its champion before and now."""
+    changed = list(changed)
+    lines = [f"{name}: version {now} is {what}, was {before}" for name, before, now in changed]
+    champions = [{"memory": name, "version_before": before, "version": now} for name, before, now in changed]
+    write_answer(*lines, champions=champions)
 
 
 def _settings(options: Options) -> RunSettings:

@@ -1,8 +1,8 @@
 """What the command line writes: results and notices to the output, warnings and progress to the error stream.
 
 Nothing else writes to a terminal. Below ``flows.cli`` results are returned, and what has to be told meanwhile
-is logged: as text, as a ``CellTable``, or as the ``Progress`` of work. With ``--json`` all of it is
-collected, and written to the output at the end as one document.
+is logged: as text, as a ``CellTable``, as a dict of paths by name, or as the ``Progress`` of work. With
+``--json`` all of it is collected, and written to the output at the end as one document.
 """
 
 from __future__ import annotations
@@ -60,6 +60,13 @@ def write(*items: str | CellTable) -> None:
         else:
             _draw(item)
     sys.stdout.flush()
+
+
+def write_answer(*lines: str, **answer: object) -> None:
+    """Write what was asked for: as lines for people, as the fields of ``answer`` for programs."""
+    if _telling.document is not None:
+        _telling.document.answer = answer
+    write(*lines)
 
 
 def write_files(**paths: object) -> None:
@@ -121,7 +128,7 @@ class Notices(logging.Handler):
     """Writes notices to the output, and warnings and errors to the error stream."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a record; its message is a text or a ``CellTable``."""
+        """Write a record; its message is a text, a ``CellTable``, or paths by name."""
         document, message = _telling.document, record.msg
         if isinstance(message, str):
             message = record.getMessage()
@@ -131,12 +138,15 @@ class Notices(logging.Handler):
                 document.warnings.append(message)
         elif record.name in DETAILS and not _telling.verbose:
             return
-        elif document is not None:
+        elif isinstance(message, str) and document is not None:
             document.add(message)
-            if isinstance(message, str) and not _telling.quiet:
+            if not _telling.quiet:
                 print(message, file=sys.stderr, flush=True)
-        elif not _telling.quiet or record.name.startswith(RESULTS):
-            write(message)
+        elif document is not None or not _telling.quiet or record.name.startswith(RESULTS):
+            if isinstance(message, dict):
+                write_files(**message)
+            else:
+                write(message)
 
 
 class ProgressShown(logging.Handler):

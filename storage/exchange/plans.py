@@ -43,31 +43,29 @@ class PlanRecord:
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
-    """Write a ``record`` to ``path`` as the plan contract's JSON.
+    """Write a ``record`` to ``path`` as the plan contract's JSON."""
+    write_json(path, plan_fields(record), indent=None)
+
+
+def plan_fields(record: PlanRecord) -> dict[str, Any]:
+    """The fields of a ``record`` as in the plan contract's JSON.
 
     Without a plan, states and controls are empty and lengths null. If the scale is not 1, positions, speeds
     and accelerations are those of a vehicle that is so much larger.
     """
     plan = record.plan and shifted(scaled(record.plan, record.scale), record.offset)
     scale = {} if record.scale == 1.0 else {"scale": record.scale}
-    write_json(
-        path,
-        {
-            **{
-                name: getattr(record, name)
-                for name in ("problem_id", "status", "source", "planner", "assist")
-            },
-            "vehicle": record_of(record.vehicle),
-            **scale,
-            "dt": None if plan is None else plan.dt,
-            "states": [] if plan is None else plan.states.tolist(),
-            "controls": [] if plan is None else plan.controls.tolist(),
-            "planning_seconds": record.planning_seconds,
-            "length_m": None if plan is None else plan.length_m,
-            "duration_s": None if plan is None else plan.duration_s,
-        },
-        indent=None,
-    )
+    return {
+        **{name: getattr(record, name) for name in ("problem_id", "status", "source", "planner", "assist")},
+        "vehicle": record_of(record.vehicle),
+        **scale,
+        "dt": None if plan is None else plan.dt,
+        "states": [] if plan is None else plan.states.tolist(),
+        "controls": [] if plan is None else plan.controls.tolist(),
+        "planning_seconds": record.planning_seconds,
+        "length_m": None if plan is None else plan.length_m,
+        "duration_s": None if plan is None else plan.duration_s,
+    }
 
 
 def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:

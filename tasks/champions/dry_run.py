@@ -22,6 +22,7 @@ from tasks.stages.curate import chosen
 from tasks.stages.hallucinate import plans_at_once
 
 HEADINGS: Final = ("class", "champion", "new experiences", "plans that change", "shards hallucinated anew")
+FIELDS: Final = ("class", "champion", "new_experiences", "changed_plans", "shards")
 
 
 def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
@@ -48,7 +49,7 @@ def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
         _row(folder, settings, pending, name) for name in settings.class_names if name in pending.champions
     ]
     if rows:
-        said.append(CellTable("Retraining now", HEADINGS, [rows]))
+        said.append(CellTable("Retraining now", HEADINGS, [rows], "retraining", FIELDS))
     if first_run is None and not pending.fresh:
         said.append("Nothing new was learned since champions were last judged: nothing would be done.")
     return said

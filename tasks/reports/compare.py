@@ -36,7 +36,7 @@ class Comparison(NamedTuple):
 
     def told(self) -> Iterator[str | CellTable]:
         """All of it in lines and tables."""
-        yield CellTable("What differs", ("setting", *self.names), [self.different])
+        yield CellTable("What differs", ("setting", *self.names), [self.different], "settings")
         yield self.how
         for name, rows in self.tables.items():
             yield f"{name} against {self.names[0]}: {verdict(rows)}"

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from planners.attempt import Attempt
+from planners.attempt import PARTS, Attempt
 from planners.explanation import recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
@@ -28,6 +28,7 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
+from tasks.requests.plan_answers import plan_answer
 from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
@@ -46,6 +47,15 @@ class AssistantSettings(NamedTuple):
     vehicle: str = DEFAULT_VEHICLE
     improve_seconds: float = 0.0  # how long to improve a plan after it is found
     recall: str | None = None  # None takes the strategy that suits the memory
+
+
+class PlannedOne(NamedTuple):
+    """What came of planning for one problem."""
+
+    attempt: Attempt
+    plan: Plan | None  # in the frame of the problem
+    answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
+    failure: str | None  # why there is no plan, in one line
 
 
 class Assistant:
@@ -148,7 +158,7 @@ def plan_one(
     drawing: Path | None,
     explained: bool = False,
     learn: Path | None = None,
-) -> tuple[Attempt, Plan]:
+) -> PlannedOne:
     """Plan for the one problem in a file.
 
     Args:
@@ -160,11 +170,11 @@ def plan_one(
         learn: the data folder to which the problem and its plan are added as an experience, or None.
 
     Returns:
-        the attempt and its plan, in the frame of the problem.
+        what came of it; finding no plan is an answer too.
 
     Raises:
         UsageError: the picture's format is unknown, or an output would be written over an input.
-        RunError: the file does not hold exactly one problem, or no plan was found.
+        RunError: the file does not hold exactly one problem.
     """
     check_picture(drawing)
     check_outputs([problem, *assistant.files], [out, drawing])
@@ -174,8 +184,9 @@ def plan_one(
     with no_garbage_collection():
         assistant.warm_up(problems[0])
         attempt, plan = assistant(problems[0])
+    record = plan_record(assistant, problems[0], attempt, plan)
     if out is not None:
-        write_plan(out, plan_record(assistant, problems[0], attempt, plan))
+        write_plan(out, record)
     if learn is not None:
         remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
@@ -190,9 +201,9 @@ def plan_one(
         save_picture(figure, drawing)
     if explained:
         _explain(assistant, problems[0], attempt, recalled)
-    if plan is None:
-        raise RunError(f"No plan for {problems[0].id or problem}: {summary}.")
-    return attempt, plan
+    failure = f"No plan for {problems[0].id or problem}: {summary}." if plan is None else None
+    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in PARTS}}
+    return PlannedOne(attempt, plan, plan_answer(record, out, attempt.verified) | parts, failure)
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:

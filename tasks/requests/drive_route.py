@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from dashboards.cells import CellTable
+from dashboards.cells import NOTHING, CellTable
 from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
@@ -27,12 +27,23 @@ from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
+from tasks.requests.plan_answers import plan_answer
 from tasks.settings.checks import check_known, check_outputs, check_picture
 from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
 HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
+FIELDS: Final = (
+    "leg",
+    "source",
+    "driven_m",
+    "braking_m",
+    "duration_s",
+    "first_speed_mps",
+    "planning_ms",
+    "retrieval_ms",
+)
 RETRIEVAL: Final = (
     "occupancy",
     "encode",
@@ -62,6 +73,7 @@ class DrivenRoute(NamedTuple):
 
     legs: CellTable
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
+    answer: dict[str, Any]  # for programs: of ``plan_answer``, and what it is made of
 
 
 def _numbers_of(text: str, count: int, option: str, meaning: str) -> tuple[float, ...]:
@@ -145,8 +157,9 @@ def drive_route(
         raise _refusal(route, world, scale)
     plan = route.plan(assistant.vehicle)
     _check(route, plan, assistant)
+    record = _record(route, plan, world, assistant, solver, scale)
     if out is not None:
-        write_plan(out, _record(route, plan, world, assistant, solver, scale))
+        write_plan(out, record)
     summary = _summary(route, plan, solver, assistant, scale, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
@@ -154,7 +167,13 @@ def drive_route(
 
         figure = route_picture(world, route, goals_m, scale, summary[0], assistant.vehicle)
         save_picture(figure, drawing)
-    return DrivenRoute(_table(route, assistant, scale), summary)
+    more = {
+        "legs": len(route.legs),
+        "legs_from_memory": _from_memory(route),
+        "local_plans": len(solver.seconds),
+        "seconds": seconds,
+    }
+    return DrivenRoute(_table(route, assistant, scale), summary, plan_answer(record, out, True) | more)
 
 
 def _drive_mirrored(
@@ -228,10 +247,10 @@ def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
             f"{whole.duration_s:.1f}",
             f"{round(scale * leg.begin[3], 1) + 0.0:.1f}",
             f"{1000.0 * leg.attempt.planning_seconds:.2f}",
-            f"{1000.0 * retrieval:.2f}" if used_memory else "-",
+            f"{1000.0 * retrieval:.2f}" if used_memory else NOTHING,
         ]
         rows.append(cells)
-    return CellTable("", HEADINGS, [rows])
+    return CellTable("", HEADINGS, [rows], "legs", FIELDS)
 
 
 def _summary(
@@ -242,7 +261,7 @@ def _summary(
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
     }
-    from_memory = len(by_source["recalled"]) + len(by_source["repaired"])
+    from_memory = _from_memory(route)
     lines = [
         f"{scale * plan.length_m:.0f} m in {plan.duration_s:.0f} s, {_count(len(legs), 'leg')}, "
         f"{from_memory} from memory"
@@ -266,6 +285,10 @@ def _summary(
         f"route with its checks {seconds:.2f} s"
     )
     return lines
+
+
+def _from_memory(route: Route) -> int:
+    return sum(leg.source in ("recalled", "repaired") for leg in route.legs)
 
 
 def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:

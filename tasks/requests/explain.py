@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
-from dashboards.cells import CellTable
+from dashboards.cells import NOTHING, CellTable
 from planners.attempt import Attempt
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
@@ -21,6 +21,10 @@ USES: Final = {
     "": "",
 }
 HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
+FIELDS: Final = (
+    "order", "plan", "encoder_rank", "blocked_cells", "blocked_states", "first_blocked_state",
+    "first_blocked_m", "use",
+)  # fmt: skip
 
 _LOG = logging.getLogger(__name__)
 
@@ -74,14 +78,14 @@ def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellT
             f"{position}",
             f"{recollection.plan}",
             f"{recollection.encoder_rank}",
-            "-" if recollection.blocked_cells is None else f"{recollection.blocked_cells}",
+            NOTHING if recollection.blocked_cells is None else f"{recollection.blocked_cells}",
             f"{int(recollection.blocked.sum())} of {len(recollection.blocked)}",
-            "-" if first is None else f"{first}",
-            "-" if first is None else f"({x:.1f}, {y:.1f})",
+            NOTHING if first is None else f"{first}",
+            NOTHING if first is None else f"({x:.1f}, {y:.1f})",
             USES[recollection.use] or missed,
         ]
         rows.append(cells)
-    return CellTable("", HEADINGS, [rows])
+    return CellTable("", HEADINGS, [rows], "recalled", FIELDS)
 
 
 def _times(attempt: Attempt) -> str:

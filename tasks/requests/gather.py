@@ -8,7 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from dashboards.cells import CellTable
+from dashboards.cells import NOTHING, CellTable
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from storage.archives.libraries import save_library
@@ -32,6 +32,7 @@ GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
 FEW_PLANS: Final = 200  # gathering so many here takes less time than starting a server and workers
 HEADINGS: Final = ("source", "questions", "plans", "driving s")
+FIELDS: Final = ("source", "questions", "plans", "driving_s")
 
 
 class Answered(NamedTuple):
@@ -145,6 +146,6 @@ def _table(sources: Sequence[str], tried: Counter[int], kept: Sequence[Answered]
     rows = []
     for number, name in enumerate(sources):
         seconds = [each.variants[0].plan.duration_s for each in kept if each.source == number]
-        mean = f"{sum(seconds) / len(seconds):.1f}" if seconds else "-"
+        mean = f"{sum(seconds) / len(seconds):.1f}" if seconds else NOTHING
         rows.append([[Path(name).name, f"{tried[number]:,}", f"{len(seconds):,}", mean]])
-    return CellTable("", HEADINGS, rows)
+    return CellTable("", HEADINGS, rows, "gather", FIELDS)

@@ -35,6 +35,7 @@ BOTH: Final = "both"
 ONLY_OF_MAPS: Final = {"tolerance_m": 0.0, "seed": 1}  # options with their defaults
 
 HEADINGS: Final = ("class", "part", "problems", "skipped", "pieces", "a problem", "seconds")
+FIELDS: Final = ("class", "part", "problems", "skipped", "pieces", "pieces_per_problem", "seconds")
 
 _LOG = logging.getLogger(__name__)
 
@@ -139,7 +140,7 @@ def import_worlds(
     if drawing is not None:
         _draw(source, settings, imported_parts, drawing)
     _warn_of_skipped([line for imported in imported_parts.values() for line in imported.skipped])
-    return CellTable("", HEADINGS, [[row] for row in rows])
+    return CellTable("", HEADINGS, [[row] for row in rows], "import", FIELDS)
 
 
 def _write(out: Path, imported_parts: Mapping[Part, Imported], vehicle: Vehicle) -> None:

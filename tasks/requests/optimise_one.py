@@ -6,7 +6,7 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from dashboards.figures.pictures import picture
 from dashboards.figures.style import save_picture
@@ -21,6 +21,7 @@ from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, read_plan, write_plan
 from storage.exchange.problems import read_problems
 from storage.vehicles.vehicle_files import said_vehicle
+from tasks.requests.plan_answers import plan_answer
 from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
@@ -76,6 +77,7 @@ class OptimisedOne(NamedTuple):
     duration_s: float
     guess_duration_s: float
     clearance_m: float  # the least distance to an obstacle
+    answer: dict[str, Any]  # for programs: of ``plan_answer``, and the numbers above
 
 
 def initial_guess(
@@ -136,8 +138,9 @@ def optimise_one(
     guess, planner = initial.guess(problem)
     optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)
     seconds = perf_counter() - start
+    record = _record(problem, optimised, planner, seconds, initial.vehicle)
     if out is not None:
-        write_plan(out, _record(problem, optimised, planner, seconds, initial.vehicle))
+        write_plan(out, record)
     summary = f"{optimised.status}, {optimised.iterations} iterations, {1000 * seconds:.0f} ms"
     if drawing is not None:
         caption = f"optimised, {planner}: {summary}"
@@ -145,13 +148,19 @@ def optimise_one(
         save_picture(figure, drawing)
     if optimised.plan is None:
         raise RunError(f"No plan for {problem.id or problem_file}: {summary}.")
-    clearance = least_clearance(problem, optimised.plan.states, initial.vehicle)
+    clearance_m = problem.scale * least_clearance(problem, optimised.plan.states, initial.vehicle)
+    more = {
+        "iterations": optimised.iterations,
+        "guess_duration_s": guess.duration_s,
+        "clearance_m": clearance_m,
+    }
     return OptimisedOne(
         summary,
         problem.scale * optimised.plan.length_m,
         optimised.plan.duration_s,
         guess.duration_s,
-        problem.scale * clearance,
+        clearance_m,
+        plan_answer(record, out, True) | more,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 from storage.places.data_folder import MARK, open_data_folder
@@ -10,13 +11,16 @@ from tasks.servers.prefect_server import set_environment
 from tasks.settings.errors import RunError, UsageError
 
 
-def verify(folder: Path, sample: float, workers: int) -> None:
+def verify(folder: Path, sample: float, workers: int) -> Counter[str]:
     """Check the files of a data folder.
 
     Args:
         folder: the data folder.
         sample: share of the benchmark's problems that are attempted again, 0 to 1.
         workers: the number of worker processes.
+
+    Returns:
+        how many of each kind were checked.
 
     Raises:
         UsageError: the sample is not a share.
@@ -29,4 +33,4 @@ def verify(folder: Path, sample: float, workers: int) -> None:
     set_environment(open_data_folder(folder).path)
     from tasks.requests.verify_folder import verify_folder
 
-    verify_folder(folder, sample, workers)
+    return verify_folder(folder, sample, workers)

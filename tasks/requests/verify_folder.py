@@ -58,13 +58,16 @@ Findings = tuple[Counter[str], list[str]]  # counts of what was checked, and a l
 Check = Callable[[], Findings]
 
 
-def verify_folder(folder: Path, sample: float, workers: int) -> None:
-    """Check a whole data folder, and log what was checked, with counts.
+def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
+    """Check a whole data folder.
 
     Args:
         folder: the data folder.
         sample: the share of the attempted problems whose attempts are made again, 0 to 1.
         workers: the number of worker processes; one worker checks in this process.
+
+    Returns:
+        how many of each kind were checked.
 
     Raises:
         RunError: the folder holds no run, or something in it is wrong; the faults are logged.
@@ -82,15 +85,13 @@ def verify_folder(folder: Path, sample: float, workers: int) -> None:
         for counts, new_faults in (pool.map if workers > 1 else map)(_run, checks):
             checked += counts
             faults_found += new_faults
-    for what, count in checked.items():
-        _LOG.info(f"{count:9,} {what}")
     if faults_found:
         _LOG.error("\n".join(faults_found[:MOST_FAULTS_TOLD]))
         raise RunError(
             f"{len(faults_found)} faults in {folder}; delete the files that are named, and repeat the "
             "command that made them."
         )
-    _LOG.info("No fault found.")
+    return checked
 
 
 def _run(check: Check) -> Findings:

@@ -88,9 +88,8 @@ def _workers_for(
 
 def _log_locations(folder: DataFolder, settings: RunSettings) -> None:
     run = folder.run(settings.run_name)
-    _LOG.info("data     %s", shown(run.path if is_there(run.settings) else folder.path))
-    if is_there(run.figures):
-        _LOG.info("figures  %s", shown(run.figures))
+    places = {"data": shown(run.path if is_there(run.settings) else folder.path)}
+    _LOG.info(places | ({"figures": shown(run.figures)} if is_there(run.figures) else {}))
     uri = redacted(tracking_uri(folder))
     _LOG.info("MLflow   %s", uri if uri.startswith("http") else f"mlflow ui --backend-store-uri {uri}")
     server = redacted(os.environ.get("PREFECT_API_URL", "")).removesuffix("/api")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import sqlite3
 from collections import Counter
@@ -201,11 +202,11 @@ def test_verify_finds_no_fault_and_then_the_one_that_is_planted(
     shutil.copytree(runs[1].path.parents[1], folder)
     (run,) = DataFolder(folder).runs()
     asked = ["verify", str(folder), "--workers", "1", "--sample"]
-    assert call([*asked, "1"]) == 0
+    assert call([*asked, "1", "--json"]) == 0
     printed = capsys.readouterr()
     assert printed.err == ""
     attempts = sum(len(rows_of(path)) for path in run.results.rglob("*.parquet"))
-    assert f"{attempts} attempts made again" in printed.out
+    assert json.loads(printed.out)["answer"]["checked"]["attempts made again"] == attempts
     damaged = run.memory("trap") / "encoder.safetensors"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"!")
     assert call([*asked, "0"]) == 1

@@ -29,7 +29,7 @@ ROWS = [
         "planner": "gust",
         "ms": 0.5,
         "reduction % [95 %]": {"value": 98, "low": 97, "high": 100},
-        "checks": "12→9",
+        "checks": {"first": 12, "other": 9},
     },
 ]
 
@@ -37,7 +37,7 @@ ROWS = [
 def test_a_document_has_the_rows_of_the_table_as_values() -> None:
     document = Document()
     document.add(TABLE)
-    assert document.tables == [{"title": "Times", "rows": ROWS}]
+    assert document.tables == [{"name": "", "title": "Times", "rows": ROWS}]
 
 
 @given(st.floats(0.0, 1e12), st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3), st.integers(0, 2))
@@ -71,7 +71,8 @@ def test_the_output_is_one_document_and_notices_stay_on_the_error_stream(
     out, err = _told(capsys, document=Document())
     assert json.loads(out) == {
         "exit_code": 0,
-        "tables": [{"title": "Times", "rows": ROWS}],
+        "answer": None,
+        "tables": [{"name": "", "title": "Times", "rows": ROWS}],
         "lines": ["found 7", "done"],
         "files": {"rows": "rows.parquet"},
         "warnings": ["mind this"],

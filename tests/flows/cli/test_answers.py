@@ -1,0 +1,145 @@
+"""Every command's JSON is as docs/commands.md says: the fields of its answer, and those of its tables."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dashboards.report import tables
+from dashboards.verdicts import comparison_tables, promotion
+from flows.cli.main import call
+from storage.exchange.problems import fields_of, write_problems
+from tasks.champions import dry_run
+from tests.tasks.served import problem, write_memory
+from tests.worlds import problem_of
+
+PAGE = (Path(__file__).parents[3] / "docs" / "commands.md").read_text(encoding="utf-8")
+ROWS = [line.strip("|").split(" | ") for line in PAGE.splitlines() if line.startswith("| `")]
+NAMES = re.compile(r"`([^`]+)`")
+ANSWERS = {
+    name: NAMES.findall(told.partition(";")[0])
+    for names, told in (row for row in ROWS if len(row) == 2 and row[1].startswith("`"))
+    for name in NAMES.findall(names)
+}
+TABLES = [
+    (NAMES.findall(row[0])[0], NAMES.findall(row[1]), NAMES.findall(row[2])) for row in ROWS if len(row) == 3
+]
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a memory, problems and a map."""
+    place = tmp_path_factory.mktemp("answers")
+    write_memory(place / "memory")
+    (place / "one.json").write_text(json.dumps(fields_of(problem(0))))
+    (place / "few.jsonl").write_text("\n".join(json.dumps(fields_of(problem(i))) for i in range(3)))
+    write_problems(place / "empty.parquet", [problem_of([], "empty")])
+    blocked = {"start": [0, 0, 0], "goal": [30, 0], "bounds": [-9, -9, 40, 9], "id": "walled"}
+    (place / "walled.json").write_text(
+        json.dumps(blocked | {"obstacles": [[[9, -9], [10, -9], [10, 9], [9, 9]]]})
+    )
+    np.save(place / "town.npy", np.zeros((160, 160), np.uint8))
+    return place
+
+
+def _told(words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any, code: int = 0) -> Any:
+    monkeypatch.chdir(place)
+    assert call([*words.split(), "--json"]) == code
+    told = json.loads(capsys.readouterr().out)
+    assert list(told) == ["exit_code", "answer", "tables", "lines", "files", "warnings", "error"]
+    assert told["exit_code"] == code
+    assert (told["error"] is None) == (code == 0)
+    assert all(Path(path).exists() for path in told["files"].values())
+    name = words.split()[0]
+    assert sorted(told["answer"] or []) == sorted(ANSWERS.get(name, []))
+    for table in told["tables"]:
+        shapes = [fields for known, of, fields in TABLES if known == table["name"] and name in of[0]]
+        assert all(list(row) in shapes for row in table["rows"]), table
+    return told
+
+
+@pytest.mark.parametrize(
+    ("words", "names", "files"),
+    [
+        ("draw parallel --problems 2 --out drawn.jsonl", [], ["problems"]),
+        ("plan one.json --memory memory --explain", ["recalled"], []),
+        ("plan one.json --out plan.json --picture plan.png", [], ["plan", "picture"]),
+        ("optimise empty.parquet --straight", [], []),
+        ("solve few.jsonl --out rows.parquet --plans plans", [], ["rows", "plans"]),
+        ("import-worlds town.npy --problems 2 --out town.jsonl", ["import"], ["problems"]),
+        ("gather few.jsonl --plans 2 --workers 1 --out library", ["gather"], ["library"]),
+        ("route town.npy --from 20,20,0 --to 120,120 --out route.json", ["legs"], ["plan"]),
+        ("export plan.json --format dynobench --out trajectory.yaml", [], ["exported"]),
+    ],
+)
+def test_a_command_tells_programs_what_is_documented(
+    words: str,
+    names: list[str],
+    files: list[str],
+    place: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if words.startswith("export"):
+        _told("plan one.json --out plan.json", place, monkeypatch, capsys)
+    told = _told(words, place, monkeypatch, capsys)
+    assert [table["name"] for table in told["tables"]] == names
+    assert list(told["files"]) == files
+
+
+def test_the_parts_of_a_plan_are_numbers_and_its_states_are_there_once(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = _told("plan one.json", place, monkeypatch, capsys)["answer"]
+    assert answer["verified"] is True
+    assert sum(answer["parts_seconds"].values()) <= answer["planning_seconds"]
+    assert len(answer["states"]) == answer["waypoints"] == len(answer["controls"]) + 1
+    assert answer["duration_s"] == pytest.approx(answer["dt"] * len(answer["controls"]))
+    told = _told("plan one.json --out kept.json", place, monkeypatch, capsys)
+    assert told["answer"]["states"] is None
+    kept = json.loads(Path(told["files"]["plan"]).read_text())
+    assert (kept["states"], kept["controls"]) == (answer["states"], answer["controls"])
+
+
+def test_no_plan_is_an_answer_too(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = _told("plan walled.json --planner gust", place, monkeypatch, capsys, code=1)["answer"]
+    assert answer["status"] != "solved"
+    assert (answer["source"], answer["length_m"], answer["verified"], answer["states"]) == (
+        None,
+        None,
+        None,
+        [],
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "command", "headings", "fields"),
+    [
+        ("summary", "run", tables._HEADINGS, tables._FIELDS),
+        ("retrieval", "report", tables.RETRIEVAL_HEADINGS, tables._RETRIEVAL_FIELDS),
+        ("stages", "report", tables.STAGE_HEADINGS, tables._STAGE_FIELDS),
+        ("sweep", "sweep", tables._SWEEP_HEADINGS, tables._SWEEP_FIELDS),
+        ("comparison", "compare", comparison_tables.HEADINGS, comparison_tables.FIELDS),
+        (
+            "comparison",
+            "compare --measure",
+            comparison_tables.HEADINGS_IN_TURN,
+            comparison_tables.FIELDS_IN_TURN,
+        ),
+        ("judgement", "retrain", promotion.HEADINGS, promotion.FIELDS),
+        ("retraining", "retrain --dry-run", dry_run.HEADINGS, dry_run.FIELDS),
+    ],
+)
+def test_the_tables_of_runs_are_documented(
+    name: str, command: str, headings: tuple[str, ...], fields: tuple[str, ...]
+) -> None:
+    (documented,) = [told for known, of, told in TABLES if known == name and command in of]
+    assert tuple(each for each in documented if each != "panel") == fields
+    assert len(headings) == len(fields)
