@@ -7,16 +7,19 @@ and Prefect's form shows the options with their choices. Workers and servers are
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable
 from dataclasses import fields
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from types import UnionType
+from types import NoneType, UnionType
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge
 from prefect import Flow
+from prefect.utilities.callables import parameter_schema
+from pydantic_core import MISSING
 
 from flows.benchmark import benchmark as benchmark_flow
 from flows.build_memory import build_memory as build_memory_flow
@@ -33,6 +36,7 @@ from flows.retrain import retrain as retrain_flow
 from flows.run import run as run_flow
 from flows.sweep import sweep as sweep_flow
 from flows.train import train as train_flow
+from tasks.servers.access import auth_environment
 from tasks.session.folder_lock import locked_folder
 
 _KEYWORD: Final = inspect.Parameter.KEYWORD_ONLY
@@ -81,7 +85,18 @@ def _flow_of(
     deployed.__name__ = name.replace("-", "_")
     deployed.__doc__ = told
     deployed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # read by Prefect
-    return Flow(deployed, name=name, task_runner=task_runner, flow_run_name=_run_name)
+    flow = Flow(deployed, name=name, task_runner=task_runner, flow_run_name=_run_name)
+    flow.__signature__ = inspect.Signature([*map(_in_form, parameters)])  # type: ignore[attr-defined]  # too
+    flow.parameters = parameter_schema(flow)
+    return flow
+
+
+def _in_form(parameter: inspect.Parameter) -> inspect.Parameter:
+    """A parameter as the form shows it: a field to leave empty, and not a choice between a value and None."""
+    if parameter.default is not None:
+        return parameter
+    kinds = [each for each in get_args(parameter.annotation) if each is not NoneType]
+    return parameter.replace(annotation=reduce(or_, kinds) | MISSING, default=MISSING)
 
 
 def _run_name() -> str:
@@ -109,6 +124,7 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
     options = [each for each in _options_of(Options) if each.name not in _ELSEWHERE]
 
     def body(**given: Any) -> None:
+        _let_in()
         further = {each.name: given.pop(each.name) for each in own}
         chosen = Options(**given)
         with locked_folder(chosen.folder) as folder:
@@ -129,6 +145,7 @@ def _command(command: Callable[..., None]) -> Flow[..., None]:
             own.append(_parameter(each.name, types[each.name], each.default))
 
     def body(**given: Any) -> None:
+        _let_in()
         values = {
             name: types[name](**{each.name: given.pop(each.name) for each in options})
             for name, options in groups.items()
@@ -138,6 +155,12 @@ def _command(command: Callable[..., None]) -> Flow[..., None]:
     flat = [*own, *(each for options in groups.values() for each in options)]
     told = _told(command, *(types[name] for name in groups))
     return _flow_of(command.__name__.replace("_", "-"), None, body, flat, told)
+
+
+def _let_in() -> None:
+    """Let MLflow's client find the password of the servers, as a command does."""
+    for name, value in auth_environment().items():
+        os.environ.setdefault(name, value)
 
 
 def _told(function: Callable[..., Any], *options: type) -> str:

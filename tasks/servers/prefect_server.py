@@ -59,6 +59,7 @@ ENVIRONMENT: Final = {
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
     "PREFECT_CLIENT_RETRY_EXTRA_CODES": "500,504",  # the answers of a server that cannot reach its database
     "MLFLOW_LOGGING_LEVEL": "ERROR",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
     "DASK_LOGGING__DISTRIBUTED": "critical",
     "NO_PROXY": "127.0.0.1,localhost",
     "PYTHONWARNINGS": "ignore:resource_tracker:UserWarning",  # it cleans up after killed processes

@@ -86,6 +86,13 @@ def test_every_parameter_is_described_in_the_form(deployed: list[dict[str, Any]]
         assert set(silent) <= {"approve"}
 
 
+def test_the_form_asks_for_values_and_not_whether_there_is_one(deployed: list[dict[str, Any]]) -> None:
+    for deployment in deployed:
+        for shown in _flow(deployment).parameters.properties.values():
+            assert shown["type"] in ("string", "integer", "number", "boolean", "array")
+            assert shown.get("default", "") is not None  # or the form would send it, and be refused
+
+
 def test_choices_are_those_that_there_are() -> None:
     for offered, there_are in (
         (choices.PresetName, PRESETS),
