@@ -21,7 +21,8 @@ class Finding(NamedTuple):
     """What was found in one panel."""
 
     panel: str
-    text: str
+    text: str  # of the strongest planner
+    others: str  # of the other planners
 
 
 def findings(summary: pd.DataFrame) -> list[Finding]:
@@ -48,7 +49,7 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
             f"{duration(now['mean_ms'])} instead of {duration(before['mean_ms'])} ({_planning(now)}), "
             f"and its robot {_arrival(now)}."
         ]
-        sentences += [
+        of_others = [
             f"{planner_title(planner)}: {_planning(helped[planner])}, and its robot "
             f"{_arrival(helped[planner])}."
             for planner in others
@@ -57,19 +58,20 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
             sentences.append(f"Solved are {now['solved']:.1%} instead of {before['solved']:.1%}.")
         answered = now["recalled"] + now["repaired"]
         sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
-        found.append(Finding(f"{panel}, {int(rows['problems'].max()):,} new problems", " ".join(sentences)))
+        title = f"{panel}, {int(rows['problems'].max()):,} new problems"
+        found.append(Finding(title, " ".join(sentences), " ".join(of_others)))
     return found
 
 
 def findings_markdown(summary: pd.DataFrame) -> str:
-    """The findings of a ``summary`` as Markdown, a heading and a paragraph for each panel."""
-    return "\n\n".join(f"## {each.panel}\n\n{each.text}" for each in findings(summary))
+    """The findings of a ``summary`` as Markdown, a heading for each panel."""
+    return "\n\n".join(f"## {each.panel}\n\n{each.text}\n\n{each.others}" for each in findings(summary))
 
 
 def for_pages(found: Sequence[Finding]) -> list[Finding]:
     """What was ``found``, with no line that ends between a number and its unit."""
     unit = re.compile(r"(?<=\d) (?=(?:s|ms|µs|%)(?![a-z]))")
-    return [each._replace(text=unit.sub("\N{NO-BREAK SPACE}", each.text)) for each in found]
+    return [Finding(*(unit.sub("\N{NO-BREAK SPACE}", words) for words in each)) for each in found]
 
 
 def _by_planner(rows: pd.DataFrame) -> dict[str, Row]:

@@ -157,6 +157,7 @@ def lines(
     x_ends: tuple[float, float] | None = None,
     y_ends: tuple[float, float] | None = None,
     x_ticks: Sequence[float] | None = None,
+    ratios: bool = False,
     has_cursor: bool = False,
 ) -> Drawing:
     """Lines over a common axis.
@@ -170,15 +171,19 @@ def lines(
         x_ends: lowest and highest x; None if the lines decide.
         y_ends: lowest and highest y; None if the lines decide.
         x_ticks: the ticks of the x axis; None if the lines decide.
+        ratios: whether y are ratios, whose axis is logarithmic, with a line at 1.
         has_cursor: whether there is a vertical line that the page's script moves.
     """
     bands = [band for line in drawn for band in (line.y, line.low, line.high) if band is not None]
     x_low, x_high = x_ends or span(np.concatenate([line.x for line in drawn]).tolist(), margin=0.0)
     y_low, y_high = y_ends or span(np.concatenate(bands).tolist())
     left, right, top, bottom = 50.0, WIDTH - 14.0, 22.0, height - 36.0
-    across, up = Scale(x_low, x_high, left, right), Scale(y_low, y_high, bottom, top)
+    of_axis: type[Scale] | type[LogScale] = LogScale if ratios else Scale
+    across, up = Scale(x_low, x_high, left, right), of_axis(y_low, y_high, bottom, top)
     marks = [_x_axis(across, bottom, x_axis, x_ticks), *_y_axis(up, left, right)]
     marks.append(text(y_axis, 2.0, 12.0, class_="name"))
+    if ratios:
+        marks.append(element("line", x1=left, x2=right, y1=up.at(1.0), y2=up.at(1.0), class_="zero"))
     for line in drawn:
         sound = np.isfinite(line.y)
         x, y = across.pixels(line.x[sound]), up.pixels(line.y[sound])
@@ -275,7 +280,7 @@ def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float
     return "".join(marks)
 
 
-def _y_axis(scale: Scale, left: float, right: float) -> list[str]:
+def _y_axis(scale: Scale | LogScale, left: float, right: float) -> list[str]:
     marks = []
     for value in scale.ticks(4):
         y = scale.at(value)

@@ -83,6 +83,10 @@ class LogScale(NamedTuple):
         ends = Scale(math.log(self.low), math.log(self.high), self.first, self.last)
         return ends.at(math.log(max(value, self.low)))
 
+    def pixels(self, values: Floats) -> Floats:
+        """The pixels of ``values [n]``."""
+        return np.array([self.at(float(value)) for value in values])
+
     def ticks(self, about: int = 5) -> list[float]:
         """1, 2, 5, 10 … on the scale, or powers of ten alone if these are more than ``about``."""
         powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)

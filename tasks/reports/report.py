@@ -225,7 +225,7 @@ def log_tables(report: Report, run: RunFolder) -> None:
     log_retrieval(report.retrieval)
     _LOG.info(stages_table(stage_cells(stages_of(run))))
     for found in findings(report.summary):
-        _LOG.info(f"{fill(f'{found.panel}: {found.text}', LINE)}\n")
+        _LOG.info(f"{fill(f'{found.panel}: {found.text} {found.others}', LINE)}\n")
 
 
 def log_retrieval(retrieval: pd.DataFrame) -> None:

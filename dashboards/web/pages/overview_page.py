@@ -16,7 +16,6 @@ from dashboards.cells import (
     panel_title,
     percent,
     planner_title,
-    with_interval,
 )
 from dashboards.palette import TIME_COLOURS, colour_of
 from dashboards.report.findings import findings, for_pages
@@ -76,20 +75,19 @@ def overview(data: DataReader, params: Parameters) -> Page:
         values |= {
             "tables": _tables(summary, name),
             "origin": origin,
-            "best": _best(summary),
             "found": for_pages(findings(summary)),
         }
     return Page("overview.html.jinja", name, "Overview", name, values, charts)
 
 
-def _faster(reduction: float) -> float:
+def faster(reduction: float) -> float:
     """How many times faster planning is whose mean time is less by a share."""
     return 1.0 / max(1.0 - reduction, 1e-4)
 
 
-def _faster_ends(rows: pd.DataFrame) -> tuple[float, float]:
+def faster_ends(rows: pd.DataFrame) -> tuple[float, float]:
     """Ends of an axis of times faster, for the ``rows`` of a summary."""
-    low, high = (_faster(each) for each in (rows["reduction_low"].min(), rows["reduction_high"].max()))
+    low, high = (faster(each) for each in (rows["reduction_low"].min(), rows["reduction_high"].max()))
     finite = [each if each == each else 1.0 for each in (low, high)]
     return max(0.1, min(0.8, finite[0])), max(2.0, 1.1 * finite[1])
 
@@ -102,7 +100,7 @@ def reduction_ends(lows: pd.Series[float]) -> tuple[float, float]:
 
 def _times_faster(row: Row) -> tuple[float, float, float]:
     """How many times faster the planner of a ``row`` is with memory, and the ends of the interval."""
-    return _faster(row["reduction"]), _faster(row["reduction_low"]), _faster(row["reduction_high"])
+    return faster(row["reduction"]), faster(row["reduction_low"]), faster(row["reduction_high"])
 
 
 def _problems_address(run: str, row: Row, **more: str) -> str:
@@ -140,7 +138,7 @@ def _dots(
 def _reduction_chart(summary: pd.DataFrame, run: str, origin: str) -> Chart:
     """How many times faster planning is with each configuration, a drawing a planner and class."""
     rows = summary[summary["configuration"] != BASELINE.label]
-    ends = _faster_ends(rows)
+    ends = faster_ends(rows)
 
     def words(row: Row) -> str:
         times, low, high = _times_faster(row)
@@ -225,24 +223,6 @@ def _tables(summary: pd.DataFrame, run: str) -> list[dict[str, Any]]:
         ]  # fmt: skip
         tables.append({"title": str(panel), "problems": int(rows["problems"].max()), "rows": cells})
     return tables
-
-
-def _best(summary: pd.DataFrame) -> list[dict[str, str]]:
-    """The configuration with the lowest mean time in each panel."""
-    best = []
-    for panel, rows in summary.groupby("panel", sort=False):
-        row = min(rows.to_dict("records"), key=lambda row: row["mean_ms"])
-        less = with_interval(row["reduction"], row["reduction_low"], row["reduction_high"])
-        less = " ".join(less.split()).replace("[ ", "[")  # nothing is aligned here
-        less = "" if row["configuration"] == BASELINE.label else f": {less} % less"
-        best.append(
-            {
-                "panel": "combined memory" if panel == COMBINED else str(panel),
-                "time": duration(row["mean_ms"]),
-                "how": f"{planner_title(row['planner'])}, {row['configuration']}{less}",
-            }
-        )
-    return best
 
 
 def _stages(records: list[dict[str, Any]]) -> list[dict[str, str]]:

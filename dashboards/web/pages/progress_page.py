@@ -17,6 +17,7 @@ from dashboards.web.charts import Chart, Drawing, Line, lines
 from dashboards.web.data_reader import DataReader
 from dashboards.web.notices import NoticeError
 from dashboards.web.page import Page, menu
+from dashboards.web.pages.overview_page import faster, faster_ends
 from dashboards.web.pages.retraining_charts import (
     retraining_charts,
     retraining_rows,
@@ -140,7 +141,7 @@ def _continual(measured: list[MeasuredRun], configuration: str) -> Iterator[Char
         tables = [each.summary.assign(experiences=each.settings["experiences"]) for each in family]
         rows = _of_configuration(tables, configuration)
         drawings = [
-            _reductions(panel_title(str(panel), str(planner)), of_panel.sort_values("experiences"))
+            _times(panel_title(str(panel), str(planner)), of_panel.sort_values("experiences"))
             for (panel, planner), of_panel in rows.groupby(["panel", "planner"], sort=False)
             if of_panel["experiences"].nunique() > 1
         ]
@@ -148,8 +149,9 @@ def _continual(measured: list[MeasuredRun], configuration: str) -> Iterator[Char
             yield Chart(
                 f"continual{ending}",
                 f"Continual improvement: {configuration} with more and more experience",
-                "Reduction of the mean planning time against the same planner without memory, paired by "
-                "problem, with 95 % intervals; each point is a run of its own, from the first stage on. "
+                "Mean planning time of the same planner without memory over that with memory, paired by "
+                "problem, with 95 % intervals; above the line at 1 is faster. Each point is a run of its "
+                "own, from the first stage on. "
                 f"{PLANNING_TIME}",
                 drawings,
                 rows,
@@ -160,11 +162,16 @@ def _percents(rows: pd.DataFrame, *columns: str) -> list[Any]:
     return [100.0 * rows[column].to_numpy(float) for column in columns]
 
 
-def _reductions(title: str, rows: pd.DataFrame) -> Drawing:
-    reduction, low, high = _percents(rows, "reduction", "reduction_low", "reduction_high")
-    line = Line(title, rows["experiences"].to_numpy(float), reduction, BLUE, low, high, dots=True)
-    ends = (min(0.0, max(-100.0, float(np.nanmin(low)))), 100.0)
-    return lines(title, [line], "experiences a class", "less planning time, %", y_ends=ends)
+def _times(title: str, rows: pd.DataFrame) -> Drawing:
+    times, low, high = (
+        rows[column].map(faster).to_numpy(float)
+        for column in ("reduction", "reduction_low", "reduction_high")
+    )
+    line = Line(title, rows["experiences"].to_numpy(float), times, BLUE, low, high, dots=True)
+    return lines(
+        title, [line], "experiences a class", "times faster", y_ends=faster_ends(rows), ratios=True,
+        x_ticks=line.x.tolist() if len(line.x) < 8 else None,
+    )  # fmt: skip
 
 
 def _recall(measured: list[MeasuredRun]) -> Iterator[Chart]:
@@ -208,7 +215,7 @@ def _recall_rows(run: MeasuredRun) -> pd.DataFrame:
 
 
 def _run_after_run(measured: list[MeasuredRun], configuration: str) -> Iterator[Chart]:
-    """The reduction in each run, one after another."""
+    """How many times faster planning is in each run, one after another."""
     tables = [
         run.summary.assign(run=run.name, number=float(number), when=f"{run.when:%Y-%m-%d %H:%M}")
         for number, run in enumerate(measured, start=1)
@@ -223,22 +230,24 @@ def _run_after_run(measured: list[MeasuredRun], configuration: str) -> Iterator[
         drawn = [
             Line(
                 planner_title(str(planner)), of_planner["number"].to_numpy(float),
-                _percents(of_planner, "reduction")[0], planners[str(planner)], dots=True,
+                of_planner["reduction"].map(faster).to_numpy(float), planners[str(planner)], dots=True,
             )
             for planner, of_planner in of_panel.groupby("planner", sort=False)
         ]  # fmt: skip
-        low = min(0.0, max(-100.0, 100.0 * float(of_panel["reduction"].min())))
+        ends = faster_ends(
+            of_panel.assign(reduction_low=of_panel["reduction"], reduction_high=of_panel["reduction"])
+        )
         drawings.append(
             lines(
-                str(panel), drawn, "run, the oldest first (table below)", "less planning time, %",
-                y_ends=(low, 100.0), x_ends=(0.8, len(measured) + 0.2), x_ticks=numbers,
+                str(panel), drawn, "run, the oldest first (table below)", "times faster",
+                y_ends=ends, x_ends=(0.8, len(measured) + 0.2), x_ticks=numbers, ratios=True,
             )
         )  # fmt: skip
     yield Chart(
         "runs",
         f"Run after run: {configuration}",
-        "Reduction of the mean planning time in each run of this folder. Runs may differ in their settings "
-        f"and machines: Compare shows two of them paired. {PLANNING_TIME}",
+        "How many times faster planning is with memory in each run of this folder. Runs may differ in their "
+        f"settings and machines: Compare shows two of them paired. {PLANNING_TIME}",
         drawings,
         rows,
         [(colour, planner_title(planner)) for planner, colour in planners.items()],
