@@ -12,7 +12,7 @@ from importlib.metadata import version
 
 from motion_memory.files import read_problems, read_worlds, solve_many
 from motion_memory.memory import Answer, Memory, load
-from planners.memory.ranked_plans import RankedPlan
+from planners.ranked_plans import RankedPlan
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 

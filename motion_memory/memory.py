@@ -18,8 +18,8 @@ import numpy as np
 from planners.attempt import SUB_PLANS
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
-from planners.memory.ranked_plans import RankedPlan, ranked_plans
 from planners.memory.recall import RECALLS, default_recall
+from planners.ranked_plans import RankedPlan, ranked_plans
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
@@ -140,21 +140,22 @@ class Memory:
         return self._planned(problem, began)
 
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
-        """Look up the stored plans that the encoder ranks best for a problem, without any search.
+        """Look up what is stored for a problem, without any search.
+
+        These are the plans that the encoder ranks best. A library, and a memory that is asked anything but a
+        canonical problem, has at most one: a free plan made of parts of stored plans.
 
         Args:
             problem: as for ``plan``.
             k: how many plans to return at most.
 
         Raises:
-            ValueError: The problem is malformed or impossible, ``k`` is below 1, or what was loaded is a
-                library of plans.
+            ValueError: The problem is malformed or impossible, or ``k`` is below 1.
         """
         if k < 1:
             raise ValueError(f"k is {k}: give 1 or more")
-        if isinstance(self.stored, PlanLibrary):
-            raise ValueError("a library ranks no plans: ask plan() for an answer, or load a memory")
-        return ranked_plans(self.stored, self._read(problem), k)
+        with self._workspace() as workspace:
+            return ranked_plans(self.stored, self._read(problem), k, workspace)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
         """Judge a plan by code that shares nothing with the planners: simulate it again, sweep it with FCL.

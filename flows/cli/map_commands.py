@@ -68,6 +68,7 @@ def gather(
     poses: float = 0.25,
     vehicle: str = "car",
     seed: int = 1,
+    model: str | None = None,
     workers: int | None = None,
     reading: MapOptions = _AS_IT_IS,
 ) -> None:
@@ -83,6 +84,7 @@ def gather(
         poses: Share of the drawn questions that ask for a pose, not for a place.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
+        model: Log the library in MLflow, and register it as a version of the model of this name.
         workers: Worker processes; default one for each core.
         reading: How maps are read.
     """
@@ -90,8 +92,16 @@ def gather(
     from tasks.requests.import_worlds import import_settings
 
     settings = import_settings(vehicle, seed, **asdict(reading))
-    write(task.gather(sources, out, plans, poses, settings, worker_count(workers), _gather_pieces))
+    counts = task.gather(sources, out, plans, poses, settings, worker_count(workers), _gather_pieces)
+    write(task.gathered_table(counts))
     write_files(library=out)
+    if model is not None:
+        from tasks.registry.registered_library import registered_library  # late: MLflow takes seconds
+
+        asked = {"sources": " ".join(sources), "plans": plans, "poses": poses, "seed": seed}
+        write_files(
+            model=registered_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
+        )
 
 
 def _gather_pieces(request: GatherRequest) -> list[Gathered]:

@@ -20,7 +20,8 @@ from storage.fields import scale_of, short, text_of
 from storage.places.run_folder import checked_name
 
 _KIND: Final = "library"
-HEADER: Final = f"{_KIND}.json"  # the file that tells a library from a memory
+_HEADER: Final = f"{_KIND}.json"
+HEADERS: Final = ("memory.json", _HEADER)  # one of these files is in the folder of a memory, of a library
 _DRIFT: Final = 1e-6  # metres and radians by which states may differ from those of the controls
 
 
@@ -63,7 +64,7 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
 
 def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:
     """The memory or the library of a ``vehicle`` in a ``folder``. Raises StorageError if there is neither."""
-    return load_library(folder, vehicle) if (folder / HEADER).is_file() else load_memory(folder, vehicle)
+    return load_library(folder, vehicle) if (folder / _HEADER).is_file() else load_memory(folder, vehicle)
 
 
 def _check_driven(plans: StoredPlans, vehicle: Vehicle) -> None:

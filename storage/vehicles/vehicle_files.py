@@ -72,7 +72,11 @@ def text_of_vehicle(given: str) -> str:
     """
     if given in VEHICLES:
         return given
-    vehicle = said_vehicle(given) if given.startswith("{") else read_vehicle(_path(given))
+    return text_of(said_vehicle(given) if given.startswith("{") else read_vehicle(_path(given)))
+
+
+def text_of(vehicle: Vehicle) -> str:
+    """What says all of a ``vehicle``: the name of a built-in one, else its definition as JSON."""
     return name_of(vehicle) if is_built_in(vehicle) else json.dumps(definition_of(vehicle))
 
 

@@ -1,4 +1,4 @@
-"""The one memory at an address, used for problems of whatever class."""
+"""The one memory or library at an address, used for problems of whatever class."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from storage.archives.libraries import HEADERS
 from tasks.registry.model_uris import memory_folder
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import COMBINED
@@ -16,8 +17,8 @@ def memory_at(address: str) -> Iterator[Path]:
     """The folder of a memory, kept for as long as the context lasts.
 
     Args:
-        address: the folder of a memory; or of a run, for its combined memory or its only one; or a model in
-            MLflow.
+        address: the folder of a memory or a library; or of a run, for its combined memory or its only one;
+            or a model in MLflow.
 
     Raises:
         RunError: the run has several memories, or MLflow has none at this address.
@@ -29,7 +30,7 @@ def memory_at(address: str) -> Iterator[Path]:
 
 def _archive(folder: Path) -> Path:
     memories = sorted(header.parent for header in folder.glob("memories/[!.]*/memory.json"))
-    if (folder / "memory.json").is_file() or not memories:
+    if any((folder / header).is_file() for header in HEADERS) or not memories:
         return folder
     chosen = [memory for memory in memories if memory.name == COMBINED] or memories
     if len(chosen) > 1:

@@ -17,7 +17,7 @@ from typing import Final
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import Vehicle
-from storage.archives.libraries import HEADER, load_memory_or_library
+from storage.archives.libraries import HEADERS, load_memory_or_library
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import folders_here
 from storage.places.scratch import scratch_folder
@@ -66,7 +66,7 @@ def memory_digest(folder: Path | None) -> str:
     """A digest of the memories in a folder: of their headers, which hold the checksums of everything else."""
     digest = hashlib.sha256()
     if folder is not None:
-        own = [folder / "memory.json", folder / HEADER]
+        own = [folder / header for header in HEADERS]
         for header in sorted([*own, *folder.glob("memories/[!.]*/memory.json")]):
             if header.is_file():
                 digest.update(f"{header.relative_to(folder)}\0".encode())
@@ -86,7 +86,7 @@ def load_from(address: str, vehicle: Vehicle) -> Memory | PlanLibrary:
 
 
 def download(uri: str, scratch: str, server: str) -> Path:
-    """Download a model's memory from MLflow.
+    """Download a model's memory or library from MLflow.
 
     Args:
         uri: the model: ``models:/…`` or ``runs:/…``.
@@ -108,7 +108,7 @@ def download(uri: str, scratch: str, server: str) -> Path:
     except Exception as error:  # each of MLflow's stores has errors of its own
         reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RunError(redacted(f"{uri} cannot be had from MLflow at {server}: {reason}")) from error
-    memories = sorted(header.parent for header in folder.rglob("memory.json"))
+    memories = sorted(found.parent for header in HEADERS for found in folder.rglob(header))
     if len(memories) != 1:
         raise RunError(
             redacted(f"{uri} in MLflow at {server} holds {len(memories)} memories; name a model with one.")

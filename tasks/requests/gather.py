@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
+from statistics import fmean
 from typing import Final, NamedTuple
 
 from dashboards.cells import NOTHING, CellTable
@@ -35,6 +36,14 @@ HEADINGS: Final = ("source", "questions", "plans", "driving s")
 FIELDS: Final = ("source", "questions", "plans", "driving_s")
 
 
+class SourceCounts(NamedTuple):
+    """What came of one source."""
+
+    name: str
+    questions: int  # that were asked
+    seconds: list[float]  # driving time of each answer
+
+
 class Answered(NamedTuple):
     """A question that was answered."""
 
@@ -50,7 +59,7 @@ def gather(
     settings: ImportSettings,
     workers: int = 1,
     flow: GatherFlow | None = None,
-) -> CellTable:
+) -> list[SourceCounts]:
     """Ask questions of each source in turn until enough are answered, and write the plans as a library.
 
     A class, a family of manoeuvres and a map give any number of questions, a file of problems those that it
@@ -70,7 +79,7 @@ def gather(
             Prefect. None does everything in this process.
 
     Returns:
-        a table that counts questions and plans of each source.
+        what came of each source.
 
     Raises:
         UsageError: a number is out of range, or ``out`` would be written over a source.
@@ -96,7 +105,37 @@ def gather(
             )
         _save(request, kept)
         remove_folder(parts_folder(out))
-    return _table(sources, tried, kept)
+    return [
+        SourceCounts(
+            Path(name).name,
+            tried[number],
+            [each.variants[0].plan.duration_s for each in kept if each.source == number],
+        )
+        for number, name in enumerate(sources)
+    ]
+
+
+def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
+    """A table that counts questions and plans of each source, with mean driving times."""
+    rows = [
+        [
+            each.name,
+            f"{each.questions:,}",
+            f"{len(each.seconds):,}",
+            f"{fmean(each.seconds):.1f}" if each.seconds else NOTHING,
+        ]
+        for each in counts
+    ]
+    return CellTable("", HEADINGS, [[row] for row in rows], "gather", FIELDS)
+
+
+def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
+    """The numbers by which libraries are compared."""
+    seconds = [each for source in counts for each in source.seconds]
+    questions = sum(each.questions for each in counts)
+    own = {f"plans_{each.name}": float(len(each.seconds)) for each in counts}
+    totals = {"questions": questions, "plans": len(seconds), "answered": len(seconds) / questions}
+    return {**totals, "driving_seconds": fmean(seconds), **own}
 
 
 def _in_this_process(pieces: Sequence[GatherPiece]) -> list[Gathered]:
@@ -140,12 +179,3 @@ def _save(request: GatherRequest, kept: Sequence[Answered]) -> None:
         tuple(sorted({question.scale for question in questions})),
     )
     save_library(request.out, library)
-
-
-def _table(sources: Sequence[str], tried: Counter[int], kept: Sequence[Answered]) -> CellTable:
-    rows = []
-    for number, name in enumerate(sources):
-        seconds = [each.variants[0].plan.duration_s for each in kept if each.source == number]
-        mean = f"{sum(seconds) / len(seconds):.1f}" if seconds else NOTHING
-        rows.append([[Path(name).name, f"{tried[number]:,}", f"{len(seconds):,}", mean]])
-    return CellTable("", HEADINGS, rows, "gather", FIELDS)

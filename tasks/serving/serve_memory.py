@@ -9,9 +9,10 @@ import math
 import os
 from pathlib import Path
 
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import name_of
-from storage.archives.memories import load_memory
+from storage.archives.libraries import load_memory_or_library
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.registry.memory_at import memory_at
 from tasks.servers.access import access, auth, auth_environment, check_address, hosts
@@ -27,7 +28,8 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
     """Serve until Ctrl-C or SIGTERM.
 
     Args:
-        memory: the folder of a memory, the folder of a run with one memory, or a model in MLflow.
+        memory: the folder of a memory or of a library, the folder of a run with one memory, or a model in
+            MLflow.
         vehicle: the vehicle's name or file.
         host: the address to listen on.
         port: the port; 0 takes any free one.
@@ -43,7 +45,7 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
     for name, value in (ENVIRONMENT | auth_environment()).items():
         os.environ.setdefault(name, value)
     with memory_at(memory) as folder, bound(host, port) as listener:
-        archive = load_memory(folder, said_vehicle(vehicle))  # refused here, not by each worker
+        archive = load_memory_or_library(folder, said_vehicle(vehicle))  # refused here, not by each worker
 
         def log_addresses() -> None:
             driven = name_of(archive.vehicle)
@@ -71,7 +73,7 @@ def scoring_app(folder: str, vehicle: str) -> Guard:
     return Guard(scoring, auth(), hosts())
 
 
-def sample_request(memory: Memory) -> bytes:
+def sample_request(memory: Memory | PlanLibrary) -> bytes:
     """A request that needs all kernels: it has the memory's scale, a turned start and a notched obstacle."""
     scale = memory.scales[0]
     notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]

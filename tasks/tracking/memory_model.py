@@ -1,4 +1,4 @@
-"""A memory as an MLflow model: problem JSON in; ranked plans out, checked and in the frame of the problem.
+"""A memory or a library as an MLflow model: problem JSON in; ranked, checked plans in its frame out.
 
 The model is saved *from code*: it consists of the archive and ``memory_model_code.py``, which imports this
 file from the installed package, and the wheel of that package. Nothing is pickled, and the archive is checked
@@ -23,11 +23,12 @@ from mlflow.pyfunc.model import PythonModel, PythonModelContext
 from mlflow.types import ColSpec, DataType, ParamSchema, ParamSpec, Schema
 from mlflow.types.schema import Array
 
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
-from planners.memory.ranked_plans import ranked_plans
+from planners.ranked_plans import ranked_plans
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
-from storage.archives.memories import load_memory
+from storage.archives.libraries import load_memory_or_library
 from storage.errors import StorageError
 from storage.exchange.problems import fields_of, problem_of
 from storage.fields import parse_json
@@ -48,7 +49,7 @@ SIGNATURE: Final = ModelSignature(
         [
             ColSpec(DataType.string, "problem_id"),
             ColSpec(DataType.long, "rank"),  # from 1
-            ColSpec(DataType.long, "plan"),  # its number in the memory
+            ColSpec(DataType.long, "plan"),  # its number in the memory; -1: made of parts of stored plans
             ColSpec(DataType.boolean, "free"),  # it answers the problem: checked exactly
             ColSpec(DataType.double, "score"),  # the encoder's, higher is better
             ColSpec(DataType.double, "dt"),  # seconds
@@ -70,7 +71,7 @@ class MemoryModel(PythonModel):
     def open(self, archive: Path, vehicle: str) -> None:
         """Load and check an archive that need not be in MLflow, for the vehicle of this name."""
         self.vehicle = said_vehicle(vehicle)
-        self.memory: Memory = load_memory(archive, self.vehicle)
+        self.memory: Memory | PlanLibrary = load_memory_or_library(archive, self.vehicle)
 
     def predict(
         self,
@@ -80,8 +81,8 @@ class MemoryModel(PythonModel):
     ) -> pd.DataFrame:
         """The ``top_k`` best plans for each problem, best first.
 
-        There are none if the encoder says that none fits, or if the problem is not canonical: at another
-        distance, from a motion, or to a pose.
+        There are none if the encoder says that none fits. A library, and a memory whose problem is at another
+        distance, from a motion or to a pose, has at most one: a free plan made of parts of stored plans.
 
         Raises MlflowException, with one line, if a problem is malformed or impossible.
         """

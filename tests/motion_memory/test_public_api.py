@@ -7,17 +7,22 @@ import re
 import subprocess
 import sys
 import typing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import motion_memory
+from planners.memory.library.plan_library import gathered_library
 from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import CAR
+from storage.archives.libraries import save_library
 from storage.exchange.problems import fields_of, write_problems
 from storage.tables.attempts import read_attempts
 from tests.prepared.prefect_database import with_prefect_database
 from tests.tasks.served import problem, write_memory
+from tests.worlds import strewn
 
 ROOT = Path(__file__).parents[2]
 NOT_FOR_ROBOTS = ("prefect", "mlflow", "pandas", "torch", "casadi", "matplotlib")
@@ -53,6 +58,19 @@ def test_what_is_recalled_is_ranked_and_free_plans_are_accepted(memory: motion_m
         assert memory.check(problem(0), each.plan) == []
     with pytest.raises(ValueError, match="k is 0"):
         memory.recall(problem(0), k=0)
+
+
+def test_a_library_and_a_memory_recall_an_answer_to_any_question(
+    memory: motion_memory.Memory, tmp_path: Path
+) -> None:
+    plans = [(str(number), plan) for number, plan in enumerate(memory.stored.plans)]
+    save_library(tmp_path / "library", gathered_library("random", CAR, plans))
+    library = motion_memory.load(tmp_path / "library")
+    asked = replace(strewn(3, 10), goal=(22.0, 20.0), start_motion=(1.0,))
+    for stored in (memory, library):
+        (answer,) = stored.recall(asked)
+        assert answer.free
+        assert stored.check(asked, answer.plan) == []
 
 
 def test_every_public_name_is_typed_and_explained() -> None:

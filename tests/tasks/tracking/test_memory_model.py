@@ -15,14 +15,17 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
+from planners.ranked_plans import PARTS
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
+from storage.archives.libraries import save_library
 from storage.archives.memories import save_memory
 from storage.errors import StorageError
 from storage.exchange.plans import read_plan
@@ -30,6 +33,7 @@ from storage.exchange.problems import fields_of, problem_of
 from storage.places.data_folder import open_data_folder
 from storage.tables.shards import write_table
 from tasks.registry.model_uris import load_from
+from tasks.registry.registered_library import registered_library
 from tasks.settings.errors import RunError
 from tests import worlds
 from tests.storage.samples import a_memory
@@ -95,6 +99,29 @@ def test_a_logged_memory_is_found_by_any_of_its_names(at_home: dict[str, str], p
     assert np.array_equal(memory.plans[0].states, original.plans[0].states)
     with pytest.raises(StorageError, match="made for vehicle car, expected car-1-trailer"):
         load_from(at_home[place], CAR_1_TRAILER)
+
+
+def test_a_library_is_registered_once_and_loaded_by_its_address(
+    logged: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tasks.tracking.memory_model import MemoryModel
+
+    plans = load_from(str(Path(logged["data"]).parent / "archive"), CAR).plans
+    library = gathered_library("random", CAR, [(str(i), plan) for i, plan in enumerate(plans)])
+    folder = tmp_path / "library"
+    save_library(folder, library)
+    monkeypatch.setenv("MOTION_MEMORY_DATA", str(tmp_path / "data"))
+    monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
+    named = [registered_library("docks", folder, CAR, {"sources": "random"}, {"plans": 12}) for _ in range(2)]
+    assert named == ["models:/docks/1", "models:/docks/1"]
+    loaded = load_from(named[0], CAR)
+    assert isinstance(loaded, PlanLibrary)
+    assert loaded.questions == library.questions
+    model = MemoryModel()
+    model.open(folder, "car")
+    asked = fields_of(replace(worlds.strewn(3, 10), goal=(22.0, 20.0), start_motion=(1.0,)))
+    (row,) = model.plans(pd.DataFrame({"problem": [json.dumps(asked)]})).to_dict("records")
+    assert (row["rank"], row["plan"], row["free"]) == (1, PARTS, True)
 
 
 @pytest.mark.parametrize(

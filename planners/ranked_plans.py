@@ -1,0 +1,70 @@
+"""The answers of a memory or a library to a problem in any frame: what is served over HTTP and to Python."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planners.memory.library.plan_library import PlanLibrary
+from planners.memory.memory import Memory
+from planners.memory.plans.free import ends_of, plan_fits, turned
+from planners.memory.ranking.scores import best_plans
+from planners.sub_plan_answers import sub_plan_answer
+from planners.world.alignment import Alignment, from_canonical, scaled, shifted, to_canonical
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import drawing_of
+from planners.world.problem import Plan, Problem, is_canonical
+from planners.world.view import View
+from planners.world.workspace import Workspace
+
+PARTS = -1  # the number of a plan that is made of parts of stored plans
+
+
+class RankedPlan(NamedTuple):
+    """A stored plan, or parts of stored plans, as an answer to a problem."""
+
+    number: int  # of the plan in the memory; or ``PARTS``
+    free: bool  # it answers the problem: it begins and ends as asked, and its whole sweep is free
+    score: float  # the encoder's, higher is better; 0 of parts
+    plan: Plan  # in the frame and the lengths of the problem
+
+
+def ranked_plans(
+    memory: Memory | PlanLibrary, problem: Problem, k: int, workspace: Workspace | None = None
+) -> list[RankedPlan]:
+    """Rank what a memory or a library has for a problem, best first.
+
+    A memory has plans for canonical problems. Other problems, and all that are put to a library, are answered
+    by one plan made of parts of stored plans; it is free.
+
+    Args:
+        memory: to recall from.
+        problem: in any frame.
+        k: how many plans to return at most.
+        workspace: the caller's buffers; by default new ones.
+
+    Returns:
+        At most k plans. None if the encoder says that no plan fits, or if no parts lead to the goal.
+    """
+    canonical, alignment = to_canonical(problem)
+    if isinstance(memory, Memory) and is_canonical(canonical):
+        return _stored(memory, canonical, problem, alignment, k)
+    library = memory.library if isinstance(memory, Memory) else memory
+    answer = sub_plan_answer(library, View(canonical, workspace), memory.vehicle).plan
+    return [] if answer is None else [RankedPlan(PARTS, True, 0.0, _in_frame_of(problem, alignment, answer))]
+
+
+def _stored(
+    memory: Memory, canonical: Problem, problem: Problem, alignment: Alignment, k: int
+) -> list[RankedPlan]:
+    scene, bits = scene_of(canonical), drawing_of(canonical).occupied
+    scores = memory.scores(memory.forward(bits), bits)
+    ranked = []
+    for i in best_plans(scores, k).tolist():
+        free, _ = plan_fits(memory.sweeps, i, ends_of(canonical), scene)
+        plan = _in_frame_of(problem, alignment, turned(memory.plans[i], canonical.start[2]))
+        ranked.append(RankedPlan(i, bool(free), float(scores[1 + i]), plan))
+    return ranked
+
+
+def _in_frame_of(problem: Problem, alignment: Alignment, plan: Plan) -> Plan:
+    return shifted(scaled(from_canonical(plan, alignment), problem.scale), problem.offset)

@@ -1,0 +1,52 @@
+"""Libraries of plans in MLflow: a run for each, with its numbers, and a version of a registered model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from planners.world.vehicles.vehicle import Vehicle, name_of
+from storage.places.data_folder import DataFolder
+from storage.vehicles.vehicle_files import text_of
+from tasks.registry.champion_registry import Registry
+from tasks.registry.model_uris import memory_digest, set_mlflow_environment
+from tasks.settings.environment import default_data
+from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
+
+STAGE = "gather"
+
+
+def registered_library(
+    name: str, folder: Path, vehicle: Vehicle, parameters: Mapping[str, Any], metrics: Mapping[str, float]
+) -> str:
+    """Log a library in MLflow and register it; the same library becomes one version, however often.
+
+    MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder.
+
+    Args:
+        name: of the registered model.
+        folder: the library.
+        vehicle: whose plans it holds.
+        parameters: how it was gathered.
+        metrics: what came of it.
+
+    Returns:
+        the address that ``--memory`` takes.
+
+    Raises:
+        RunError: MLflow does not answer.
+    """
+    set_mlflow_environment()
+    data = str(default_data().absolute())
+    digest, log = memory_digest(folder), tracker(data)
+    with log.run(f"library {name} {digest[:8]}", STAGE, {}) as run_id:
+        if not log.is_logged(run_id, digest, "memory"):
+            log.parameters(run_id, {**parameters, "vehicle": name_of(vehicle)})
+            model_id = log.memory(run_id, name, folder, text_of(vehicle))
+            log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
+            log.metrics(run_id, [metrics], model_id=model_id)
+            log.mark_logged(run_id, digest, "memory")
+    run_id, model_id = log.logged_memory(f"library {name} {digest[:8]}", name, digest)
+    registry = Registry(DataFolder(Path(data)))
+    return registry.register(name, run_id, model_id, digest, {"memory": name}, "A library of plans").uri
