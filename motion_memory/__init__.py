@@ -15,6 +15,9 @@ from motion_memory.memory import Answer, Memory, load
 from planners.ranked_plans import RankedPlan
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
+from storage.errors import StorageError
+from tasks.attempts.judged_attempts import PlanFaultError
+from tasks.settings.errors import RunError, UsageError
 
 __version__ = version("motion-memory")
 __all__ = [
@@ -22,8 +25,12 @@ __all__ = [
     "Arrival",
     "Memory",
     "Plan",
+    "PlanFaultError",
     "Problem",
     "RankedPlan",
+    "RunError",
+    "StorageError",
+    "UsageError",
     "Vehicle",
     "load",
     "read_problems",

@@ -42,7 +42,10 @@ class ProblemSlice:
 def format_of(path: Path) -> str:
     """The ending of ``path``, which says its format. Raises StorageError if problems have no such files."""
     if path.suffix not in FORMATS:
-        raise StorageError(f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it.")
+        cut = ", or make problems of a map or of worlds by import-worlds" if path.exists() else ""
+        raise StorageError(
+            f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it{cut}."
+        )
     return path.suffix
 
 

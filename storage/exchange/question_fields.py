@@ -15,6 +15,7 @@ STARTS: Final = {"start_speed": "speed", "start_steering": "steering", "start_tu
 ENDS: Final = ("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance")
 QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
 POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
+_NAME_IT: Final = "name the vehicle that the problem is for (--vehicle)"
 ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
 
 
@@ -32,6 +33,8 @@ def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float,
     Raises ValueError if a field is malformed or the vehicle has nothing that it could mean.
     """
     names = state_names(vehicle)[3:]
+    hitches = [name for name in names if name.startswith("hitch")]
+    _refuse_other_hitches(fields, len(hitches), vehicle)
     motion = dict.fromkeys(names, 0.0)
     motion["speed"] = max(vehicle.scale * vehicle.min_speed, 0.0)  # as slow as it can be
     for field, name in STARTS.items():
@@ -40,16 +43,27 @@ def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float,
         if name not in motion:
             raise ValueError(
                 f"has {field}, but the state of {short(name_of(vehicle))} has {', '.join(names)}; "
-                "leave it out"
+                f"leave it out, or {_NAME_IT}"
             )
         motion[name] = number_of(fields[field], field)
-    hitches = [name for name in names if name.startswith("hitch")]
     if fields.get("start_hitch") is not None:
         motion.update(zip(hitches, numbers_of(fields, "start_hitch", len(hitches)), strict=True))
     values = list(motion.values())
     while values and values[-1] == 0.0:
         values.pop()
     return tuple(values)
+
+
+def _refuse_other_hitches(fields: Mapping[str, Any], trailers: int, vehicle: Vehicle) -> None:
+    for name in ("start_hitch", "goal_hitch"):
+        given = fields.get(name)
+        asks_nothing = name == "goal_hitch" and given == []
+        if isinstance(given, list) and len(given) != trailers and not asks_nothing:
+            has = f"{trailers} trailers" if trailers else "no trailer"
+            raise ValueError(
+                f"{name} lists {short(given)}, one angle a trailer, but {short(name_of(vehicle))} has {has}; "
+                f"{_NAME_IT}"
+            )
 
 
 def goal_of(fields: Mapping[str, Any]) -> Goal:

@@ -36,6 +36,12 @@ def attempt_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
     return columns
 
 
+def attempt_records(path: Path) -> list[dict[str, Any]]:
+    """The rows of the file of attempts at ``path`` as ``write_attempts`` takes them."""
+    rows: list[dict[str, Any]] = read_table(path, ATTEMPTS).to_pylist()
+    return rows
+
+
 def read_attempts(path: Path, without: Sequence[str] = ()) -> pd.DataFrame:
     """All attempts of a file, or of every file below a folder, in the order of their names.
 

@@ -48,6 +48,15 @@ def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | N
     return Picture(np.asarray(paper.convert("L")), np.asarray(coloured.getchannel("A")) > 0)
 
 
+def size_of(file: Path) -> tuple[int, int] | None:
+    """Width and height of the picture in a ``file``, by its first bytes; None if that is no picture."""
+    try:
+        with Image.open(file) as picture:
+            return picture.size
+    except Exception:  # Pillow raises anything
+        return None
+
+
 def _check_shape(picture: Image.Image, wanted: tuple[int, int] | None) -> None:
     columns, rows = picture.size
     if wanted is not None and picture.size != wanted:

@@ -11,6 +11,7 @@ from storage.errors import StorageError, sentence
 from storage.places.run_folder import checked_name
 from storage.worlds.moving_ai import map_of_scenarios
 from storage.worlds.numpy_grids import is_stack
+from storage.worlds.picture_files import size_of
 from storage.worlds.ros_maps import picture_of
 
 Part = Literal["train", "test", "validation"]
@@ -24,6 +25,7 @@ MAPS: Final = {
     ".map": "moving-ai", ".scen": "moving-ai", ".yaml": "ros", ".yml": "ros",
     ".npy": "numpy", ".npz": "numpy",
 }  # fmt: skip
+PICTURES: Final = (".png", ".pgm", ".jpg", ".jpeg", ".bmp", ".gif", ".tif", ".tiff", ".svg", ".pdf")
 MANOEUVRES: Final = ("bench-mr", "dynobench", "tpcap")  # from pose to pose; files end like others
 FORMATS: Final = tuple(sorted({*WORLDS.values(), *MAPS.values(), *MANOEUVRES}))
 
@@ -90,6 +92,8 @@ def source_at(path: Path, named: str | None = None) -> Source:
     class_of(path)  # raises if the name cannot be that of a class
     if path.is_dir():
         return Source(path, named or _format_of_folder(path), is_map=False)
+    if named is None and path.suffix.lower() in PICTURES:
+        _refuse_picture_of_map(path)
     format_ = named or MAPS.get(path.suffix) or WORLDS.get(path.suffix)
     if format_ is None:
         endings = ", ".join(dict.fromkeys([*WORLDS, *MAPS]))
@@ -100,6 +104,20 @@ def source_at(path: Path, named: str | None = None) -> Source:
         return Source(path, format_, is_map=not is_stack(path))
     except ValueError as error:
         raise StorageError(sentence(path, error)) from None
+
+
+def _refuse_picture_of_map(path: Path) -> None:
+    """Raise StorageError for a picture that is no world: nobody can know how large its pixels are."""
+    from storage.worlds.pictures import PIXELS  # late: SciPy takes a third of a second
+
+    if path.suffix == ".png" and size_of(path) in (None, (PIXELS, PIXELS)):
+        return
+    beside = [path.with_suffix(ending) for ending in (".yaml", ".yml") if path.with_suffix(ending).is_file()]
+    there = f"give {beside[0]}" if beside else "write one, as ROS's map_server does, and give that"
+    raise StorageError(
+        f"{path} is a picture; as a map it needs a YAML file that says how large a pixel is: {there} "
+        "(docs/worlds.md)."
+    )
 
 
 def _format_of_folder(folder: Path) -> str:

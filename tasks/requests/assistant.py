@@ -15,6 +15,8 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.memory.recall import RECALLS
+from planners.optimisation.polish import most_iterations
+from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
@@ -34,6 +36,7 @@ from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
+WARM_EXPANSIONS: Final = 1000  # of an improver after its first polish: enough for a search, and a guided one
 
 
 class AssistantSettings(NamedTuple):
@@ -104,7 +107,8 @@ class Assistant:
         """Attempt the mirror image of a problem at least once, and for ``WARM_SECONDS`` if it is quick.
 
         So the code and the memory are ready, as those of a robot that has planned before, but nothing of the
-        problem itself is in the caches when it is attempted.
+        problem itself is in the caches when it is attempted. What improves plans is made ready too, if it is
+        asked for, or the first one would spend its seconds on compiling.
         """
         other = mirrored(to_canonical(problem)[0])
         deadline = perf_counter() + WARM_SECONDS
@@ -114,6 +118,15 @@ class Assistant:
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
                 break
             seed += 1
+        if self.settings.improve_seconds > 0.0:
+            work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
+            improve(
+                *(self.settings.planner, other, attempts[0].plan),
+                expansions=work,
+                seed=seed,
+                vehicle=self.vehicle,
+                workspace=self._workspace,
+            )
         OtherWork()()
 
     def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import functools
 import gc
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -14,7 +16,8 @@ from storage.errors import StorageError
 from storage.exchange.plans import write_plan
 from storage.exchange.problem_files import ProblemSlice, slices_of
 from storage.exchange.problems import problems_or_faults_of
-from storage.tables.attempts import write_attempts
+from storage.tables.attempts import attempt_records, write_attempts
+from storage.tables.shards import shard_is_done
 from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.keys import key_of
@@ -23,7 +26,8 @@ from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 from tasks.requests.part_folder import parts_folder
 
-PART_PROBLEMS: Final = 500  # a killed worker loses one part, which is seconds of work
+PART_PROBLEMS: Final = 500  # a second of work, or minutes where problems are hard
+KEEP_SECONDS: Final = 5.0  # of work on a part that a killed worker may lose; Ctrl-C loses none
 PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
 MOST_IN_ONE_FOLDER: Final = 10_000  # plans; for more problems each part writes its plans into its own folder
 COLLECT_EVERY: Final = 50  # problems from one garbage collection to the next
@@ -72,6 +76,15 @@ class FilePart:
         """The file with the part's attempt rows."""
         return self.request.folder / f"{self.index:06d}.parquet"
 
+    @property
+    def begun(self) -> Path:
+        """The file with the rows so far of a part that was interrupted."""
+        return self.request.folder / f"{self.index:06d}.begun.parquet"
+
+    def rows_begun(self) -> list[dict[str, Any]]:
+        """The rows of an earlier command that was interrupted in this part."""
+        return attempt_records(self.begun) if shard_is_done(self.begun, self.key) else []
+
 
 class PartResult(NamedTuple):
     """Whether a part was solved."""
@@ -119,32 +132,56 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
     """Like ``solve_part``, and call ``on_problem`` after each problem."""
     request = chunk.request
     assistant = _assistant(request.settings, request.memory_digest)
-    rows: list[dict[str, Any]] = []
+    rows = chunk.rows_begun()
+    before = len(rows)
     solved: list[Solved] = []
-    with no_garbage_collection():
-        for location, problem in problems_or_faults_of(chunk.problem_slice, assistant.vehicle):
+
+    def keep(path: Path) -> None:
+        if request.learn is not None:
+            remember(request.learn, solved, assistant.vehicle)
+            solved.clear()
+        write_attempts(path, rows, key=chunk.key)
+
+    problems = problems_or_faults_of(chunk.problem_slice, assistant.vehicle)
+    with no_garbage_collection(), _kept_if_interrupted(lambda: keep(chunk.begun)):
+        kept = time.monotonic()
+        for number, (location, problem) in enumerate(problems):
             if isinstance(problem, str):
                 return PartResult(f"{location}: {problem}")
-            if not rows:
+            if number < before:
+                on_problem()
+                continue
+            if number == before:
                 assistant.warm_up(problem)
             attempt, plan = assistant(problem)
-            memory = assistant.memory_of(problem.class_name)
-            rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
             if request.learn is not None:
                 solved.append(Solved(to_canonical(problem)[0], attempt))
             if request.plans is not None:
-                number = chunk.problem_slice.first + len(rows) - 1
                 write_plan(
-                    _plan_path(chunk, request.plans, problem.id, number),
+                    _plan_path(chunk, request.plans, problem.id, chunk.problem_slice.first + number),
                     plan_record(assistant, problem, attempt, plan),
                 )
+            memory = assistant.memory_of(problem.class_name)
+            rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))
             on_problem()
+            if time.monotonic() - kept > KEEP_SECONDS:
+                keep(chunk.begun)
+                kept = time.monotonic()
             if len(rows) % COLLECT_EVERY == 0:
                 gc.collect()
-    if request.learn is not None:
-        remember(request.learn, solved, assistant.vehicle)
-    write_attempts(chunk.shard, rows, key=chunk.key)
+    keep(chunk.shard)
+    chunk.begun.unlink(missing_ok=True)
     return PartResult(None)
+
+
+@contextmanager
+def _kept_if_interrupted(keep: Callable[[], None]) -> Iterator[None]:
+    """Keep what was done if Ctrl-C ends the context."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        keep()
+        raise
 
 
 SOLVE: Final = Job(

@@ -11,6 +11,7 @@ from planners.maps.questions import question_in
 from planners.world.classes.families import FAMILIES, family
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
+from storage.errors import StorageError
 from storage.exchange.problems import read_problems
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
@@ -48,12 +49,20 @@ def question_source(name: str, plans: int, poses: float, settings: ImportSetting
     if is_drawn(name):
         drawn = problem_class(name, vehicle=vehicle)
         return _asked_in(lambda number: drawn.draw(2 * seed, number), poses, settings)
+    if not Path(name).exists():
+        known = ", ".join([*CLASSES, *FAMILIES])
+        raise StorageError(f"{name} is neither a file or folder nor one of {known}; check the name.")
     source = source_at(Path(name))
     if source.format == "problems" and source.path.is_file():
         problems = read_problems(source.path, vehicle)
         return QuestionSource(lambda number: problems[number], len(problems))
     most = min(settings.count or plans, plans) if source.is_map else settings.count
-    worlds = import_part(source, "train", replace(settings, count=most)).problems
+    imported = import_part(source, "train", replace(settings, count=most))
+    worlds = imported.problems
+    if not worlds:
+        raise StorageError(
+            f"{source.path} holds no usable world for training ({imported.explained()}); give another source."
+        )
     return _asked_in(lambda number: worlds[number % len(worlds)], poses, settings)
 
 

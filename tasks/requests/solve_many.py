@@ -109,6 +109,7 @@ def solve_many(
         parts = parts_of(request)
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
+            begun = sum(len(part.rows_begun()) for part in left)
             if flow is None or workers == 1 or len(left) <= FEW_PARTS:
                 results = _in_this_process(left)
             else:
@@ -123,7 +124,7 @@ def solve_many(
                 raise StorageError(tally.repeated_id)
             join_attempts(out, [part.shard for part in parts])
             remove_folder(request.folder)
-    solved_now = sum(part.problem_slice.count for part in left)
+    solved_now = sum(part.problem_slice.count for part in left) - begun
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request, tally))
 
 

@@ -82,6 +82,19 @@ def test_every_public_name_is_typed_and_explained() -> None:
             assert value.__doc__
 
 
+def test_what_goes_wrong_is_caught_by_its_public_name(
+    memory: motion_memory.Memory, folder: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(motion_memory.StorageError):
+        motion_memory.load(tmp_path)
+    with pytest.raises(motion_memory.StorageError):
+        motion_memory.load(folder, vehicle="car-1-trailer")
+    with pytest.raises(motion_memory.UsageError):
+        motion_memory.load(folder, planner="luck")
+    with pytest.raises(ValueError, match="goal"):
+        memory.plan(fields_of(problem(0)) | {"goal": [1]})
+
+
 def test_many_are_solved_as_by_the_command(folder: Path, tmp_path: Path) -> None:
     write_problems(tmp_path / "problems.jsonl", [problem(i) for i in range(3)])
     assert len(motion_memory.read_problems(tmp_path / "problems.jsonl")) == 3

@@ -43,6 +43,16 @@ def occupied_by(obstacles: Obstacles, rows: int, columns: int) -> tuple[Cells, i
     return painted > 0, int((painted > 1).sum())
 
 
+@pytest.mark.parametrize("name", ["floor.png", "floor.pgm", "floor.jpg", "floor.BMP"])
+def test_a_picture_of_a_map_is_told_to_need_a_file_of_its_scale(name: str, tmp_path: Path) -> None:
+    Image.fromarray(np.zeros((20, 30), np.uint8)).save(tmp_path / name)
+    with pytest.raises(StorageError, match=r"floor\.\w+ is a picture.* YAML file .*write one"):
+        source_at(tmp_path / name)
+    (tmp_path / "floor.yaml").touch()
+    with pytest.raises(StorageError, match=r"give .*floor\.yaml "):
+        source_at(tmp_path / name)
+
+
 def write_world(file: Path, dark: Cells, mode: str = "L") -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(np.where(dark, 0, 255).astype(np.uint8)).convert(mode).save(file, format="PNG")

@@ -11,7 +11,9 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from planners.attempt import Attempt
 from planners.world.classes.problem_classes import problem_class
+from planners.world.problem import Plan, Problem
 from storage.errors import StorageError
 from storage.exchange.plans import read_plan
 from storage.exchange.problems import write_problems
@@ -20,7 +22,7 @@ from storage.places.files import locked
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.gained_experiences import gained_shards
 from tasks.requests import problem_parts as parts
-from tasks.requests.assistant import AssistantSettings
+from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows.same_rows import equal_but_for_seconds
 
@@ -104,6 +106,37 @@ def test_what_was_finished_before_an_interruption_is_not_done_again(
     assert counting.written == -(-COUNT // SIZE) - 2
     assert equal_but_for_seconds(read_attempts(out), undisturbed)
     assert list(tmp_path.iterdir()) == [out]
+
+
+def test_ctrl_c_loses_no_problem_that_was_solved(
+    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, plans = tmp_path / "rows.parquet", tmp_path / "plans"
+    asked: list[str] = []
+    attempt = Assistant.__call__
+
+    def counted(self: Assistant, problem: Problem) -> tuple[Attempt, Plan | None]:
+        asked.append(problem.id)
+        if len(asked) == stop_at:
+            raise KeyboardInterrupt
+        return attempt(self, problem)
+
+    monkeypatch.setattr(Assistant, "__call__", counted)
+    monkeypatch.setattr(parts, "PART_PROBLEMS", COUNT)
+    for last, done in ((5, 4), (3, 6)):  # within the only part, then again
+        asked.clear()
+        stop_at = last
+        with pytest.raises(KeyboardInterrupt):
+            solve_many(ASSISTANT, problems, out, plans)
+        assert len(list(plans.iterdir())) == done
+        assert not out.exists()
+    asked.clear()
+    stop_at = -1
+    solved = solve_many(ASSISTANT, problems, out, plans)
+    assert len(asked) == solved.solved_now == COUNT - 6
+    assert equal_but_for_seconds(read_attempts(out), undisturbed)
+    assert len(list(plans.iterdir())) == COUNT
+    assert {each.name for each in tmp_path.iterdir()} == {"rows.parquet", "plans"}
 
 
 def test_another_question_never_takes_the_parts_of_this_one(
