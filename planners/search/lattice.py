@@ -86,9 +86,9 @@ class LatticeSettings(NamedTuple):
     )  # the same for problems that are not canonical; where a speed is asked at the goal, without two
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
-    alone: int = 2000  # expansions before manoeuvres are searched for as well, unless the goal is tight
+    alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
-    if_tight: tuple[int, int] = (16, 48)  # ... or so many
+    if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 
 
@@ -276,7 +276,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         if manoeuvring is None:
             grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
             return
-        here, there = settings.if_tight if manoeuvring.is_tight else settings.by_turns
+        hard = manoeuvring.is_tight or manoeuvring.meets
+        here, there = settings.if_tight if hard else settings.by_turns
         now = here
         if counts[trees.EXPANSIONS] == 0:
             now = 0 if manoeuvring.is_tight else settings.alone

@@ -49,6 +49,8 @@ def drive_to_goal(
 @lean
 def drive_arcs_to_goal(
     drive: Drive,
+    before: GoalTree,
+    links: int,
     tree: GoalTree,
     node: int,
     start: Floats,
@@ -59,11 +61,17 @@ def drive_arcs_to_goal(
 ) -> bool:
     """Drive from the start over the arcs of ``drive.join`` to a node, and from there to the goal.
 
-    Returns the same as ``drive_to_goal``.
+    Before these arcs those of the first ``links`` nodes of ``drive.join.chain`` are driven, of the tree
+    ``before`` that grew out of the start. Returns the same as ``drive_to_goal``.
     """
     drive.counts.fill(0)
     for k in range(drive.states.shape[1]):
         drive.states[0, k] = start[0, k]
+    for k in range(links):
+        link = drive.join.chain[k]
+        gear = 1.0 if before.metres[link] > 0.0 else -1.0
+        if not drive_arc(drive, gear, before.bends[link], abs(before.metres[link]), vehicle, scene):
+            return False
     arcs = drive.join.arcs
     for k in range(drive.join.counts[0]):
         if arcs[2, k] > SMALLEST and not drive_arc(drive, arcs[0, k], arcs[1, k], arcs[2, k], vehicle, scene):

@@ -9,14 +9,18 @@ import numpy as np
 
 from planners.search.connection.profile import run_seconds
 from planners.search.structures.frontier import Frontier, allocate_frontier, clear_frontier, push
-from planners.world.arrays import Floats, Indices
+from planners.world.arrays import Floats, Indices, Integers
 from planners.world.goal import HEADING, HITCHES, X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
-from planners.world.vehicles.dynamics import State, bend_rate, control_limits, store
+from planners.world.vehicles.dynamics import State, bend_rate, control_limits, load, store
 from planners.world.vehicles.vehicle import Vehicle
 
 NODES: Final = 1 << 17
+PLACES: Final = 1 << 16
+PLACE: Final = 0.2  # side of a place, in the first body's length ...
+PLACE_HEADINGS: Final = 48  # ... and how many headings are told apart there
+_FIBONACCI: Final = 0x9E3779B1
 HITCH_CELLS: Final = 5.0  # a radian
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
 # indices into GoalTree.counts
@@ -33,6 +37,7 @@ class GoalTree(NamedTuple):
     runs: Floats  # [NODES] metres that are driven in the gear of that arc until it changes
     seconds: Floats  # [NODES] estimated driving time from the node to the goal
     known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
+    places: Integers  # [PLACES] a node in the place that falls into this slot; -1: none
     frontier: Frontier
     counts: Indices  # [2]
 
@@ -47,24 +52,29 @@ def allocate_goal_tree(state_size: int) -> GoalTree:
         np.zeros(NODES),
         np.zeros(NODES),
         np.zeros(NODES, np.int64),
+        np.zeros(PLACES, np.int32),
         allocate_frontier(),
         np.zeros(2, np.int64),
     )
 
 
+def pose_of(goal: Floats, size: int) -> Floats:
+    """The state ``[size]`` that a goal, that of ``goal_of``, asks for; what it does not ask for is zero."""
+    state = np.zeros(size)
+    state[[0, 1, 2]] = goal[[X, Y, HEADING]]
+    state[5:] = goal[HITCHES::2] if len(goal) > HITCHES else 0.0
+    return state
+
+
 @lean
-def plant_goal(tree: GoalTree, goal: Floats) -> None:
-    """Begin a tree at a goal, that of ``goal_of``. Hitches that it does not ask for are straight."""
+def plant_root(tree: GoalTree, root: Floats) -> None:
+    """Begin a tree at a state ``[S]``."""
     clear_frontier(tree.frontier)
+    tree.places.fill(-1)
     push(tree.frontier, 0.0, 0, 0)
     tree.counts[SIZE] = 1
     for k in range(tree.states.shape[1]):
-        tree.states[0, k] = 0.0
-    tree.states[0, 0] = goal[X]
-    tree.states[0, 1] = goal[Y]
-    tree.states[0, 2] = goal[HEADING]
-    for k in range((goal.shape[0] - HITCHES) // 2):
-        tree.states[0, 5 + k] = goal[HITCHES + 2 * k]
+        tree.states[0, k] = root[k]
     tree.parents[0] = -1
     tree.bends[0] = 0.0
     tree.metres[0] = 0.0
@@ -129,3 +139,41 @@ def cell_of(state: State, gear: float, tree: GoalTree, cell: float, headings: in
     for k in range(5, len(state)):
         key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
     return int(((key << 16 | row) << 16 | column) << 8 | heading << 1 | (1 if gear > 0.0 else 0))
+
+
+@inlined
+def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
+    """The place of a pose with its hitches, seen from a corner ``origin [2]``: where two trees may meet."""
+    cell = PLACE * (vehicle.front + vehicle.rear)
+    key = math.floor((state[1] - origin[1]) / cell) & 0xFFFF
+    key = key << 16 | (math.floor((state[0] - origin[0]) / cell) & 0xFFFF)
+    key = key << 7 | int((wrapped(state[2]) + math.pi) * (PLACE_HEADINGS / (2.0 * math.pi)))
+    for k in range(5, len(state)):
+        key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
+    return int(key)
+
+
+@inlined
+def slot_of(place: int) -> int:
+    """Where in ``places`` a place has its node."""
+    return (place * _FIBONACCI >> 20) & (PLACES - 1)
+
+
+@inlined
+def mark_place(tree: GoalTree, node: int, origin: Floats, vehicle: Vehicle) -> None:
+    """Remember a node for its place, unless there is one."""
+    place = place_of(load(tree.states, node, vehicle), origin, vehicle)
+    slot = slot_of(place)
+    known = tree.places[slot]
+    if known < 0 or place_of(load(tree.states, known, vehicle), origin, vehicle) != place:
+        tree.places[slot] = node
+
+
+@inlined
+def node_near(tree: GoalTree, state: State, origin: Floats, vehicle: Vehicle) -> int:
+    """A node in the place of a state; -1 if none is known."""
+    place = place_of(state, origin, vehicle)
+    node = tree.places[slot_of(place)]
+    if node >= 0 and place_of(load(tree.states, node, vehicle), origin, vehicle) == place:
+        return int(node)
+    return -1

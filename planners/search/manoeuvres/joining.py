@@ -22,6 +22,7 @@ from planners.world.vehicles.dynamics import State, bend_with, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 MOST_ARCS: Final = 2 * PARTS
+MOST_CHAIN: Final = 256
 ROUNDS: Final = 16
 BEND_SHARE: Final = 0.2  # of the tightest bend: how much an arc's bend changes as readily as ...
 LENGTH_SHARE: Final = 0.2  # ... its length does, by this share of the first body's length
@@ -40,6 +41,9 @@ class Join(NamedTuple):
     ends: Floats  # [2, S] where the arcs lead, and where they should
     effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on the end: x, y, heading, hitches
     squares: Floats  # [6, 7] the equations of a correction
+    free: Floats  # [2 MOST_ARCS] 0 for what the last round would have moved beyond its limit, else 1
+    chain: Indices  # [MOST_CHAIN] nodes of a tree, the last one first
+    base: Floats  # [1, S] where the arcs begin
     counts: Indices  # [1] how many arcs there are
 
 
@@ -50,6 +54,9 @@ def allocate_join(state_size: int) -> Join:
         np.zeros((2, state_size)),
         np.zeros((6, 2 * MOST_ARCS)),
         np.zeros((6, 7)),
+        np.zeros(2 * MOST_ARCS),
+        np.zeros(MOST_CHAIN, np.int64),
+        np.zeros((1, state_size)),
         np.zeros(1, np.int64),
     )
 
@@ -113,6 +120,8 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
     """Correct the arcs until they lead from ``start [1, S]`` to ``join.ends[1]``. Returns whether they do."""
     rows = join.ends.shape[1] - 2
     columns = 2 * join.counts[0]
+    for column in range(columns):
+        join.free[column] = 1.0
     limit = tightest_bend(vehicle.max_speed, vehicle)
     size = vehicle.front + vehicle.rear
     _end(start, join, -1, vehicle)
@@ -129,7 +138,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
             _end(start, join, column, vehicle)
             for row in range(rows):
                 effect = join.squares[row, rows] - _off(join, row)
-                join.effects[row, column] = weight * effect / NUDGE
+                join.effects[row, column] = join.free[column] * weight * effect / NUDGE
         for i in range(rows):
             for j in range(rows):
                 total = DAMPING if i == j else 0.0
@@ -150,8 +159,12 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
             if column % 2 == 0:
                 bend = join.arcs[1, arc] + BEND_SHARE * limit * change
                 join.arcs[1, arc] = min(max(bend, -limit), limit)
+                fits = bend == join.arcs[1, arc]
             else:
-                join.arcs[2, arc] = max(join.arcs[2, arc] + LENGTH_SHARE * size * change, 0.0)
+                metres = join.arcs[2, arc] + LENGTH_SHARE * size * change
+                join.arcs[2, arc] = max(metres, 0.0)
+                fits = metres >= 0.0
+            join.free[column] = 1.0 if fits else 0.0
         _end(start, join, -1, vehicle)
     return False
 

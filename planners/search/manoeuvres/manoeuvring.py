@@ -13,7 +13,7 @@ from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, allocate_goal_tree, plant_goal
+from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, allocate_goal_tree, plant_root, pose_of
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.query import Endings, Query
@@ -31,6 +31,7 @@ LEVELS: Final = (  # and for how many expansions, unless nothing is left before
     (5000, Outward(cell=0.05, headings=96)),
     (1 << 30, Outward(cell=0.02, headings=128)),
 )
+MEETING: Final = 3  # times as many, where two trees are to meet
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -64,11 +65,11 @@ def _alone(vehicle: Vehicle) -> Vehicle:
 
 
 def _suited(level: Outward, vehicle: Vehicle) -> Outward:
-    """The level with bends in which trailers can follow."""
+    """The level with bends in which trailers can follow for long, and the tightest, in which they fold."""
     if not isinstance(vehicle, CarWithTrailers):
         return level
     share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
-    return level._replace(bends=(share, 0.0, -share, 0.5 * share, -0.5 * share))
+    return level._replace(bends=(1.0, share, 0.0, -share, -1.0))
 
 
 def allocate_way_from_start() -> CostToGo:
@@ -76,9 +77,9 @@ def allocate_way_from_start() -> CostToGo:
     return allocate_cost_to_go()
 
 
-def allocate_joining_tree(state_size: int) -> GoalTree:
-    """Buffers of its own for the search that aims at known endings, since it takes turns with another."""
-    return allocate_goal_tree(state_size)
+def allocate_trees(state_size: int, number: int) -> tuple[GoalTree, GoalTree]:
+    """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
+    return allocate_goal_tree(state_size), allocate_goal_tree(state_size)
 
 
 class Manoeuvring:
@@ -95,13 +96,17 @@ class Manoeuvring:
         problem, vehicle = query.problem, query.vehicle
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
-        self._tree = query.workspace.buffers(allocate_goal_tree, size)
+        self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
         self._drive = query.workspace.buffers(allocate_drive, size)
         go = query.workspace.buffers(allocate_way_from_start)
         fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
         start = start_state(problem, vehicle)[np.newaxis]
-        known = seconds_to_pose(_alone(vehicle)), no_endings(size), word_radius(vehicle)
-        self._known = FromStart(start, go, *known)
+        known = seconds_to_pose(_alone(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
+        self._known = FromStart(start, go, *known, outward=True)
+        to_goal = query.workspace.buffers(allocate_cost_to_go)
+        self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
+        # with trailers a tree grows out of the start too: what is hard from one end is easy from the other
+        self.meets = bool(trailers_of(vehicle)) and bool(start[0, 3] == 0.0)
         self._level = self._spent = self.expansions = 0
         self._begin_at_coarsest()
         # whether there is so little room around the goal that other searches have small hopes
@@ -111,8 +116,10 @@ class Manoeuvring:
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
         """The same search from its beginning, which goes on from known endings too, in buffers of its own."""
         other = copy.copy(self)
-        other._tree = query.workspace.buffers(allocate_joining_tree, state_size(query.vehicle))
+        size = state_size(query.vehicle)
+        other._tree, other._other = query.workspace.buffers(allocate_trees, size, 1)
         other._known = self._known._replace(endings=endings)
+        other._known_there = self._known_there._replace(endings=endings)
         other._begin_at_coarsest()
         if not np.any(other._nodes >= 0):
             other._level = len(LEVELS)  # nothing that is known is free here
@@ -127,14 +134,14 @@ class Manoeuvring:
         """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
-            level_ends = LEVELS[self._level][0] - self._spent
+            level_ends = LEVELS[self._level][0] * (MEETING if self.meets else 1) - self._spent
             more = min(until - self.expansions, level_ends)
             found, used = self._grow(more)
             self.expansions += used
             self._spent += used
             if found and add_to_tree(self._drive, tree, self._vehicle):
                 return True
-            if used < more or more == level_ends:
+            if used == 0 or used == level_ends:
                 self._level, self._spent = self._level + 1, 0
                 self._begin()
         return False
@@ -142,27 +149,33 @@ class Manoeuvring:
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
-        self._checks_before = int(self._tree.counts[CHECKS])
+        self._checks_before = int(self._tree.counts[CHECKS] + self._other.counts[CHECKS])
         self._begin()
 
     def _begin(self) -> None:
         """Plant the tree of the present level, if there is one."""
         if not self.is_over:
-            plant_goal(self._tree, self._goal)
+            plant_root(self._tree, self._known_there.start[0])
+            plant_root(self._other, self._known.start[0])
             level = _suited(LEVELS[self._level][1], self._vehicle)
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
 
     def _grow(self, most: int) -> tuple[bool, int]:
         """Grow the goal tree by some expansions at most; whether there is a drive, and how many they were."""
-        return grow_outward(
-            *(self._tree, most, self._known, self._goal, self._drive),
-            *(_suited(LEVELS[self._level][1], self._vehicle), self._vehicle, self._scene),
-        )
+        level = _suited(LEVELS[self._level][1], self._vehicle)
+        settings = self._goal, self._drive, level, self._vehicle, self._scene
+        used = 0
+        if self.meets:
+            found, used = grow_outward(self._other, self._tree, most // 2, self._known_there, *settings)
+            if found:
+                return True, used
+        found, more = grow_outward(self._tree, self._other, most - used, self._known, *settings)
+        return found, used + more
 
     @property
     def checks(self) -> int:
         """How often obstacles were looked at so far."""
-        return int(self._tree.counts[CHECKS]) - self._checks_before
+        return int(self._tree.counts[CHECKS] + self._other.counts[CHECKS]) - self._checks_before
 
     @property
     def joined(self) -> bool:

@@ -12,7 +12,17 @@ from planners.search.connection.pose_table import seconds_from
 from planners.search.manoeuvres.arcs import FINE, STRIDE, stride_along, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
-from planners.search.manoeuvres.goal_tree import CHECKS, SIZE, GoalTree, add_node, cell_of, seconds_after
+from planners.search.manoeuvres.goal_tree import (
+    CHECKS,
+    SIZE,
+    GoalTree,
+    add_node,
+    cell_of,
+    mark_place,
+    node_near,
+    seconds_after,
+)
+from planners.search.manoeuvres.meeting import meet
 from planners.search.manoeuvres.shots import FromStart, shoot
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
@@ -59,7 +69,10 @@ def room_around(states: Floats, vehicle: Vehicle, scene: Scene) -> float:
 @inlined
 def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
     x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
-    turns = seconds_from(x, y, heading, (state[0], state[1], state[2]), known.table, vehicle.max_speed)
+    if known.outward:
+        turns = seconds_from(x, y, heading, (state[0], state[1], state[2]), known.table, vehicle.max_speed)
+    else:
+        turns = seconds_from(state[0], state[1], state[2], (x, y, heading), known.table, vehicle.max_speed)
     return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)
 
 
@@ -69,8 +82,10 @@ def begin_outward(
 ) -> None:
     """Let the stops of known endings wait that are free; ``nodes [K]`` is filled in with their numbers."""
     add_endings(tree, known.endings, nodes, vehicle, scene)
+    mark_place(tree, 0, known.origin, vehicle)
     for k in range(nodes.shape[0]):
         if nodes[k] >= 0:
+            mark_place(tree, nodes[k], known.origin, vehicle)
             left = _seconds_from_start(load(tree.states, nodes[k], vehicle), known, vehicle)
             push(tree.frontier, KNOWN * tree.seconds[nodes[k]] + settings.greed * left, nodes[k], 1)
 
@@ -78,6 +93,7 @@ def begin_outward(
 @lean
 def open_node(
     tree: GoalTree,
+    other: GoalTree,
     node: int,
     further: bool,
     known: FromStart,
@@ -109,7 +125,8 @@ def open_node(
                     mark += 1
                     if metres - before >= 2.0 * stride / FINE:
                         longest = mark == len(settings.marks) and not ended
-                        _wait(tree, node, state, bend, gear * metres, longest, known, settings, vehicle)
+                        way = gear * metres
+                        _wait(tree, other, node, state, bend, way, longest, known, settings, vehicle)
                     before = metres
                 if ended:
                     break
@@ -118,6 +135,7 @@ def open_node(
 @inlined
 def _wait(
     tree: GoalTree,
+    other: GoalTree,
     node: int,
     state: State,
     bend: float,
@@ -134,13 +152,20 @@ def _wait(
         return
     seconds = seconds_after(tree, node, bend, metres, vehicle)
     left = _seconds_from_start(state, known, vehicle)
+    estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds)
-    push(tree.frontier, seconds + settings.greed * left, new, 1 if longest else 0)
+    if len(state) > 5:  # decided when compiling
+        mark_place(tree, new, known.origin, vehicle)
+        near = node_near(other, state, known.origin, vehicle)
+        if near >= 0:
+            estimate = min(estimate, seconds + other.seconds[near])
+    push(tree.frontier, estimate, new, 1 if longest else 0)
 
 
 @lean
 def grow_outward(
     tree: GoalTree,
+    other: GoalTree,
     most: int,
     known: FromStart,
     goal: Floats,
@@ -150,6 +175,8 @@ def grow_outward(
     scene: Scene,
 ) -> tuple[bool, int]:
     """Open the node with the least estimate until solved, nothing is left, or ``most`` expansions.
+
+    With trailers the tree may meet an ``other`` one, which grows from the other end.
 
     Returns whether ``drive`` leads to the goal now, and how many expansions there were.
     """
@@ -163,7 +190,16 @@ def grow_outward(
             continue
         reach(tree.frontier, key)
         expansions += 1
-        if shoot(tree, node, known, goal, drive, vehicle, scene):
+        if len(state) > 5:  # decided when compiling
+            near = node_near(other, state, known.origin, vehicle)
+            if known.outward:
+                if near >= 0 and meet(other, near, tree, node, known.endings, goal, drive, vehicle, scene):
+                    return True, expansions
+                if shoot(tree, node, known, goal, drive, vehicle, scene):
+                    return True, expansions
+            elif near >= 0 and meet(tree, node, other, near, known.endings, goal, drive, vehicle, scene):
+                return True, expansions
+        elif shoot(tree, node, known, goal, drive, vehicle, scene):
             return True, expansions
-        open_node(tree, node, longest == 1, known, settings, vehicle, scene)
+        open_node(tree, other, node, longest == 1, known, settings, vehicle, scene)
     return False, expansions

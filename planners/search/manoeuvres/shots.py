@@ -29,13 +29,15 @@ NEAR: Final = 0.3  # radians: hitches that are farther off than this are not cor
 
 
 class FromStart(NamedTuple):
-    """What is known of the way from the start."""
+    """What is known of the way from the start; of a tree that grows out of the start, from the goal."""
 
     start: Floats  # [1, S]
     go: CostToGo  # around obstacles
     table: Floats  # that of ``seconds_to_pose``
     endings: Endings  # of known plans
     radius: float  # of words, in metres, with which trailers keep straight enough
+    origin: Floats  # [2] metres, from which places are counted
+    outward: bool  # whether the tree grows out of the goal
 
 
 @lean
@@ -137,7 +139,9 @@ def _shoot_with_trailers(
             continue
         free, checks = arcs_are_free(known.start, drive.join, vehicle, scene)
         tree.counts[CHECKS] += checks
-        if free and drive_arcs_to_goal(drive, tree, node, known.start, known.endings, goal, vehicle, scene):
+        if free and drive_arcs_to_goal(
+            drive, tree, 0, tree, node, known.start, known.endings, goal, vehicle, scene
+        ):
             return True
     return False
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from planners.search.manoeuvres.goal_tree import allocate_goal_tree
+from planners.search.manoeuvres.manoeuvring import allocate_trees
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.search.structures.frontier import SEARCH, allocate_frontier
@@ -37,7 +37,7 @@ def test_what_was_asked_before_changes_no_answer(planner: str) -> None:
 def test_searches_long_ago_change_no_answer() -> None:
     used = Workspace()
     frontiers = [
-        used.buffers(allocate_goal_tree, state_size(CAR)).frontier,
+        used.buffers(allocate_trees, state_size(CAR), 0)[0].frontier,
         used.buffers(allocate_frontier),
     ]
     for problem in [*SLOTS, *STREWN]:
