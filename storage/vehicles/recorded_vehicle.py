@@ -31,8 +31,8 @@ def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
 
     Args:
         where: the file or folder that records the vehicle.
-        made_for: a definition, the name of a built-in vehicle, or what earlier versions recorded of one; the
-            name of a vehicle that has a file of its own is none of these.
+        made_for: a definition, the name of a built-in vehicle, or what earlier versions recorded of one. Of
+            other vehicles a name says too little.
         wanted: the vehicle that is wanted.
     """
     recorded = vehicle_recorded(made_for)
