@@ -7,6 +7,7 @@ and Prefect's form shows the options with their choices. Workers and servers are
 from __future__ import annotations
 
 import inspect
+import logging
 import os
 from collections.abc import Callable
 from dataclasses import fields
@@ -124,7 +125,7 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
     options = [each for each in _options_of(Options) if each.name not in _ELSEWHERE]
 
     def body(**given: Any) -> None:
-        _let_in()
+        _prepare()
         further = {each.name: given.pop(each.name) for each in own}
         chosen = Options(**given)
         with locked_folder(chosen.folder) as folder:
@@ -145,7 +146,7 @@ def _command(command: Callable[..., None]) -> Flow[..., None]:
             own.append(_parameter(each.name, types[each.name], each.default))
 
     def body(**given: Any) -> None:
-        _let_in()
+        _prepare()
         values = {
             name: types[name](**{each.name: given.pop(each.name) for each in options})
             for name, options in groups.items()
@@ -157,10 +158,15 @@ def _command(command: Callable[..., None]) -> Flow[..., None]:
     return _flow_of(command.__name__.replace("_", "-"), None, body, flat, told)
 
 
-def _let_in() -> None:
-    """Let MLflow's client find the password of the servers, as a command does."""
+def _prepare() -> None:
+    """Do what a command does before its flow: let MLflow's client find the password, and log what is told.
+
+    Prefect sends the lines of its extra loggers to the run's log, but leaves their level to the root logger.
+    """
     for name, value in auth_environment().items():
         os.environ.setdefault(name, value)
+    for room in ("tasks", "storage"):
+        logging.getLogger(room).setLevel(logging.INFO)
 
 
 def _told(function: Callable[..., Any], *options: type) -> str:

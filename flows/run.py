@@ -11,10 +11,13 @@ from flows.continual import continual
 from flows.hallucinate import hallucinate
 from flows.report import report
 from flows.train import train
+from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.fan_out import cluster
 from tasks.session.folder_lock import locks_data_folder
 from tasks.settings.run_settings import RunSettings
+from tasks.tracking.artifacts import publish_pages
 from tasks.tracking.logbook import run_logged
+from tasks.tracking.report_log import pages_of
 
 
 @flow(name="run", flow_run_name="run {settings.title}")
@@ -29,3 +32,4 @@ def run(settings: RunSettings, data: str) -> None:
         benchmark(settings, data)
         continual(settings, data)
         report(settings, data)
+        publish_pages(run_folder(data, settings), pages_of(data, settings))

@@ -28,12 +28,7 @@ def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -
         claims: by every method that judges them.
         pages: addresses of pages about the run that a browser elsewhere can open, by their titles.
     """
-    from prefect.artifacts import (
-        create_image_artifact,
-        create_link_artifact,
-        create_markdown_artifact,
-        create_table_artifact,
-    )
+    from prefect.artifacts import create_image_artifact, create_markdown_artifact, create_table_artifact
 
     table = [claim._asdict() for claim in claims]
     for title, address in ({"Report": uri_of(run.report)} | dict(pages)).items():
@@ -42,8 +37,6 @@ def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -
         if "Report" not in pages:  # browsers open no file from a page of a server
             told = f"`{uri_of(run.report)}` on {platform.node()}; `motion-memory dashboard` shows its figures"
             create_markdown_artifact(told, key=_key(run, "report"), description="Where the report lies")
-        for title, address in pages.items():
-            create_link_artifact(address, title, key=_key(run, title), description=title)
         create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
         create_table_artifact(table, key=_key(run, "claims"), description="Claims of the paper")
         for figure in files_in(run.figures, "*.png"):
@@ -51,6 +44,18 @@ def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -
                 create_image_artifact(_address(figure), key=_key(run, figure.stem), description=figure.stem)
     except Exception as error:  # the report is complete without them
         _warn("the report", error)
+    publish_pages(run, pages)
+
+
+def publish_pages(run: RunFolder, pages: Mapping[str, str]) -> None:
+    """Publish links to ``pages`` about a run, as artifacts of the flow that this is called in."""
+    from prefect.artifacts import create_link_artifact
+
+    try:
+        for title, address in pages.items():
+            create_link_artifact(address, title, key=_key(run, title), description=title)
+    except Exception as error:  # they are in the log, too
+        _warn("the pages", error)
 
 
 def publish_judgements(run_name: str, verdicts: Sequence[tuple[str, str, str]]) -> None:

@@ -33,6 +33,7 @@ STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ..
 KEY_TAG: Final = "motion_memory.key"  # digest of what the logged content depends on
 MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory logged_model with its encoder
 MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
+_TRAINING: Final = "workflowType=machine_learning"  # or MLflow opens its pages for language models
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
@@ -247,7 +248,8 @@ class Tracker:
         if not self.uri.startswith("http"):
             return None
         shown = f"/artifacts/{artifact}" if artifact else ""
-        return redacted(f"{self.uri.rstrip('/')}/#/experiments/{self._experiment}/runs/{run_id}{shown}")
+        place = f"{self.uri.rstrip('/')}/#/experiments/{self._experiment}/runs/{run_id}{shown}"
+        return redacted(f"{place}?{_TRAINING}")
 
     def dataset(self, run_id: str, name: str, path: Path, digest: str, context: str) -> None:
         """Log which data a run has used.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
@@ -77,6 +78,20 @@ def test_flat_parameters_are_the_settings_that_the_command_makes(
     options: dict[str, Any] = {"preset": "smoke", "experiences": 10, "classes": ["trap"], "epochs": 3}
     deployments.collect.fn(**deployments.collect.validate_parameters(options))
     assert made == [(for_preset(**options), str(tmp_path / "data"))]
+
+
+def test_what_a_deployed_run_does_reaches_its_log(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    tell = logging.getLogger("tasks.tracking").info
+    monkeypatch.setattr(deployments.collect_flow, "fn", lambda settings, data: tell("said"))
+    assert not logging.getLogger("tasks").isEnabledFor(logging.INFO)  # as Prefect leaves it
+    try:
+        deployments.collect.fn(**deployments.collect.validate_parameters({"data": tmp_path / "data"}))
+    finally:
+        for room in ("tasks", "storage"):
+            logging.getLogger(room).setLevel(logging.NOTSET)
+    assert "said" in caplog.messages
 
 
 def test_every_parameter_is_described_in_the_form(deployed: list[dict[str, Any]]) -> None:
