@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
@@ -31,6 +32,18 @@ NOT_FLOWS = {"__init__", "deployments"}
 def deployed() -> list[dict[str, Any]]:
     found: list[dict[str, Any]] = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
     return found
+
+
+@pytest.fixture(autouse=True)
+def _levels() -> Iterator[None]:
+    """The levels of loggers as Prefect leaves them; afterwards as they were."""
+    loggers = [logging.getLogger(room) for room in ("tasks", "storage")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.NOTSET)
+    yield
+    for logger, level in zip(loggers, levels, strict=True):
+        logger.setLevel(level)
 
 
 def _flow(deployment: dict[str, Any]) -> Any:
@@ -85,12 +98,7 @@ def test_what_a_deployed_run_does_reaches_its_log(
 ) -> None:
     tell = logging.getLogger("tasks.tracking").info
     monkeypatch.setattr(deployments.collect_flow, "fn", lambda settings, data: tell("said"))
-    assert not logging.getLogger("tasks").isEnabledFor(logging.INFO)  # as Prefect leaves it
-    try:
-        deployments.collect.fn(**deployments.collect.validate_parameters({"data": tmp_path / "data"}))
-    finally:
-        for room in ("tasks", "storage"):
-            logging.getLogger(room).setLevel(logging.NOTSET)
+    deployments.collect.fn(**deployments.collect.validate_parameters({"data": tmp_path / "data"}))
     assert "said" in caplog.messages
 
 
