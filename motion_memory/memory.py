@@ -1,6 +1,6 @@
 """A memory to plan with, for a robot's own process too: it needs no Prefect, MLflow, pandas or torch.
 
-Everything is loaded, checked and compiled before ``load`` returns.
+Everything is loaded and checked before ``load`` returns, and compiled unless it is asked not to.
 """
 
 from __future__ import annotations
@@ -226,6 +226,7 @@ def load(
     recall: str | None = None,
     seed: int = 1,
     judged: bool = True,
+    warm: bool = True,
 ) -> Memory:
     """Read and check a memory, load the compiled kernels and plan once, so that the first call is quick.
 
@@ -239,6 +240,8 @@ def load(
         recall: how they are recalled; by default what suits the size of the memory.
         seed: everything random follows from it.
         judged: whether each plan is judged before it is returned, which takes some milliseconds.
+        warm: False leaves out that plan. Then each call compiles what it needs and no call needed before,
+            which is quicker where only a few problems are planned for after an installation.
 
     Raises:
         UsageError: A name is unknown, or ``top_k`` is below 1.
@@ -255,9 +258,11 @@ def load(
     with memory_at(str(memory)) as folder:
         archive = load_memory_or_library(folder, said_vehicle(vehicle))  # mapped files outlive their names
     if isinstance(archive, PlanLibrary):
-        return _warmed(Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged))
+        ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
+        return _warmed(ready) if warm else ready
     strategy = recall or default_recall(archive)
-    compile_assists(archive.vehicle, planner, [strategy])
+    if warm:
+        compile_assists(archive.vehicle, planner, [strategy])
     try:
         archive.forward  # noqa: B018  made when it is first used
     except ModuleNotFoundError as error:
@@ -265,7 +270,8 @@ def load(
             f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
             "pip install 'motion-memory[pipeline]'."
         ) from None
-    return _warmed(Memory(archive, planner, assist, top_k, strategy, seed, judged))
+    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged)
+    return _warmed(ready) if warm else ready
 
 
 def _warmed(ready: Memory) -> Memory:

@@ -25,7 +25,7 @@ PLAN: Final = """
 import sys
 import motion_memory
 
-memory = motion_memory.load(sys.argv[1])
+memory = motion_memory.load(sys.argv[1], warm=False)
 box = [[20, 18], [24, 18], [24, 30], [20, 30]]
 ends = {"start": [0, 0, 0.785], "goal": [50, 50], "goal_radius": 2, "bounds": [-7, -7, 57, 57]}
 answer = memory.plan(ends | {"obstacles": [box]})

@@ -1,4 +1,9 @@
-"""How kernels are compiled: Numba's flags, where compiled kernels are kept, and kernels by vehicle."""
+"""How kernels are compiled: Numba's flags, where compiled kernels are kept, and kernels by vehicle.
+
+Only a kernel that Python calls becomes machine code. The kernels that it calls are linked into it and
+optimised together with it. So they are compiled to LLVM's representation and no further: machine code of
+their own would never run.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +15,12 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+from llvmlite import binding as llvm
 from numba.core import event, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, UserWideCacheLocator
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, compile_result
+from numba.core.registry import CPUDispatcher
 from numba.extending import overload, typeof_impl
 
 _SOURCES = Path(__file__).parents[1]
@@ -48,6 +57,105 @@ class _KernelCacheImpl(CompileResultCacheImpl):
 
 class _KernelCache(FunctionCache):
     _impl_class = _KernelCacheImpl
+
+
+class _LinkedLibrary(JITCodeLibrary):
+    """LLVM's representation of a kernel that others call."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the kernel that Python calls."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> _NoMachineCode:
+        return _NoMachineCode()
+
+
+class _NoMachineCode:
+    """Takes the address of a kernel's environment: ``_Kernel.add_overload`` writes it where the code is."""
+
+    def set_env(self, _name: str, _environment: object) -> None:
+        pass
+
+
+class _LinkedCompiler(Compiler):
+    """Compiles a kernel that others call."""
+
+    def define_pipelines(self) -> list[Any]:
+        state = self.state
+        state.library = _LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        pipelines: list[Any] = super().define_pipelines()
+        return pipelines
+
+
+class _LinkedCacheImpl(_KernelCacheImpl):
+    """Keeps kernels that others call, in files beside those of kernels that Python calls."""
+
+    def get_filename_base(self, fullname: str, abiflags: str) -> str:
+        return "linked-" + str(super().get_filename_base(fullname, abiflags))
+
+    def reduce(self, cres: Any) -> tuple[Any, ...]:
+        library, fndesc = cres.library, cres.fndesc
+        fndesc.typemap = fndesc.calltypes = None  # as Numba does: they cannot all be pickled
+        bitcode = library._get_module_for_linking().as_bitcode()
+        return library.name, bitcode, fndesc, cres.environment, cres.signature, cres.reload_init
+
+    def rebuild(self, target_context: Any, payload: tuple[Any, ...]) -> Any:
+        name, bitcode, fndesc, environment, signature, reload_init = payload
+        for load in reload_init:
+            load()
+        library = _LinkedLibrary(target_context.codegen(), name)
+        library._final_module = llvm.parse_bitcode(bitcode)
+        library._finalize_final_module()
+        return compile_result(
+            typing_context=target_context.typing_context,
+            target_context=target_context,
+            entry_point=target_context.get_executable(library, fndesc, environment),
+            library=library,
+            environment=environment,
+            fndesc=fndesc,
+            signature=signature,
+            objectmode=False,
+            lifted=(),
+            reload_init=reload_init,
+        )
+
+
+class _LinkedCache(_KernelCache):
+    _impl_class = _LinkedCacheImpl
+
+
+class _Linked(CPUDispatcher):
+    """A kernel as others call it."""
+
+    def __init__(self, py_func: Callable[..., Any], locals: Any, targetoptions: dict[str, Any]) -> None:
+        options = targetoptions | {"no_cpython_wrapper": True}
+        super().__init__(py_func, locals, options, _LinkedCompiler)
+        self._cache = _LinkedCache(py_func)
+
+
+class _Kernel(CPUDispatcher):
+    """A kernel as Python calls it."""
+
+    def __init__(self, py_func: Callable[..., Any], locals: Any, targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, locals, targetoptions)
+        self._cache = _KernelCache(py_func)
+        self._linked = _Linked(py_func, locals, targetoptions)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What the compiler takes for it where it stands in another kernel."""
+        return types.Dispatcher(self._linked)
+
+    def add_overload(self, cres: Any) -> None:
+        """Let Python call what was compiled; the kernels that are linked into it find their environments."""
+        for environment in cres._find_referenced_environments():
+            cres.codegen.set_env(environment.env_name, environment)
+        super().add_overload(cres)
 
 
 class _NoCollection(event.Listener):
@@ -87,9 +195,7 @@ _INLINED: dict[str, Any] = _LEAN | {"forceinline": True}
 
 
 def _compiled(function: Callable[_P, _R], flags: dict[str, Any]) -> Callable[_P, _R]:
-    dispatcher = numba.njit(**flags)(function)
-    dispatcher._cache = _KernelCache(function)
-    compiled: Callable[_P, _R] = dispatcher
+    compiled: Callable[_P, _R] = _Kernel(function, None, {"nopython": True} | flags)
     return compiled
 
 
@@ -135,6 +241,7 @@ def by_vehicle(function: Callable[_P, _R]) -> Callable[_P, _R]:
         return next((by_kind[kind] for kind in kinds if kind in by_kind), None)
 
     options: Any = {name: on for name, on in _INLINED.items() if name != "no_cfunc_wrapper"}
+    options["pipeline_class"] = _LinkedCompiler
     overload(interpreted, jit_options=options, strict=False)(compiled)
     _implementations[interpreted] = by_kind
     declared: Callable[_P, _R] = interpreted  # type: ignore[assignment]  # the parameters are those of the function

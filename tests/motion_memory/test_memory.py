@@ -96,6 +96,13 @@ def test_what_a_goal_pose_needs_is_made_before_the_first_is_asked_for(memory: Pa
     assert seconds_to_pose.cache_info().misses == made
 
 
+def test_what_was_not_warmed_up_answers_the_same(planner: Memory, memory: Path) -> None:
+    seconds_to_pose.cache_clear()
+    cold = load(memory, warm=False)
+    assert seconds_to_pose.cache_info().misses == 0
+    assert same(planner.plan(problem(0)), cold.plan(problem(0)))
+
+
 def test_no_plan_is_an_answer(planner: Memory) -> None:
     walls = [box(48.0, y, 1.0) for y in np.arange(42.0, 58.0)] + [
         box(x, 43.0, 1.0) for x in np.arange(48, 58)

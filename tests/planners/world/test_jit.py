@@ -38,6 +38,55 @@ def test_importing_the_kernels_leaves_numba_as_it_is_for_others(tmp_path, monkey
     assert done.returncode == 0, done.stderr
 
 
+CALLED = """
+import sys
+from planners.world.jit import jit
+
+@jit
+def root(value):
+    if value < 0.0:
+        raise ValueError(value)  # the number is found by way of the environment of this kernel
+    return value ** 0.5
+
+@jit
+def sum_of_roots(value, other):
+    return root(value) + root(other)
+
+@jit
+def product_of_roots(value, other):
+    return root(value) * root(other)
+
+def refused(kernel, *values):
+    try:
+        kernel(*values)
+    except ValueError as error:
+        return error.args
+
+if "both" in sys.argv:
+    assert root(4.0) == 2.0
+    assert sum_of_roots(4.0, 9.0) == 5.0
+    assert refused(root, -3.0) == refused(sum_of_roots, 4.0, -3.0) == (-3.0,)
+assert product_of_roots(4.0, 9.0) == 6.0
+assert refused(product_of_roots, 4.0, -3.0) == (-3.0,)
+print([sum(kernel.stats.cache_hits.values()) for kernel in (root, sum_of_roots, product_of_roots)])
+"""
+
+
+def test_kernels_work_alike_called_by_python_and_by_others_compiled_and_from_disk(tmp_path, monkeypatch):
+    script = tmp_path / "called.py"
+    script.write_text(CALLED)
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    loaded = []
+    for words in ([], ["both"], ["both"]):  # the second compiles a caller of what it finds on disk
+        done = subprocess.run(
+            [sys.executable, str(script), *words], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        loaded.append(done.stdout.strip())
+    assert loaded == ["[0, 0, 0]", "[0, 0, 1]", "[1, 1, 1]"]
+
+
 @pytest.fixture
 def collecting() -> Iterator[None]:
     yield
