@@ -53,7 +53,7 @@ class Story:
 
     def first_champion_and_a_better_one(self) -> None:
         (first,) = retrain(self.data)
-        learn(self.data, seed=901, count=150)
+        learn(self.data, seed=901, count=24)
         (second,) = retrain(self.data)
         self.seen |= {"first": first.to_json(), "second": second.to_json()}
         self.seen["promoted"] = self.state()
@@ -113,7 +113,7 @@ class Story:
         self.seen["after rollback"] = len(retrain(self.data))
 
     def unreachable(self, patch: pytest.MonkeyPatch) -> None:
-        learn(self.data, seed=903, count=40)
+        learn(self.data, seed=903, count=8)
         with patch.context() as without:
             without.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")
             without.setenv("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "0")
@@ -136,7 +136,7 @@ class Story:
         self.seen["went on"] = self.state() | {"learned": made.learned}
 
     def approval(self) -> None:
-        learn(self.data, seed=905, count=150)
+        learn(self.data, seed=905, count=24)
         roll_back_to_first(self)
         retrain(self.data, approve=True)
         self.seen["awaiting"] = self.state()

@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pytest
+from numba.core.caching import InTreeCacheLocator
 
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
-from planners.memory.plans.cell_masks import masks_of
+from planners.memory.plans.cell_masks import blocked_cells, masks_of
 from planners.memory.plans.sweeps import sweep_plans
 from planners.ranked_plans import PARTS
 from planners.solve import solve
@@ -206,11 +207,13 @@ def _installed(logged: dict[str, str], folder: Path) -> Path:
     with zipfile.ZipFile(wheel) as opened:
         opened.extractall(folder)
     for path in folder.rglob("*.py"):
-        original = ROOT / path.relative_to(folder)
-        shutil.copystat(original, path)
-        for compiled in original.parent.glob(f"__pycache__/{original.stem}.*.nb*"):
-            (path.parent / "__pycache__").mkdir(exist_ok=True)
-            shutil.copy2(compiled, path.parent / "__pycache__")
+        shutil.copystat(ROOT / path.relative_to(folder), path)
+    kernels = Path(blocked_cells.stats.cache_path).parent
+    copies, subpath = folder / "planners" / "__pycache__", InTreeCacheLocator.get_suitable_cache_subpath
+    for place in {path.parent for path in folder.rglob("*.py")}:
+        original = kernels / subpath(str(ROOT / place.relative_to(folder) / "any.py"))
+        if original.is_dir():
+            shutil.copytree(original, copies / kernels.name / subpath(str(place / "any.py")))
     return folder
 
 
