@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from planners.memory.library.plan_library import gathered_library
+from planners.optimisation.polish import polish
+from planners.search.query import Limits
 from planners.solve import solve
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Arrival
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle
+from planners.world.workspace import Workspace
 from tasks.attempts.compile_assists import EMPTY
 from tasks.session.warm_up import GROUPS
 
@@ -20,7 +26,16 @@ def compile_library(vehicle: Vehicle) -> None:
         solve(EMPTY, "lattice", assist, memory=library, vehicle=vehicle)
 
 
-COMPILED: Final = (*GROUPS, compile_library)  # no worker of a run needs the last one
+def compile_arrivals(vehicle: Vehicle) -> None:
+    """Compile what drives to a pose, and what polishes such a drive."""
+    asked = replace(EMPTY, goal=(12.0, 9.0), goal_radius=0.5, arrival=Arrival(0.5, 0.2, 0.0, 0.0))
+    found = solve(asked, "lattice", vehicle=vehicle, limits=Limits(expansions=2_000)).plan
+    assert found is not None
+    polish(asked, found, vehicle, scene_of(asked), Workspace())
+
+
+COMPILED: Final = (*GROUPS, compile_library, compile_arrivals)  # no worker of a run needs the last two
+ARRIVE: Final = len(COMPILED) - 1
 FIRST: Final = next(iter(VEHICLES))
 # What two processes need at the same time both compile: groups of one vehicle, which share most, are far
 # apart. The second group is nearly the same for all vehicles.
@@ -30,6 +45,7 @@ PIECES: Final = [
     *((name, 2) for name in VEHICLES),
     *((name, 1) for name in VEHICLES if name != FIRST),
     (FIRST, 3),
+    *((name, ARRIVE) for name in ("car", "differential-drive", "car-1-trailer")),  # as the tests ask for
 ]
 
 
