@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TORCH := torch==2.13.0
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
+BYTECODE := $(BIN)/python -m compileall -qq -j 0 -x '/tests/' $(VENV)/lib
 
 .PHONY: run smoke prepared test test-slow test-cluster wheel site check speed format clean
 
@@ -48,12 +49,13 @@ format: $(READY)
 clean:
 	rm -rf $(VENV) build *.egg-info
 
-# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA.
+# torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA. pip takes one core,
+# so bytecode is compiled apart from it, on all; tests of packages are never imported, and some files are of other Pythons.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
 	$(PIP) install --no-compile -c constraints.txt $(TORCH)
-	$(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat
-	$(BIN)/python -m compileall -qq -j 0 $(VENV)/lib || true  # on all cores, as pip takes one; some files are of other Pythons
+	$(BYTECODE) & $(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat && wait
+	$(BYTECODE) || true
 	touch $(READY)

@@ -19,8 +19,8 @@ from tasks.settings.environment import environment
 from tasks.settings.errors import RunError
 from tasks.settings.redaction import redacted
 from tasks.tracking.mlflow_database import ready_database
-from tasks.tracking.mlflow_runs import tracking_uri
 from tasks.tracking.model_names import PREFIX
+from tasks.tracking.tracking_address import tracking_uri
 
 CHAMPION: Final = "champion"
 CHALLENGER: Final = "challenger"  # a better version that waits for approval

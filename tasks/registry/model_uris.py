@@ -27,7 +27,7 @@ from tasks.settings.environment import default_data, environment
 from tasks.settings.errors import RunError
 from tasks.settings.redaction import redacted
 from tasks.tracking.mlflow_database import ready_database
-from tasks.tracking.mlflow_runs import tracking_uri
+from tasks.tracking.tracking_address import tracking_uri
 
 URI: Final = re.compile(r"(models|runs|mlflow-artifacts):/.*")
 _SETTINGS: Final = {

@@ -18,7 +18,8 @@ from tasks.settings.environment import default_scheduler
 from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
 from tasks.settings.run_settings import RunSettings
-from tasks.tracking.mlflow_runs import tracker, tracking_uri
+from tasks.tracking.mlflow_runs import tracker
+from tasks.tracking.tracking_address import tracking_uri
 
 UNTRACKED: Final = ("collect", "hallucinate", "benchmark")  # flows that log nothing in MLflow
 

@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any, Final
 from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
 from storage.places.scratch import scratch_folder
-from tasks.settings.errors import UsageError
 from tasks.settings.redaction import redacted
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.provenance import provenance
 from tasks.tracking.table_shape import table_shape
+from tasks.tracking.tracking_address import tracking_uri
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -35,20 +35,6 @@ MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory logged_m
 MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
 _TRAINING: Final = "workflowType=machine_learning"  # or MLflow opens its pages for language models
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
-
-
-def tracking_uri(data: DataFolder) -> str:
-    """The address of MLflow: MLFLOW_TRACKING_URI if it is set, else of a database in the data folder.
-
-    Raises UsageError if the data folder is in object storage, which cannot hold a database.
-    """
-    uri = os.environ.get("MLFLOW_TRACKING_URI")
-    if not uri and data.is_remote:
-        raise UsageError(
-            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
-            "keeps its own (docs/runbook.md)."
-        )
-    return uri or f"sqlite:///{data.mlflow_database}"
 
 
 class Tracker:

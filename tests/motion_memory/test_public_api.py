@@ -25,7 +25,7 @@ from tests.tasks.served import problem, write_memory
 from tests.worlds import strewn
 
 ROOT = Path(__file__).parents[2]
-NOT_FOR_ROBOTS = ("prefect", "mlflow", "pandas", "torch", "casadi", "matplotlib")
+NOT_FOR_ROBOTS = ("prefect", "mlflow", "pandas", "pyarrow", "torch", "casadi", "matplotlib")
 
 
 @pytest.fixture(scope="module")
