@@ -21,6 +21,7 @@ MOST = 60
 SILENT = 300
 SHORT = 0.5  # seconds
 PATIENCE = 60.0  # seconds, of a busy machine
+TRIES = 5  # for what a machine that stalls makes late
 Address = tuple[str, int]
 sent: list[bytes] = []  # answers to /parts that the application has finished
 
@@ -168,12 +169,17 @@ def test_a_request_that_does_not_come_is_not_waited_for(
 
 @pytest.mark.parametrize("path", [b"/", b"/rude"])
 def test_a_second_request_that_does_not_come_is_not_waited_for(hurried: Address, path: bytes) -> None:
-    with socket.create_connection(hurried) as connection:
-        length = 10**6 if path == b"/rude" else 0
-        connection.sendall(b"POST %b HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % (path, length))
-        while not connection.recv(1000).endswith(b"\r\n\r\n"):
-            pass
-        assert is_closed(connection, b"x")
+    length = 10**6 if path == b"/rude" else 0
+    for _ in range(TRIES):
+        with suppress(ConnectionError), socket.create_connection(hurried) as connection:
+            connection.sendall(b"POST %b HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n" % (path, length))
+            answer = b""
+            while not answer.endswith(b"\r\n\r\n") and (more := connection.recv(1000)):
+                answer += more
+            if answer.endswith(b"\r\n\r\n"):
+                assert is_closed(connection, b"x")
+                return
+    pytest.fail("the first request was never answered")
 
 
 def test_who_sends_half_a_request_makes_room_after_the_silent(patient: Address) -> None:
@@ -186,21 +192,21 @@ def test_who_sends_half_a_request_makes_room_after_the_silent(patient: Address) 
                 assert httpx.post(url, content=b"new").content == b"new"
 
 
+def bytes_read(address: Address, wait_before: float, wait_between: float) -> int:
+    """How much of a large answer comes to a reader who takes its time."""
+    read = 0
+    with suppress(ConnectionError), socket.create_connection(address) as connection:
+        connection.sendall(b"POST /large HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\n\r\n1")
+        time.sleep(wait_before)
+        while read < 10_000_000 and (more := len(connection.recv(400_000))):
+            read += more
+            time.sleep(wait_between)
+    return read
+
+
 def test_an_answer_is_not_cut_off_while_it_is_read(hurried: Address) -> None:
-    with socket.create_connection(hurried) as connection:
-        connection.sendall(b"POST /large HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\n\r\n1")
-        read = 0
-        while read < 10_000_000:
-            read += len(connection.recv(400_000))
-            time.sleep(0.05)
-    with socket.create_connection(hurried) as connection:
-        connection.sendall(b"POST /large HTTP/1.1\r\nHost: x\r\nContent-Length: 1\r\n\r\n1")
-        time.sleep(5 * SHORT)
-        read = 0
-        with suppress(ConnectionError):
-            while more := len(connection.recv(400_000)):
-                read += more
-        assert read < 10_000_000
+    assert any(bytes_read(hurried, 0.0, 0.05) >= 10_000_000 for _ in range(TRIES))
+    assert any(bytes_read(hurried, 5 * SHORT, 0.0) < 10_000_000 for _ in range(TRIES))
 
 
 def test_answers_that_nobody_reads_do_not_pile_up(patient: Address, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -228,15 +234,15 @@ def test_slow_readers_keep_no_application_waiting(patient: Address) -> None:
     with socket.create_connection(patient) as reader:
         reader.sendall(b"GET /parts HTTP/1.1\r\nHost: x\r\n\r\n")
         assert reader.recv(12) == b"HTTP/1.1 200"
-        time.sleep(SHORT)
-        assert httpx.get("http://{}:{}/sent".format(*patient)).content == b"all"
+        end = time.monotonic() + PATIENCE
+        while httpx.get("http://{}:{}/sent".format(*patient)).content != b"all":
+            assert time.monotonic() < end
 
 
 def test_a_request_that_takes_longer_to_answer_is_answered(hurried: Address) -> None:
-    """Five tries, as on a busy machine the request itself may come too late."""
-    for _ in range(5):
+    for _ in range(TRIES):  # on a busy machine the request itself may come too late
         with suppress(httpx.TransportError), httpx.Client(base_url="http://{}:{}".format(*hurried)) as client:
             answers = [client.post("/slow", content=b"late").content for _ in range(2)]
             assert answers == [b"late", b"late"]
             return
-    pytest.fail("five times a server cut off its own answer")
+    pytest.fail("a server cut off its own answer, again and again")

@@ -45,7 +45,7 @@ with local_server(Path(sys.argv[1])) as server:
     print(server.url, flush=True)
     time.sleep(240)
 """
-PATIENCE = 60.0  # seconds, of a busy machine
+PATIENCE = 120.0  # seconds, of a busy machine
 SILENT = 1_100  # connections, more than the server may have files
 SLOTS = 100  # of Prefect's server on SQLite
 ROOT = Path(__file__).parents[3]

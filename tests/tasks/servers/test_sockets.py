@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from typing import Any
 
 import httpx
@@ -28,6 +28,7 @@ PROOF = json.dumps({"type": "auth", "token": SECRET})
 SLOTS = 3  # requests and websockets that the application works for at once
 SHORT = 0.3  # seconds
 PATIENCE = 60.0  # seconds, of a busy machine
+TRIES = 5  # for what a machine that stalls makes late
 
 
 async def echo(socket: WebSocket) -> None:
@@ -113,15 +114,23 @@ def test_others_are_answered_whoever_holds_websockets_without_a_password(
 def test_a_websocket_that_proves_nothing_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sockets, "PROOF_SECONDS", SHORT)
 
-    async def wait() -> None:
-        async with serving() as address:
-            async with opened(address) as silent:
-                assert await closing_code(silent) == 1008
+    async def stays(address: str) -> bool:
+        with suppress(ConnectionClosed):  # the proof came too late
             async with opened(address) as proven:
                 await proven.send(PROOF)
                 await asyncio.sleep(3 * SHORT)
                 await proven.send("still here")
-                assert [await proven.recv(), await proven.recv()][1] == "still here"
+                return [await proven.recv(), await proven.recv()][1] == "still here"
+        return False
+
+    async def wait() -> None:
+        async with serving() as address:
+            async with opened(address) as silent:
+                assert await closing_code(silent) == 1008
+            for _ in range(TRIES):
+                if await stays(address):
+                    return
+            pytest.fail("a websocket with the password was closed")
 
     asyncio.run(wait())
 
