@@ -97,7 +97,9 @@ def log_memories(
                 for figure in ("retrieval", *figure_names(name)):
                     log.artifacts(run_id, run.figure(figure, "png"), "figures")
                 of_memory = retrieval_metrics(retrieval[retrieval["memory"] == name])
-                log.metrics(run_id, [of_memory], model_id=model_id)
+                own = f"{name}/memory-{name}/"  # known from the model's name, and MLflow cuts long names
+                shown = {metric.removeprefix(own): value for metric, value in of_memory.items()}
+                log.metrics(run_id, [shown], model_id=model_id)
                 log.mark_logged(run_id, chunk.key, "memory")
     log_headline(data, settings, headline_retrieval(retrieval), ("retrieval",))
 
