@@ -27,7 +27,7 @@ test-slow: prepared  ## the tests that take minutes
 test-cluster: prepared  ## more than one machine, all of them here: needs the PostgreSQL server
 	$(BIN)/pytest -m cluster -q
 
-wheel: prepared  ## build the wheel, install it alone in a new environment, and plan with it
+wheel: prepared  ## build sdist and wheel, install it alone in a new environment, and plan with it
 	$(BIN)/python -m tests.wheel
 
 site: $(READY)  ## the documentation as pages in build/site; a broken link is an error

@@ -1,4 +1,4 @@
-"""Build the wheel, install it alone in a new environment, and plan with a memory there.
+"""Build a wheel from the source distribution, install it alone in a new environment, and plan there.
 
     python -m tests.wheel
 
@@ -21,6 +21,13 @@ from tests.tasks.served import write_memory
 
 ROOT: Final = Path(__file__).parents[1]
 MOST_BYTES: Final = 400e6
+BUILD: Final = """
+import os, sys
+from setuptools import build_meta
+
+os.chdir(sys.argv[1])
+build_meta.build_sdist(sys.argv[2])
+"""
 PLAN: Final = """
 import sys
 import motion_memory
@@ -39,12 +46,25 @@ def _run(*command: str | Path) -> None:
     subprocess.run([str(each) for each in command], check=True, cwd=tempfile.gettempdir(), env=bare)
 
 
+def _source_distribution(folder: Path) -> Path:
+    """Make it in an environment of its own, from what git knows of this checkout."""
+    venv.create(folder / "build", with_pip=True)
+    python = folder / "build" / "bin" / "python"
+    _run(python, "-m", "pip", "install", "--quiet", "setuptools>=75")
+    tree = folder / "tree"
+    _run("git", "-C", ROOT, "checkout-index", "--all", f"--prefix={tree}/")
+    _run(python, "-c", BUILD, tree, folder)
+    (sources,) = folder.glob("*.tar.gz")
+    return sources
+
+
 def main() -> None:
     """Do all of that, and tell what it took."""
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         memory = write_memory(folder / "memory", architecture=Architecture())
-        _run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, ROOT)
+        sources = _source_distribution(folder)
+        _run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", folder, sources)
         (wheel,) = folder.glob("*.whl")
         began = time.monotonic()
         venv.create(folder / "new", with_pip=True)
