@@ -35,21 +35,10 @@ SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
 HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
 FIELDS: Final = (
-    "leg",
-    "source",
-    "driven_m",
-    "braking_m",
-    "duration_s",
-    "first_speed_mps",
-    "planning_ms",
-    "retrieval_ms",
+    *("leg", "source", "driven_m", "braking_m"),
+    *("duration_s", "first_speed_mps", "planning_ms", "retrieval_ms"),
 )
-RETRIEVAL: Final = (
-    "occupancy",
-    "encode",
-    "recall",
-    "check",
-)  # the parts of the planning time that a memory takes
+RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of planning that a memory takes
 
 
 @dataclass

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from planners.search.lattice import grow_lattice
+from planners.search.primitives import grow_lattice
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class

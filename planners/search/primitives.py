@@ -1,0 +1,199 @@
+"""Motion primitives, and the search that drives the one with the least estimate next, in compiled code.
+
+A motion primitive drives for a fixed time towards one of a few speeds and one of a few steering angles (or
+turn rates). States in the same cell of place, heading and speed count as one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+from planners.search.guides.sampling import uniform
+from planners.search.query import Query
+from planners.search.structures import tree as trees
+from planners.search.structures.cost_to_go import (
+    BOTTOM,
+    LEFT,
+    PER_M,
+    CostToGo,
+    metres_to_go,
+)
+from planners.search.structures.frontier import (
+    Frontier,
+    clear_frontier,
+    is_empty,
+    pop,
+    push,
+    reach,
+    was_reached,
+)
+from planners.search.structures.time_to_go import Ahead, seconds_to_go
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import asks_for_more, metres_to, reaches
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import wrapped
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, turn_limit
+from planners.world.vehicles.vehicle import Vehicle
+
+SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
+SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
+CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
+
+
+class Lattice(NamedTuple):
+    """One resolution of the search. The defaults are those of docs/planners.md."""
+
+    steps: int = 5  # of a primitive
+    speeds: int = 1  # how many of ``SPEEDS`` there are primitives for
+    turn: float = 1.0  # the ``SHARES`` are multiplied by this
+    cell: float = 1.0  # side of a cell, in those of the problem's window
+    headings: int = 24  # cells of headings
+    paces: int = 4  # cells of speeds
+    greed: float = 2.0  # weight of the time to go; with 1 driving times are shorter and searches longer
+    heading_s: float = 0.4  # time to go for each unit of 1 - cos of the angle to turn by
+    pace: float = 1.0  # of a connection to the goal: the share of the largest speed
+    late_s: float = 1.0  # time to go for each metre by which braking for the goal comes too late
+
+
+@inlined
+def _controls(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> tuple[float, float]:
+    """The controls that lead towards a primitive's speed and steering."""
+    share = SPEEDS[motion // len(SHARES)]
+    speed = share * vehicle.max_speed if share > 0.0 else -share * vehicle.min_speed
+    turn = min(max(lattice.turn * SHARES[motion % len(SHARES)], -1.0), 1.0) * turn_limit(vehicle)
+    limit_1, limit_2 = control_limits(vehicle)
+    control_1 = min(max((speed - state[3]) / vehicle.dt, -limit_1), limit_1)
+    control_2 = min(max((turn - state[4]) / vehicle.dt, -limit_2), limit_2)
+    return admissible(state, control_1, control_2, vehicle)
+
+
+@inlined
+def _key(state: State, go: CostToGo, lattice: Lattice, vehicle: Vehicle) -> int:
+    """The cell of a state: 16 bits each for row and column, seven for the heading, three for the speed."""
+    row = int((state[1] - go.frame[BOTTOM]) * go.frame[PER_M] / lattice.cell) & 0xFFFF
+    column = int((state[0] - go.frame[LEFT]) * go.frame[PER_M] / lattice.cell) & 0xFFFF
+    heading = int((wrapped(state[2]) + math.pi) * (lattice.headings / (2.0 * math.pi))) & 127
+    share = (state[3] - vehicle.min_speed) / (vehicle.max_speed - vehicle.min_speed)
+    pace = min(int(share * lattice.paces), lattice.paces - 1)
+    return ((row << 16 | column) << 7 | heading) << 3 | pace
+
+
+@lean
+def open_vertex(
+    tree: trees.Tree,
+    vertex: int,
+    frontier: Frontier,
+    ahead: Ahead,
+    lattice: Lattice,
+    vehicle: Vehicle,
+) -> None:
+    """Let all primitives from a vertex wait. Each is checked for collisions when it is driven."""
+    for motion in range(len(SHARES) * lattice.speeds):
+        state = load(tree.states, vertex, vehicle)
+        for _ in range(lattice.steps):
+            control_1, control_2 = _controls(state, motion, lattice, vehicle)
+            state = step(state, control_1, control_2, vehicle)
+        if not was_reached(frontier, _key(state, ahead.go, lattice, vehicle)):
+            spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
+            left = seconds_to_go(state, ahead, lattice.heading_s, lattice.late_s, vehicle)
+            push(frontier, spent + lattice.greed * left, vertex, motion)
+
+
+@lean
+def begin_lattice(
+    tree: trees.Tree, frontier: Frontier, ahead: Ahead, lattice: Lattice, vehicle: Vehicle
+) -> None:
+    """Begin a search from the vertices that the tree has: its root, or a drive that is given."""
+    clear_frontier(frontier)
+    last = tree.counts[trees.SIZE] - 1
+    open_vertex(tree, last, frontier, ahead, lattice, vehicle)
+    for vertex in range(0, last, lattice.steps):
+        open_vertex(tree, vertex, frontier, ahead, lattice, vehicle)
+
+
+@lean
+def drive_primitive(
+    tree: trees.Tree, vertex: int, motion: int, goal: Floats, lattice: Lattice, vehicle: Vehicle, scene: Scene
+) -> int:
+    """Add the states of a primitive to the tree, and return the last; -1 if one is blocked or too late."""
+    counts = tree.counts
+    state = load(tree.states, vertex, vehicle)
+    parent = vertex
+    for _ in range(lattice.steps):
+        control_1, control_2 = _controls(state, motion, lattice, vehicle)
+        state = step(state, control_1, control_2, vehicle)
+        depth = tree.depths[parent] + 1
+        if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:
+            return -1
+        counts[trees.CHECKS] += 1
+        if not state_is_free(state, vehicle, scene):
+            return -1
+        parent = trees.append(tree, parent, 0, state, control_1, control_2, depth)
+        if reaches(state, goal):
+            counts[trees.GOAL_VERTEX] = parent
+            break
+    return parent
+
+
+@lean
+def grow_lattice(
+    tree: trees.Tree,
+    goal: Floats,
+    until: int,
+    frontier: Frontier,
+    ahead: Ahead,
+    lattice: Lattice,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> None:
+    """Drive the primitive with the least estimate until solved, nothing is left, or ``until`` expansions."""
+    counts = tree.counts
+    connects = asks_for_more(goal)
+    top = lattice.pace * vehicle.max_speed
+    if connects and trees.connect_to_goal(tree, 0, goal, top, vehicle, scene):
+        return
+    while (
+        counts[trees.EXPANSIONS] < until
+        and counts[trees.SIZE] + lattice.steps <= tree.states.shape[0]
+        and not is_empty(frontier)
+    ):
+        counts[trees.EXPANSIONS] += 1
+        vertex, motion = pop(frontier)
+        last = drive_primitive(tree, vertex, motion, goal, lattice, vehicle, scene)
+        if counts[trees.GOAL_VERTEX] >= 0:
+            return
+        if last >= 0:
+            key = _key(load(tree.states, last, vehicle), ahead.go, lattice, vehicle)
+            if not was_reached(frontier, key):
+                reach(frontier, key)
+                if (
+                    connects
+                    and metres_to_go(tree.states[last, 0], tree.states[last, 1], ahead.go) < CONNECT_M
+                    and trees.connect_to_goal(tree, last, goal, top, vehicle, scene)
+                ):
+                    return
+                open_vertex(tree, last, frontier, ahead, lattice, vehicle)
+
+
+def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
+    """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
+
+    Speeds are told apart more finely if two primitives one after another would not get from one to the next.
+    """
+    seconds = 2.0 / vehicle.max_speed
+    faster = 2.0 * seconds * control_limits(vehicle)[0]
+    paces = lattice.paces
+    while faster * paces < vehicle.max_speed - vehicle.min_speed and paces < 8:
+        paces += 1
+    steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
+    return lattice._replace(steps=max(steps, 1), paces=paces)
+
+
+def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
+    """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
+    bits = query.rng.bit_generator
+    return lattice._replace(
+        greed=greed, steps=lattice.steps + int(3.0 * uniform(bits)) - 1, turn=0.7 + 0.6 * uniform(bits)
+    )
