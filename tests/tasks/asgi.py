@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 import httpx
+
+from tests.own_loop import run
 
 
 class Client:
@@ -15,10 +16,10 @@ class Client:
         self._transport = httpx.ASGITransport(app)
 
     def get(self, path: str, **asked: Any) -> httpx.Response:
-        return asyncio.run(self._ask("GET", path, **asked))
+        return run(self._ask("GET", path, **asked))
 
     def post(self, path: str, **asked: Any) -> httpx.Response:
-        return asyncio.run(self._ask("POST", path, **asked))
+        return run(self._ask("POST", path, **asked))
 
     async def _ask(self, method: str, path: str, **asked: Any) -> httpx.Response:
         async with httpx.AsyncClient(transport=self._transport, base_url="http://here") as client:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from storage.places.data_folder import DataFolder
 from tests.dashboards.web.browser import browser
 from tests.dashboards.web.server import served
 from tests.dashboards.web.small_data import VERSIONS, small_data
+from tests.own_loop import run
 
 
 class LocalClient:
@@ -23,7 +23,7 @@ class LocalClient:
         self._transport = httpx.ASGITransport(dashboard_app(folder, versions))
 
     def get(self, path: str) -> httpx.Response:
-        return asyncio.run(self._get(path))
+        return run(self._get(path))
 
     async def _get(self, path: str) -> httpx.Response:
         async with httpx.AsyncClient(transport=self._transport, base_url="http://127.0.0.1") as client:

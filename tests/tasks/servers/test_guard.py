@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Collection
 from typing import Any
 
@@ -15,6 +14,7 @@ from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 
 from tasks.servers.guard import Guard
+from tests.own_loop import run
 from tests.tasks.servers.attacks import EVIL
 
 SECRET = "robot:s3cret-of-the-fleet"
@@ -44,7 +44,7 @@ def request(
         async with httpx.AsyncClient(transport=transport, base_url=f"http://{at}") as client:
             return await client.request(method, path, **options)
 
-    return asyncio.run(ask())
+    return run(ask())
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_a_websocket_is_closed_before_it_opens(secret: str | None, headers: dict
 
     fields = [(name.encode(), value.encode()) for name, value in headers.items()]
     scope = {"type": "websocket", "path": "/ping", "headers": fields, "server": ("127.0.0.1", 80)}
-    asyncio.run(Guard(Starlette(), secret)(scope, None, send))  # type: ignore[arg-type]
+    run(Guard(Starlette(), secret)(scope, None, send))  # type: ignore[arg-type]
     assert sent == [{"type": "websocket.close", "code": 1008}]
 
 

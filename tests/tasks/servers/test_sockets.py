@@ -22,6 +22,7 @@ from tasks.servers import sockets
 from tasks.servers.connections import FIRST_MESSAGE
 from tasks.servers.listening import bound, config_of
 from tasks.servers.sockets import Sockets
+from tests.own_loop import run
 
 SECRET = "robot:s3cret-of-the-fleet"
 PROOF = json.dumps({"type": "auth", "token": SECRET})
@@ -108,7 +109,7 @@ def test_others_are_answered_whoever_holds_websockets_without_a_password(
             await held[-1].send(PROOF)
             assert "auth_success" in str(await held[-1].recv())
 
-    asyncio.run(hold())
+    run(hold())
 
 
 def test_a_websocket_that_proves_nothing_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -132,7 +133,7 @@ def test_a_websocket_that_proves_nothing_is_closed(monkeypatch: pytest.MonkeyPat
                     return
             pytest.fail("a websocket with the password was closed")
 
-    asyncio.run(wait())
+    run(wait())
 
 
 @pytest.mark.parametrize(
@@ -153,4 +154,4 @@ def test_what_is_no_proof_is_refused(first: str | bytes, code: int) -> None:
             await socket.send(first)
             assert await closing_code(socket) == code
 
-    asyncio.run(send())
+    run(send())
