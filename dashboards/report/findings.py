@@ -14,6 +14,7 @@ from dashboards.statistics.headline import used_by_default
 from dashboards.statistics.panels import COMBINED
 
 Row = Mapping[Any, Any]  # of a summary
+FEW: Final = 100  # problems; fewer are for trying things out
 _SAME_S: Final = 0.05  # arrivals that differ by less are called the same: they are written to 0.1 s
 
 
@@ -46,7 +47,7 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
         before, now = alone[first], helped[first]
         sentences = [
             f"With {memory}, {planner_title(first)}, the strongest planner here, has its plan in "
-            f"{duration(now['mean_ms'])} instead of {duration(before['mean_ms'])} ({_planning(now)}), "
+            f"{duration(now['mean_ms'])}, alone in {duration(before['mean_ms'])} ({_planning(now)}), "
             f"and its robot {_arrival(now)}."
         ]
         of_others = [
@@ -58,6 +59,8 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
             sentences.append(f"Solved are {now['solved']:.1%} instead of {before['solved']:.1%}.")
         answered = now["recalled"] + now["repaired"]
         sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
+        if rows["problems"].max() < FEW:
+            sentences.append("So few problems say little.")
         title = f"{panel}, {int(rows['problems'].max()):,} new problems"
         found.append(Finding(title, " ".join(sentences), " ".join(of_others)))
     return found
@@ -93,7 +96,7 @@ def _planning(row: Row) -> str:
         return f"{less:.0f} % less planning time, 95 %: {low:.0f} to {high:.0f} %"
     if high < 0.0:
         return f"{-less:.0f} % more planning time, 95 %: {-high:.0f} to {-low:.0f} %"
-    return f"no difference in planning time is shown, 95 %: {low:+.0f} to {high:+.0f} % less"
+    return f"no difference in planning time is shown, 95 %: {-low:.0f} % more to {high:.0f} % less"
 
 
 def _arrival(row: Row) -> str:
@@ -102,9 +105,13 @@ def _arrival(row: Row) -> str:
     if math.isnan(row["sooner_s"]):
         return "was not compared on the road"
     if abs(row["sooner_s"]) < _SAME_S:
-        return f"arrives at the same time (95 %: {low:+.2f} to {high:+.2f} s sooner)"
+        return f"arrives at the same time (95 %: {_sooner(low)} to {_sooner(high)})"
     if low > 0.0:
         return f"arrives {row['sooner_s']:.1f} s sooner (95 %: {low:.2f} to {high:.2f} s)"
     if high < 0.0:
         return f"arrives {-row['sooner_s']:.1f} s later (95 %: {-high:.2f} to {-low:.2f} s)"
-    return f"arrives at the same time, as far as this shows (95 %: {low:+.2f} to {high:+.2f} s sooner)"
+    return f"arrives at the same time, as far as this shows (95 %: {_sooner(low)} to {_sooner(high)})"
+
+
+def _sooner(seconds: float) -> str:
+    return f"{seconds:.2f} s sooner" if seconds >= 0.0 else f"{-seconds:.2f} s later"

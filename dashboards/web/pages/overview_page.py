@@ -21,7 +21,7 @@ from dashboards.palette import TIME_COLOURS, colour_of
 from dashboards.report.findings import findings, for_pages
 from dashboards.report.tables import driving_cells, reduction_cell
 from dashboards.statistics.distributions import TIME_PARTS, time_split
-from dashboards.statistics.panels import COMBINED
+from dashboards.statistics.panels import COMBINED, PLANNERS, ranked
 from dashboards.web.charts import Chart, Dot, Drawing, dots, stacks
 from dashboards.web.data_reader import DataReader, class_names, stamp_of
 from dashboards.web.notices import NoticeError
@@ -117,8 +117,16 @@ def _dots(
     words: Callable[[Row], str],
     **more: str,
 ) -> Iterator[tuple[str, list[Dot]]]:
-    """Of each panel and planner a title, and a dot for each row with its ``estimate`` and ``words`` on it."""
-    for (panel, planner), rows in summary.groupby(["panel", "planner"], sort=False):
+    """Of each panel and planner a title, and a dot for each row with its ``estimate`` and ``words`` on it.
+
+    The drawings of a panel begin with the planner that is told of first: the last of ``PLANNERS``.
+    """
+    ordered = [
+        (panel, planner, of_panel[of_panel["planner"] == planner])
+        for panel, of_panel in summary.groupby("panel", sort=False)
+        for planner in ranked(of_panel["planner"], PLANNERS)[::-1]
+    ]
+    for panel, planner, rows in ordered:
         title = panel_title(str(panel), str(planner))
         yield (
             title,

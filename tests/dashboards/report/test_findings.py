@@ -37,7 +37,11 @@ def _summary(
     [
         ((2.0, 1.5, 2.5), (0.75, 0.7, 0.8), ("75 % less", "70 to 80 %", "2.0 s sooner")),
         ((-0.4, -0.5, -0.3), (-1.0, -1.2, -0.9), ("100 % more", "90 to 120 %", "0.4 s later")),
-        ((0.1, -0.1, 0.3), (0.58, -0.28, 0.87), ("no difference", "-28 to +87 %", "at the same time")),
+        (
+            (0.1, -0.1, 0.3),
+            (0.58, -0.28, 0.87),
+            ("no difference", "28 % more to 87 % less", "0.10 s later to 0.30 s sooner"),
+        ),
     ],
 )
 def test_gains_and_losses_are_told_alike(
