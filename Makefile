@@ -4,6 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TORCH := torch==2.13.0
+CPU_INDEX := https://download.pytorch.org/whl/cpu
 PIP := $(BIN)/pip --disable-pip-version-check --quiet
 BYTECODE := $(BIN)/python -m compileall -qq -j 0 -x '/tests/' $(VENV)/lib
 
@@ -51,11 +52,13 @@ clean:
 
 # torch first and pinned: a newer one, drawn in by another package, brings gigabytes of CUDA. pip takes one core,
 # so bytecode is compiled apart from it, on all; tests of packages are never imported, and some files are of other Pythons.
+# Without a GPU torch comes from PyTorch's index for processors, if that answers: PyPI's own has CUDA for most Pythons.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
-	$(PIP) install --no-compile -c constraints.txt $(TORCH)
+	index=$$(command -v nvidia-smi || $(PYTHON) -c 'from urllib.request import urlopen; urlopen("$(CPU_INDEX)/torch/", timeout=5); print("--extra-index-url $(CPU_INDEX)")' 2>/dev/null); \
+	$(PIP) install --no-compile -c constraints.txt $(TORCH) $${index##*nvidia-smi}
 	$(BYTECODE) & $(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat && wait
 	$(BYTECODE) || true
 	touch $(READY)
