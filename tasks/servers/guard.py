@@ -13,7 +13,10 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 OPEN: Final = ("/ping", "/health")  # whoever asks may know that a server is alive
-_ADDED: Final = {  # headers of each answer, so that other sites can neither read it nor show it in a frame
+# Headers of each answer: other sites can neither read it nor show it in a frame, and its page asks no other
+# site for anything (Prefect's would ask one for settings whenever it is opened).
+_ADDED: Final = {
+    "Content-Security-Policy": "connect-src 'self'",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",

@@ -45,6 +45,9 @@ with local_server(Path(sys.argv[1])) as server:
     print(server.url, flush=True)
     time.sleep(240)
 """
+ELSEWHERE = """
+fetch(arguments[0], {mode: "no-cors"}).then(() => arguments[1]("reached"), () => arguments[1]("refused"));
+"""
 PATIENCE = 120.0  # seconds, of a busy machine
 SILENT = 1_100  # connections, more than the server may have files
 SLOTS = 100  # of Prefect's server on SQLite
@@ -173,6 +176,9 @@ def test_in_a_browser_a_page_elsewhere_reaches_nothing_and_the_servers_own_asks_
         waiting.until(lambda driver: "login" not in driver.current_url)
         driver.get(f"{shared.server.ui_url}/deployments")
         waiting.until(lambda driver: "scheduled" in driver.find_element(By.TAG_NAME, "body").text)
+        assert (
+            driver.execute_async_script(ELSEWHERE, page) == "refused"
+        )  # as other sites may not see who works
 
 
 def test_a_killed_server_is_there_again_for_who_asks_meanwhile(shared: Shared, deployment: str) -> None:
