@@ -31,12 +31,17 @@ _HEIGHT = 1.0  # FCL's world has three dimensions: everything here is a prism th
 _RUN = 32  # steps whose common box is tried at once
 # Verified against dense samples of the motion: of FCL's solvers and motions only these jump nothing. The
 # default solver samples, and the linear motion misses what a turning corner hits. A screw is an arc here.
+# They sometimes meet a long thin triangle that is decimetres away, so what they meet is looked at again.
 _MOTION = fcl.ContinuousCollisionRequest(
     num_max_iterations=1000,
     toc_err=1e-6,
     ccd_motion_type=fcl.CCDMotionType.CCDM_SCREW,
     ccd_solver_type=fcl.CCDSolverType.CCDC_CONSERVATIVE_ADVANCEMENT,
 )
+# Of its two ways to compare convex bodies at rest only the default one meets such triangles wrongly.
+_TOUCHING = fcl.CollisionRequest(gjk_solver_type=fcl.GJKSolverType.GST_INDEP)
+_APART = fcl.DistanceRequest(gjk_solver_type=fcl.GJKSolverType.GST_INDEP)
+_TOUCH = 1e-4  # metres: bodies so near meet
 
 
 def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
@@ -146,10 +151,11 @@ def _sweep_faults(problem: Problem, body: Body) -> list[str]:
             continue
         wider = bend[first] if last > first else 0.0
         footprint = fcl.CollisionObject(_shape(polygon, wider), _pose(centres[first], along[first]))
-        end = _pose(centres[last], along[last])
+        reach = float(np.hypot(*polygon.T).max()) + 2.0 * wider
+        arc = (centres[first], along[first], centres[last], along[last])
         around = _box_around(corners[first : last + 1], centres[last] - centres[first], wider)
         for other in _near(manager, around):
-            if _hits(footprint, end, other):
+            if _hits(footprint, arc, reach, other):
                 x, y = centres[first]
                 return [
                     f"Collision: the {name}'s footprint meets an obstacle between states {first} and {last},"
@@ -242,11 +248,41 @@ def _near(
     return near
 
 
-def _hits(body: fcl.CollisionObject, end: fcl.Transform, other: fcl.CollisionObject) -> bool:
-    """Whether ``body``, moved from its pose to ``end``, meets ``other`` on the way."""
-    touching = fcl.CollisionResult()
-    if fcl.collide(body, other, fcl.CollisionRequest(), touching):
+Arc = tuple[Floats, Floats, Floats, Floats]  # centre and direction [2] at the begin, and at the end
+
+
+def _hits(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.CollisionObject) -> bool:
+    """Whether ``body``, with corners within ``reach`` m of its centre, meets ``other`` on its arc."""
+    if fcl.collide(body, other, _TOUCHING, fcl.CollisionResult()):
         return True
     result = fcl.ContinuousCollisionResult()
-    fcl.continuousCollide(body, end, other, other.getTransform(), _MOTION, result)
-    return bool(result.is_collide)
+    fcl.continuousCollide(body, _pose(*arc[2:]), other, other.getTransform(), _MOTION, result)
+    return bool(result.is_collide) and _comes_near(body, arc, reach, other)
+
+
+def _comes_near(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.CollisionObject) -> bool:
+    """The same by conservative advancement: the body goes on as far as it is apart from the other."""
+    begin, along, end, along_end = arc
+    turn = math.atan2(along[0] * along_end[1] - along[1] * along_end[0], along @ along_end)
+    half = 0.5 * turn
+    longer = half / math.sin(half) if half else 1.0  # the arc over its chord
+    most = longer * math.dist(begin, end) + abs(turn) * reach  # metres that any point goes
+    share, apart = 0.0, math.inf
+    while share < 1.0 and apart >= _TOUCH:
+        body.setTransform(_on_arc(begin, along, end, turn, share))
+        apart = fcl.distance(body, other, _APART, fcl.DistanceResult())
+        share += apart / max(most, apart)
+    body.setTransform(_pose(begin, along))
+    return bool(apart < _TOUCH)
+
+
+def _on_arc(begin: Floats, along: Floats, end: Floats, turn: float, share: float) -> fcl.Transform:
+    """The pose after a ``share`` of the arc from ``begin`` to ``end`` on which the body turns by ``turn``."""
+    half, now = 0.5 * turn, 0.5 * share * turn
+    chord = math.sin(now) / math.sin(half) if half else share
+    off = now - half  # of the chord so far, from the whole chord
+    cos, sin = math.cos(off), math.sin(off)
+    x, y = chord * (end - begin)
+    centre = begin + np.array([cos * x - sin * y, sin * x + cos * y])
+    cos, sin = math.cos(2.0 * now), math.sin(2.0 * now)
+    return _pose(centre, np.array([cos * along[0] - sin * along[1], sin * along[0] + cos * along[1]]))

@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import fcl
 import numpy as np
 import pytest
 import shapely
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from planners.search.registry import PLANNERS, plan
 from planners.world.arrays import Floats
-from planners.world.authority.authority import faults
+from planners.world.authority.authority import _hits, _on_arc, _pose, _shape, faults, prism
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.goal import goal_of, reaches
@@ -194,3 +195,48 @@ def test_hitch_angles_at_the_goal_are_judged() -> None:
         problem = replace(start, arrival=Arrival(hitches=asked, hitch_tolerances=(0.1, 0.1)))
         assert kinds(faults(problem, plan, CAR_2_TRAILERS)) == wrong
         assert reaches(tuple(plan.states[-1]), goal_of(problem)) == (not wrong)
+
+
+def test_a_long_thin_piece_two_decimetres_away_is_not_met() -> None:
+    """The step of a road car in a hard parallel slot for which a good plan was refused."""
+    piece = [(2.067532539367676, -6.491831302642822), (2.067532539367676, 7.206526279449463)]
+    piece.append((0.10534708946943283, 7.206526279449463))
+    body = np.array([[-0.5875, -0.2425], [0.5875, -0.2425], [0.5875, 0.2425], [-0.5875, 0.2425]])
+    body[[0, 3], 0] = -0.5874999999999999
+    begin, along = (
+        np.array([0.3855436038302086, 0.15457373662631957]),
+        [-0.38811459608159593, -0.9216111220620222],
+    )
+    end, along_end = (
+        np.array([0.4186652806374982, 0.19353764627595033]),
+        [-0.34410958631362154, -0.9389294928838204],
+    )
+    footprint = fcl.CollisionObject(_shape(body, 0.0051223299752779046), _pose(begin, np.array(along)))
+    way = (begin, np.array(along), end, np.array(along_end))
+    assert not _hits(footprint, way, 0.65, prism(np.array(piece)))
+
+
+@given(st.integers(0, 10**6))
+def test_a_step_meets_a_long_thin_piece_only_where_shapely_says_so(seed: int) -> None:
+    """FCL alone met such pieces, which turned bounds leave, from decimetres away."""
+    rng = np.random.default_rng(seed)
+    a, c = rng.uniform(-3.0, 3.0, 2), rng.uniform(-8.0, 8.0, 2)
+    piece = np.array([a, [a[0], c[1]], [c[0], c[1]]])
+    if abs(c[0] - a[0]) < 0.2 or abs(c[1] - a[1]) < 2.0:
+        return
+    piece = piece if shapely.LinearRing(piece).is_ccw else piece[::-1]
+    body = np.array([[-0.5, -0.24], [0.5, -0.24], [0.5, 0.24], [-0.5, 0.24]])
+    corner = piece[rng.integers(3)]
+    heading, turn = rng.uniform(-np.pi, np.pi), rng.uniform(-0.2, 0.2)
+    begin = corner + rng.normal(0.0, 0.8, 2)
+    end = begin + rng.uniform(-0.1, 0.1) * np.array([np.cos(heading + turn / 2), np.sin(heading + turn / 2)])
+    towards = [np.array([np.cos(each), np.sin(each)]) for each in (heading, heading + turn)]
+    footprint = fcl.CollisionObject(_shape(body, 0.0), _pose(begin, towards[0]))
+    met = _hits(footprint, (begin, towards[0], end, towards[1]), float(np.hypot(0.5, 0.24)), prism(piece))
+    distances = []
+    for share in np.linspace(0.0, 1.0, 41):
+        pose = _on_arc(begin, towards[0], end, turn, share)
+        placed = body @ np.asarray(pose.getRotation())[:2, :2].T + np.asarray(pose.getTranslation())[:2]
+        distances.append(shapely.Polygon(placed).distance(shapely.Polygon(piece)))
+    assert met or min(distances) > 0.0
+    assert not met or min(distances) < 0.02
