@@ -62,6 +62,12 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
         raise StorageError(f"{folder} is no whole library ({reason}); gather it again.") from None
 
 
+def is_library(folder: Path) -> bool:
+    """Whether a ``folder`` holds a library, whole or not, and nothing else."""
+    names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
+    return _HEADER in names and names <= {_HEADER, *PLAN_FILES}
+
+
 def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:
     """The memory or the library of a ``vehicle`` in a ``folder``. Raises StorageError if there is neither."""
     return load_library(folder, vehicle) if (folder / _HEADER).is_file() else load_memory(folder, vehicle)

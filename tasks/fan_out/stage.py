@@ -65,7 +65,9 @@ class Job(Generic[AnyPiece, Result]):
     def kept(self, piece: AnyPiece) -> Done[Result] | None:
         """The result of a piece that was done before; None if the piece has to be done."""
         values = _read_if_whole(piece.result) if self.is_written(piece) else None
-        return None if values is None else Done(self.result(**values), None)
+        if not isinstance(values, dict) or values.keys() != set(getattr(self.result, "_fields", ())):
+            return None
+        return Done(self.result(**values), None)
 
     def run(self, piece: AnyPiece) -> Done[Result]:
         """Do a piece; keep its result once its output is written."""

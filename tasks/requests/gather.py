@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from dashboards.cells import NOTHING, CellTable
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
-from storage.archives.libraries import save_library
+from storage.archives.libraries import is_library, save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
@@ -90,6 +90,7 @@ def gather(
     if not 0.0 <= poses <= 1.0:
         raise UsageError(f"A share of {poses:g} poses: give 0 to 1.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
+    _refuse_foreign(out)
     request = GatherRequest(tuple(sources), out, plans, poses, settings)
     with unfinished(out):
         if flow is None or workers == 1 or plans <= FEW_PLANS:
@@ -136,6 +137,12 @@ def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
     own = {f"plans_{each.name}": float(len(each.seconds)) for each in counts}
     totals = {"questions": questions, "plans": len(seconds), "answered": len(seconds) / questions}
     return {**totals, "driving_seconds": fmean(seconds), **own}
+
+
+def _refuse_foreign(out: Path) -> None:
+    """Raise UsageError if there is anything at ``out`` but an earlier library."""
+    if out.exists() and not (is_library(out) or (out.is_dir() and not any(out.iterdir()))):
+        raise UsageError(f"{out} exists and is no library; give --out the name of a new folder.")
 
 
 def _in_this_process(pieces: Sequence[GatherPiece]) -> list[Gathered]:

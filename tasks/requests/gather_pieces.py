@@ -18,7 +18,10 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
+from storage.errors import StorageError
 from storage.tables.experiences import write_experiences
+from storage.tables.schemas import EXPERIENCES
+from storage.tables.shards import read_table, shard_is_done
 from storage.vehicles.definitions import definition_of
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import source_at
@@ -90,7 +93,7 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     Raises JudgementError if the authority refuses a plan.
     """
     request = chunk.request
-    sources, vehicle, workspace = _sources(request), request.settings.vehicle, Workspace()
+    sources, vehicle, workspace = _sources(request, request.digest), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
     for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
         drawn = _question(sources, number)
@@ -113,11 +116,20 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     return Gathered(asked, rows)
 
 
+def _is_readable(shard: Path, key: str) -> bool:
+    """Whether all of a shard can be read, and it was made from ``key``."""
+    try:
+        return shard_is_done(shard, key) and read_table(shard, EXPERIENCES) is not None
+    except StorageError:
+        return False
+
+
 GATHER: Final = Job(
     name="gather",
     do=gather_piece,
     result=Gathered,
     output=lambda piece: piece.shard,
+    is_whole=_is_readable,
     units=lambda piece: PIECE,
     unit="questions",
 )
@@ -135,7 +147,7 @@ def gather_pieces(
     Returns:
         the results of all pieces from the first on. They do not depend on who does how many at a time.
     """
-    longest = max(source.most for source in _sources(request)) * len(request.sources)
+    longest = max(source.most for source in _sources(request, request.digest)) * len(request.sources)
     results: list[Gathered] = []
     answered = asked = 0
     while answered < request.plans and asked < GIVE_UP * request.plans and len(results) * PIECE < longest:
@@ -148,8 +160,8 @@ def gather_pieces(
 
 
 @functools.lru_cache(maxsize=1)
-def _sources(request: GatherRequest) -> list[QuestionSource]:
-    """The sources of this process, which keeps the worlds that it has read."""
+def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
+    """The sources of this process, which keeps the worlds that it has read as long as they are the same."""
     return [question_source(name, request.plans, request.poses, request.settings) for name in request.sources]
 
 

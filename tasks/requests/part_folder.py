@@ -20,9 +20,12 @@ def parts_folder(out: Path) -> Path:
 def unfinished(out: Path) -> Iterator[None]:
     """Lock the folder of the parts of ``out`` while the context lasts; remove it at the end if it holds none.
 
-    Raises StorageError if the folder cannot be written, or another command has locked it.
+    Raises StorageError if the folder cannot be written, holds something else, or another command has locked
+    it.
     """
     folder = parts_folder(out)
+    if folder.exists() and not (folder.is_dir() and all(map(_is_own, folder.iterdir()))):
+        raise StorageError(f"{folder} holds something else; move it, or give another --out.")
     with ExitStack() as stack:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -35,6 +38,12 @@ def unfinished(out: Path) -> Iterator[None]:
         finally:
             if not any(folder.glob("[0-9]*.parquet")):
                 remove_folder(folder)
+
+
+def _is_own(entry: Path) -> bool:
+    """Whether an ``entry`` of a parts folder is one that a command has left there."""
+    is_part = entry.name[:6].isdigit() and entry.suffix in (".parquet", ".json")
+    return is_part or entry.name.startswith(".") or entry.name == "prefect"
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from planners.maps.questions import question_in
 from planners.world.classes.families import FAMILIES, family
@@ -15,6 +16,8 @@ from storage.errors import StorageError
 from storage.exchange.problems import read_problems
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
+
+OWN_SEEDS: Final = 1 << 32  # more than a seed that anyone draws problems to be asked with
 
 
 @dataclass(frozen=True)
@@ -42,13 +45,14 @@ def question_source(name: str, plans: int, poses: float, settings: ImportSetting
     Raises:
         StorageError: there is nothing at the path, or nothing that can be read.
     """
-    seed, vehicle = settings.seed, settings.vehicle
+    vehicle = settings.vehicle
+    seed = OWN_SEEDS + settings.seed
     if is_drawn(name) and name in FAMILIES:
         manoeuvres = family(name, vehicle=vehicle)
-        return QuestionSource(lambda number: manoeuvres.draw(2 * seed, number))
+        return QuestionSource(lambda number: manoeuvres.draw(seed, number))
     if is_drawn(name):
         drawn = problem_class(name, vehicle=vehicle)
-        return _asked_in(lambda number: drawn.draw(2 * seed, number), poses, settings)
+        return _asked_in(lambda number: drawn.draw(seed, number), poses, settings)
     if not Path(name).exists():
         known = ", ".join([*CLASSES, *FAMILIES])
         raise StorageError(f"{name} is neither a file or folder nor one of {known}; check the name.")

@@ -71,12 +71,40 @@ def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pyt
 
     with pytest.raises(KeyboardInterrupt):
         gathered("interrupted", workers=2)
+    damaged = done[0]  # in the middle of its rows, and then what is kept beside it
+    (shard,) = (tmp_path / "interrupted.parts").glob(f"{damaged:06d}.parquet")
+    shard.write_bytes(shard.read_bytes()[:200] + bytes(60) + shard.read_bytes()[260:])
+    (result,) = (tmp_path / "interrupted.parts").glob(f"{done[1]:06d}-*.json")
+    result.write_text("[1]")
     gathered("interrupted", workers=2)
-    assert len(done) == len(set(done))
+    assert sorted(done) == sorted([*set(done), *done[:2]])
     gathered("whole", workers=1)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["interrupted", "whole"]
     for file in (tmp_path / "whole").iterdir():
         assert file.read_bytes() == (tmp_path / "interrupted" / file.name).read_bytes()
+
+
+@pytest.mark.parametrize("name", ["thesis", "thesis/library", "problems.jsonl", "."])
+def test_nothing_that_is_there_is_replaced_but_a_library(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "library.parts").mkdir()
+    (tmp_path / "thesis" / "library.parts" / "page.tex").write_text("words")
+    write_problems(tmp_path / "problems.jsonl", [strewn(1, 10)])
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.chdir(tmp_path)
+    assert call(["gather", "problems.jsonl", "--plans", "1", "--workers", "1", "--out", name]) in (1, 2)
+    assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: Path) -> None:
+    problems, out = tmp_path / "asked.jsonl", tmp_path / "library"
+    for seed in (1, 2):
+        write_problems(problems, [strewn(seed, 10)])
+        gather.gather([str(problems)], out, 1, 0.0, ImportSettings())
+        assert load_library(out).questions == (f"strewn-{seed}-10",)
 
 
 @pytest.mark.parametrize(
