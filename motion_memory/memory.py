@@ -130,6 +130,8 @@ class Memory:
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
+        points = np.asarray(points, float).reshape(-1, 2)
+        polygon_starts = np.asarray(polygon_starts, np.int64)
         problem = checked_problem(
             *(start, goal, goal_radius, bounds, points, polygon_starts),
             vehicle=self.vehicle,

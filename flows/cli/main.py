@@ -148,7 +148,7 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit.daemon = True
     forced_exit.start()
     print(
-        "Interrupted. The same command goes on after what was done; plan begins anew.",
+        "Interrupted. Give the same command again: it goes on after what was done (plan: anew).",
         file=sys.stderr,
     )
     raise KeyboardInterrupt

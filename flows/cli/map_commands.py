@@ -78,9 +78,10 @@ def gather(
 
     Args:
         sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
-            and in worlds in their part for training. Files of problems: these are the questions.
-        out: Folder of the library.
-        plans: How many to keep.
+            and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
+            problems: these are the questions.
+        out: Folder of the library, which may replace an earlier one.
+        plans: How many questions to have answered.
         poses: Share of the drawn questions that ask for a pose, not for a place.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.

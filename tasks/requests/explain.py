@@ -59,6 +59,10 @@ def _recall_line(
     line = f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
     if not recalled and attempt.source == "recalled":
         return f"recall   parts of {len(memory.plans):,} plans of {memory.class_name}, driven again"
+    if not recalled and attempt.source == "repaired":
+        return (
+            f"recall   the search joined the end of one of {len(memory.plans):,} plans of {memory.class_name}"
+        )
     if not recalled:
         return f"{line}: no stored plan seemed likely to fit"
     free = sum(

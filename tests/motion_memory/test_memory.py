@@ -86,6 +86,10 @@ def same(one: Answer, other: Answer) -> bool:
     return np.array_equal(one.plan.states, other.plan.states) and one.problem_id == other.problem_id
 
 
+def test_no_obstacles_are_an_empty_list(planner: Memory) -> None:
+    assert planner.plan_arrays((0.0, 0.0, 0.0), (20.0, 0.0), [], [0]).plan is not None  # type: ignore[arg-type]
+
+
 def test_what_a_goal_pose_needs_is_made_before_the_first_is_asked_for(memory: Path) -> None:
     seconds_to_pose.cache_clear()
     planner = load(memory)
