@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from storage.errors import StorageError
+from storage.places.data_folder import MARK
 from storage.places.files import locked, remove_folder, remove_leftovers
 from tasks.servers.prefect_server import local_server
 
@@ -43,7 +44,7 @@ def unfinished(out: Path) -> Iterator[None]:
 def _is_own(entry: Path) -> bool:
     """Whether an ``entry`` of a parts folder is one that a command has left there."""
     is_part = entry.name[:6].isdigit() and entry.suffix in (".parquet", ".json")
-    return is_part or entry.name.startswith(".") or entry.name == "prefect"
+    return is_part or entry.name.startswith(".") or entry.name in (MARK, "prefect")
 
 
 @contextmanager
