@@ -57,8 +57,8 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Motion Memory needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	$(PYTHON) -m venv $(VENV)
 	@echo "Installing into $(VENV), some two minutes ..."
-	index=$$(command -v nvidia-smi || $(PYTHON) -c 'from urllib.request import urlopen; urlopen("$(CPU_INDEX)/torch/", timeout=5); print("--extra-index-url $(CPU_INDEX)")' 2>/dev/null); \
-	$(PIP) install --no-compile -c constraints.txt $(TORCH) $${index##*nvidia-smi}
+	index=; command -v nvidia-smi >/dev/null || index=$$($(PYTHON) -c 'from urllib.request import urlopen; urlopen("$(CPU_INDEX)/torch/", timeout=5); print("--extra-index-url $(CPU_INDEX)")' 2>/dev/null); \
+	$(PIP) install --no-compile -c constraints.txt $(TORCH) $$index
 	$(BYTECODE) & $(PIP) install --no-compile -c constraints.txt --editable '.[dev]' --config-settings editable_mode=compat && wait
 	$(BYTECODE) || true
 	touch $(READY)

@@ -87,7 +87,7 @@ def _flow_of(
     deployed.__doc__ = told
     deployed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]  # read by Prefect
     flow = Flow(deployed, name=name, task_runner=task_runner, flow_run_name=_run_name)
-    flow.__signature__ = inspect.Signature([*map(_in_form, parameters)])  # type: ignore[attr-defined]  # too
+    flow.__signature__ = inspect.Signature([*map(_in_form, parameters)])  # type: ignore[attr-defined]  # as above
     flow.parameters = parameter_schema(flow)
     return flow
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,6 +73,14 @@ class Source:
         except ValueError as error:
             raise StorageError(sentence(self.path, error)) from None
         return [self.path]
+
+    def digest(self) -> str:
+        """A digest of ``contents``, which raises the same, and of where they lie beside each other."""
+        digest = hashlib.sha256()
+        for file in self.contents():
+            digest.update(f"{file.relative_to(self.path.parent)}\0".encode())
+            digest.update(file.read_bytes())
+        return digest.hexdigest()[:16]
 
 
 def class_of(path: Path) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -122,9 +121,4 @@ def _named(value: Any) -> Any:
 
 @functools.cache
 def _digest(path: Path) -> str:
-    """A digest of the files of worlds or of a map."""
-    digest = hashlib.sha256()
-    for file in source_at(path).contents():
-        digest.update(f"{file.relative_to(path.parent)}\0".encode())
-        digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
+    return source_at(path).digest()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.places.data_folder import DataFolder
@@ -14,7 +14,7 @@ from tasks.registry.model_uris import memory_digest, set_mlflow_environment
 from tasks.settings.environment import default_data
 from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
 
-STAGE = "gather"
+STAGE: Final = "gather"
 
 
 def registered_library(
@@ -40,13 +40,14 @@ def registered_library(
     set_mlflow_environment()
     data = str(default_data().absolute())
     digest, log = memory_digest(folder), tracker(data)
-    with log.run(f"library {name} {digest[:8]}", STAGE, {}) as run_id:
+    title = f"library {name} {digest[:8]}"
+    with log.run(title, STAGE, {}) as run_id:
         if not log.is_logged(run_id, digest, "memory"):
             log.parameters(run_id, {**parameters, "vehicle": name_of(vehicle)})
             model_id = log.memory(run_id, name, folder, text_of(vehicle))
             log.tag(run_id, {MEMORY_TAG: name, MODEL_TAG: model_id})
             log.metrics(run_id, [metrics], model_id=model_id)
             log.mark_logged(run_id, digest, "memory")
-    run_id, model_id = log.logged_memory(f"library {name} {digest[:8]}", name, digest)
+    run_id, model_id = log.logged_memory(title, name, digest)
     registry = Registry(DataFolder(Path(data)))
     return registry.register(name, run_id, model_id, digest, {"memory": name}, "A library of plans").uri

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -52,7 +51,7 @@ class GatherRequest:
         """A digest of all that decides which question has which number, and what is kept of its answer."""
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
-        contents = [_content(name) for name in self.sources]
+        contents = ["" if is_drawn(name) else source_at(Path(name)).digest() for name in self.sources]
         return key_of("gather", how, self.plans, self.poses, self.sources, contents)
 
 
@@ -185,12 +184,3 @@ def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspa
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)
     return variants
-
-
-def _content(name: str) -> str:
-    """A digest of the files of a source; empty if it is drawn."""
-    digest = hashlib.sha256()
-    for file in [] if is_drawn(name) else source_at(Path(name)).contents():
-        digest.update(f"{file}\0".encode())
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
