@@ -43,7 +43,7 @@ class Attempt:
     verified: bool | None  # what the authority said of the plan; None: it was not asked
 
 
-PARTS = tuple(
+TIMED_PARTS = tuple(
     field.name.removesuffix("_seconds")
     for field in fields(Attempt)
     if field.name.endswith("_seconds") and field.name != "planning_seconds"

@@ -16,13 +16,13 @@ from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
-PARTS = -1  # the number of a plan that is made of parts of stored plans
+OF_PARTS = -1  # the number of a plan that is made of parts of stored plans
 
 
 class RankedPlan(NamedTuple):
     """A stored plan, or parts of stored plans, as an answer to a problem."""
 
-    number: int  # of the plan in the memory; or ``PARTS``
+    number: int  # of the plan in the memory; or ``OF_PARTS``
     free: bool  # it answers the problem: it begins and ends as asked, and its whole sweep is free
     score: float  # the encoder's, higher is better; 0 of parts
     plan: Plan  # in the frame and the lengths of the problem
@@ -50,7 +50,9 @@ def ranked_plans(
         return _stored(memory, canonical, problem, alignment, k)
     library = memory.library if isinstance(memory, Memory) else memory
     answer = sub_plan_answer(library, View(canonical, workspace), memory.vehicle).plan
-    return [] if answer is None else [RankedPlan(PARTS, True, 0.0, _in_frame_of(problem, alignment, answer))]
+    return (
+        [] if answer is None else [RankedPlan(OF_PARTS, True, 0.0, _in_frame_of(problem, alignment, answer))]
+    )
 
 
 def _stored(

@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from planners.attempt import PARTS, SUB_PLANS, Attempt
+from planners.attempt import SUB_PLANS, TIMED_PARTS, Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
@@ -211,7 +211,7 @@ def solve(
         solved=answer is not None,
         source=source if answer is not None else None,
         planning_seconds=planning_seconds,
-        **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in PARTS},
+        **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in TIMED_PARTS},
         recalled=recalled.plans,
         collision_checks=int(work[0]),
         expansions=int(work[1]),

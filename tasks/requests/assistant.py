@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Final, NamedTuple
 
-from planners.attempt import PARTS, Attempt
+from planners.attempt import TIMED_PARTS, Attempt
 from planners.explanation import recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
@@ -215,7 +215,7 @@ def plan_one(
     if explained:
         _explain(assistant, problems[0], attempt, recalled)
     failure = f"No plan for {problems[0].id or problem}: {summary}." if plan is None else None
-    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in PARTS}}
+    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     return PlannedOne(attempt, plan, plan_answer(record, out, attempt.verified) | parts, failure)
 
 

@@ -6,6 +6,7 @@ from planners.search.manoeuvres.driving import (
     SMALLEST,
     Drive,
     append,
+    begin,
     connection_is_free,
     drive_arc,
     drive_word,
@@ -38,9 +39,7 @@ def drive_to_goal(
 
     Returns whether that leads to the goal, and nothing is in the way. The drive lies in ``drive`` then.
     """
-    drive.counts.fill(0)
-    for k in range(drive.states.shape[1]):
-        drive.states[0, k] = start[0, k]
+    begin(drive, start)
     if not drive_word(drive, word, vehicle, scene):
         return False
     return _drive_in(drive, tree, node, endings, goal, vehicle, scene)
@@ -64,9 +63,7 @@ def drive_arcs_to_goal(
     Before these arcs those of the first ``links`` nodes of ``drive.join.chain`` are driven, of the tree
     ``before`` that grew out of the start. Returns the same as ``drive_to_goal``.
     """
-    drive.counts.fill(0)
-    for k in range(drive.states.shape[1]):
-        drive.states[0, k] = start[0, k]
+    begin(drive, start)
     for k in range(links):
         link = drive.join.chain[k]
         gear = 1.0 if before.metres[link] > 0.0 else -1.0

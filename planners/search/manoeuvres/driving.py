@@ -31,17 +31,7 @@ from planners.world.vehicles.dynamics import (
 from planners.world.vehicles.vehicle import Vehicle
 
 STEPS: Final = 1 << 13  # of a drive at most
-TOPS: Final = (
-    1.0,
-    0.7,
-    0.5,
-    0.35,
-    0.25,
-    0.17,
-    0.12,
-    0.08,
-    0.04,
-)  # shares of full speed
+TOPS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.04)  # shares of full speed
 NEAR_M: Final = 2e-3  # how exactly a word leads to a node, in metres and radians
 STRIDES: Final = 1 << 10  # of an arc at most
 ROUNDING: Final = 1e-9
@@ -73,6 +63,14 @@ def allocate_drive(state_size: int) -> Drive:
         allocate_connection(state_size),
         allocate_join(state_size),
     )
+
+
+@lean
+def begin(drive: Drive, start: Floats) -> None:
+    """Begin a drive at ``start [1, S]``."""
+    drive.counts.fill(0)
+    for k in range(drive.states.shape[1]):
+        drive.states[0, k] = start[0, k]
 
 
 @lean

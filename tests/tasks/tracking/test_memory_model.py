@@ -19,7 +19,7 @@ from numba.core.caching import InTreeCacheLocator
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.plans.cell_masks import blocked_cells, masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.ranked_plans import PARTS
+from planners.ranked_plans import OF_PARTS
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
@@ -122,7 +122,7 @@ def test_a_library_is_registered_once_and_loaded_by_its_address(
     model.open(folder, "car")
     asked = fields_of(replace(worlds.strewn(3, 10), goal=(22.0, 20.0), start_motion=(1.0,)))
     (row,) = model.plans(pd.DataFrame({"problem": [json.dumps(asked)]})).to_dict("records")
-    assert (row["rank"], row["plan"], row["free"]) == (1, PARTS, True)
+    assert (row["rank"], row["plan"], row["free"]) == (1, OF_PARTS, True)
 
 
 @pytest.mark.parametrize(
