@@ -12,6 +12,10 @@ from urllib.parse import urlsplit
 
 EVIL: Final = "http://evil.example"
 STEPS: Final = {"pull_steps": [{"prefect.deployments.steps.run_shell_script": {"script": "touch attacked"}}]}
+# Ask another site for anything: whether that got there.
+ELSEWHERE: Final = """
+fetch(arguments[0], {mode: "no-cors"}).then(() => arguments[1]("reached"), () => arguments[1]("refused"));
+"""
 # Read, change, change without asking first, and open a websocket: what a page learns of each.
 ATTACK: Final = """
 const [address, steps, done] = arguments;

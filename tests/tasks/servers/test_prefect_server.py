@@ -34,7 +34,7 @@ from tasks.servers.prefect_server import (
 from tasks.servers.users import is_held, locked
 from tests.dashboards.web.browser import CHROMIUM, DRIVER, browser
 from tests.prepared.prefect_database import with_prefect_database
-from tests.tasks.servers.attacks import ATTACK, EVIL, STEPS, evil_page, open_websocket, websocket_status
+from tests.tasks.servers import attacks
 
 HOLD = """
 import os, sys, time
@@ -44,9 +44,6 @@ os.umask(0)
 with local_server(Path(sys.argv[1])) as server:
     print(server.url, flush=True)
     time.sleep(240)
-"""
-ELSEWHERE = """
-fetch(arguments[0], {mode: "no-cors"}).then(() => arguments[1]("reached"), () => arguments[1]("refused"));
 """
 PATIENCE = 120.0  # seconds, of a busy machine
 SILENT = 1_100  # connections, more than the server may have files
@@ -125,19 +122,20 @@ def test_only_the_owner_can_read_the_password_whatever_the_umask(shared: Shared)
 
 
 def test_who_does_not_know_the_password_is_told_nothing(shared: Shared, deployment: str) -> None:
+    address = f"{shared.server.url}/{deployment}"
     for auth in (None, ("motion-memory", "wrong")):
-        assert httpx.get(f"{shared.server.url}/{deployment}", auth=auth).status_code == 401
-        assert httpx.patch(f"{shared.server.url}/{deployment}", json=STEPS, auth=auth).status_code == 401
+        assert httpx.get(address, auth=auth).status_code == 401
+        assert httpx.patch(address, json=attacks.STEPS, auth=auth).status_code == 401
     assert httpx.get(f"{shared.server.url}/health").status_code == 200
 
 
-@pytest.mark.parametrize("foreign", [{"Origin": EVIL}, {"Origin": "null"}, {"Host": "evil.example"}])
+@pytest.mark.parametrize("foreign", [{"Origin": attacks.EVIL}, {"Origin": "null"}, {"Host": "evil.example"}])
 def test_another_site_is_refused_even_with_the_password(
     shared: Shared, deployment: str, foreign: dict[str, str]
 ) -> None:
     with shared.client() as client:
         for answer in (
-            client.patch(deployment, json=STEPS, headers=foreign),
+            client.patch(deployment, json=attacks.STEPS, headers=foreign),
             client.post(f"{deployment}/create_flow_run", json={}, headers=foreign),
             client.delete(deployment, headers=foreign),
             client.get(deployment, headers=foreign),
@@ -149,8 +147,8 @@ def test_another_site_is_refused_even_with_the_password(
         assert not client.get(deployment).json()["pull_steps"]
         asked = {"flow_runs": {"deployment_id": {"any_": [deployment.partition("/")[2]]}}}
         assert client.post("flow_runs/filter", json=asked).json() == []
-    assert websocket_status(f"{shared.server.url}/events/in", foreign) == 403
-    assert websocket_status(f"{shared.server.url}/events/in", {}) == 101
+    assert attacks.websocket_status(f"{shared.server.url}/events/in", foreign) == 403
+    assert attacks.websocket_status(f"{shared.server.url}/events/in", {}) == 101
 
 
 @pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
@@ -158,27 +156,25 @@ def test_in_a_browser_a_page_elsewhere_reaches_nothing_and_the_servers_own_asks_
     shared: Shared, deployment: str
 ) -> None:
     port = shared.server.ui_url.rpartition(":")[2]
-    with browser() as driver, evil_page() as page:
+    with browser() as driver, attacks.evil_page() as page:
         driver.get(page)
-        told = driver.execute_async_script(ATTACK, f"{shared.server.url}/{deployment}", STEPS)
+        told = driver.execute_async_script(attacks.ATTACK, f"{shared.server.url}/{deployment}", attacks.STEPS)
         assert told == {"read": "refused", "changed": "refused", "sent": "refused", "socket": "closed"}
-        driver.get(f"{EVIL}:{port}/")  # a name that now means this machine
-        told = driver.execute_async_script(ATTACK, f"/api/{deployment}", STEPS)
+        driver.get(f"{attacks.EVIL}:{port}/")  # a name that now means this machine
+        told = driver.execute_async_script(attacks.ATTACK, f"/api/{deployment}", attacks.STEPS)
         assert told == {"read": 400, "changed": 400, "sent": 400, "socket": "closed"}
         with shared.client() as client:
             assert not client.get(deployment).json()["pull_steps"]
         driver.get(shared.server.ui_url)
         waiting = WebDriverWait(driver, PATIENCE)
         box = waiting.until(lambda driver: driver.find_element(By.CSS_SELECTOR, "input[type=password]"))
-        told = driver.execute_async_script(ATTACK, f"/api/{deployment}", STEPS)
+        told = driver.execute_async_script(attacks.ATTACK, f"/api/{deployment}", attacks.STEPS)
         assert told == {"read": 401, "changed": 401, "sent": 401, "socket": "open"}  # where the token is next
         box.send_keys(shared.server.secret, Keys.ENTER)
         waiting.until(lambda driver: "login" not in driver.current_url)
         driver.get(f"{shared.server.ui_url}/deployments")
         waiting.until(lambda driver: "scheduled" in driver.find_element(By.TAG_NAME, "body").text)
-        assert (
-            driver.execute_async_script(ELSEWHERE, page) == "refused"
-        )  # as other sites may not see who works
+        assert driver.execute_async_script(attacks.ELSEWHERE, page) == "refused"
 
 
 def test_a_killed_server_is_there_again_for_who_asks_meanwhile(shared: Shared, deployment: str) -> None:
@@ -245,7 +241,7 @@ def test_neither_silent_connections_nor_few_files_keep_a_server_from_answering_a
                 stack.enter_context(socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE))
             assert is_healthy(server.url)
             for _ in range(SLOTS + 20):  # Prefect works for so many requests and websockets at once
-                stack.enter_context(open_websocket(f"{server.url}/events/in", {}))
+                stack.enter_context(attacks.open_websocket(f"{server.url}/events/in", {}))
             user_name, _, password = server.secret.partition(":")
             assert httpx.get(f"{server.url}/version", auth=(user_name, password)).status_code == 200
         finally:
