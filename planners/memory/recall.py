@@ -11,6 +11,8 @@
 
 By cells, the plans that are likely to be free are tried, the quickest first, and then some that may be free.
 To check all others in vain would cost a planner that is soon done more than the few that are free would save.
+So where more than half of the plans seem free, the least blocked half is looked at first: if none of these is
+free, no other is tried.
 
 In a large memory ``hybrid`` and ``exhaustive`` try the first thousand plans before the others. If any plan is
 free, one of these mostly is, so the time to find it does not grow with the memory.
@@ -24,7 +26,7 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells, rank_to_try
-from planners.memory.plans.free import ends_of, first_fitting, first_fitting_drawn
+from planners.memory.plans.free import NOBODY, ends_of, first_fitting, first_fitting_drawn
 from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
 from planners.world.arrays import Floats32, Integers
@@ -38,10 +40,10 @@ MOST_SCORED: Final = 1_000  # plans: with more, scoring by cells costs more than
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
 TRIED_EARLY: Final = 1_000  # plans of a large memory that are ranked first
 CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the others mostly are, too
-CHECKED_DRAWN: Final = 32  # plans checked from the drawing; if all are blocked, a planner will need the scene
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
 LIKELY_CELLS: Final = 16  # blocked cells: where a plan with more is free, one with fewer mostly is, too
 POSSIBLE_CELLS: Final = 24  # blocked cells: on curves at hard only such plans are free in 9 % of problems
+TELLING: Final = 48  # the least blocked plans, and at least half of all: if none is free, no other is tried
 
 
 class Recalled(NamedTuple):
@@ -96,6 +98,7 @@ def recall(
         count  # how many of the ranked plans may be returned, and how many are tried by driving time
     )
     tries: Integers | None = None
+    telling = NOBODY
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "encoder":
@@ -112,10 +115,12 @@ def recall(
         worth = int(ends[WORTH_CELLS])
         if strategy == "mask":
             order, tries = order[: min(k, worth)], None
+        elif len(tries) > (told := max(TELLING, len(order) // 2)):
+            telling = order[:told]
     if tries is None:
         tries = shortest_first(memory, order, likely)
     view.lap("recall")
-    free, checks = first_check(memory, view, tries, as_stored)
+    free, checks = first_check(memory, view, tries, as_stored, telling)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
 
 
@@ -219,20 +224,22 @@ def by_cells(
     return among[ranking.order], ranking.ends, among[tries]
 
 
-def first_check(memory: Memory, view: View, order: Integers, as_stored: bool) -> tuple[int, int]:
+def first_check(
+    memory: Memory, view: View, order: Integers, as_stored: bool, telling: Integers = NOBODY
+) -> tuple[int, int]:
     """Find the first plan of ``order [n]`` that fits the problem (-1: none), and count the collision checks.
 
-    ``as_stored`` says that the problem begins with the heading of the stored plans; else plans are turned.
+    ``as_stored`` says that the problem begins with the heading of the stored plans. These are then checked
+    from the drawing, ``telling`` first; else plans are turned, and checked in the scene.
     """
-    plan, checks = -1, 0
-    if as_stored and len(order):
-        head, order = order[:CHECKED_DRAWN], order[CHECKED_DRAWN:]
-        plan, checks = first_fitting_drawn(head, memory.sweeps, memory.masks, view.drawing, view.problem)
-        view.lap("check")
-    if plan < 0 and len(order):
-        plan, more = first_fitting(order, memory.sweeps, ends_of(view.problem), view.scene)
-        checks += more
-        view.lap("check")
+    if not len(order):
+        return -1, 0
+    if as_stored:
+        asked = (order, memory.sweeps, memory.masks, view.drawing, view.problem, telling)
+        plan, checks = first_fitting_drawn(*asked)
+    else:
+        plan, checks = first_fitting(order, memory.sweeps, ends_of(view.problem), view.scene)
+    view.lap("check")
     return int(plan), int(checks)
 
 

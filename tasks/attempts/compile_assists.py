@@ -12,7 +12,7 @@ from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import CHECKED_DRAWN, RECALLS
+from planners.memory.recall import RECALLS
 from planners.solve import solve
 from planners.world.problem import (
     BOUNDS,
@@ -46,7 +46,7 @@ def compile_assists(
     plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan
     if plan is None:
         return
-    plans = [plan] * (CHECKED_DRAWN + 1)  # so that the last is checked with the scene
+    plans = [plan] * 2
     sweeps = sweep_plans(plans, vehicle)
     architecture = Architecture()
     readout = np.zeros((len(plans) + 1, architecture.dimensions), np.float32)
@@ -57,10 +57,11 @@ def compile_assists(
     x, y = plan.states[len(plan.states) // 2, :2]
     box = np.array([[x - 1.0, y - 1.0], [x + 1.0, y - 1.0], [x + 1.0, y + 1.0], [x - 1.0, y + 1.0]])
     blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
+    turned = replace(blocked, start=(*EMPTY.start[:2], EMPTY.start[2] + 0.01))  # so that a scene is checked
     for strategy in strategies:
-        for assist in ("open", "repair"):
+        for problem, assist in ((blocked, "open"), (blocked, "repair"), (turned, "closed")):
             solve(
-                *(blocked, planner, assist, 1, memory),
+                *(problem, planner, assist, 1, memory),
                 vehicle=vehicle,
                 strategy=strategy,
                 workspace=workspace,

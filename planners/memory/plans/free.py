@@ -7,7 +7,7 @@ from a drawing, which is made much sooner than a scene, a plan as it is stored. 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Plan, Problem
 
 START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
+NOBODY: Final = np.empty(0, np.int32)
 
 
 class Ends(NamedTuple):
@@ -175,7 +176,7 @@ def _piece_meets(
 
 
 @lean
-def _first_fitting_drawn(
+def _first_drawn(
     order: Integers,
     sweeps: PlanSweeps,
     masks: Bits,
@@ -185,13 +186,15 @@ def _first_fitting_drawn(
     edges: Floats,
     bounds: Bounds,
     ends: Ends,
-) -> tuple[int, int]:
+    blocking: int,
+) -> tuple[int, int, int]:
+    """The first plan of ``order`` that fits (-1: none), how many boxes were tried, and what blocked the last.
+
+    The piece that blocked another plan, ``blocking``, is tried first: it mostly blocks the next one, too.
+    """
     narrow = bounds[0] > BOUNDS[0] or bounds[1] > BOUNDS[1] or bounds[2] < BOUNDS[2] or bounds[3] < BOUNDS[3]
     checks = 0
     pieces = piece_starts.shape[0] - 1
-    blocking = (
-        0  # the piece that the last blocked plan met, which is tried first: it mostly meets others, too
-    )
     for i in order:
         begins, cos, sin = turn_to_start(sweeps, i, ends)
         if not (begins and sin == 0.0 and _ends_at_goal(sweeps, i, cos, sin, ends)):
@@ -216,12 +219,41 @@ def _first_fitting_drawn(
                     free = False
                     blocking = p
         if free:
-            return i, checks
-    return -1, checks
+            return i, checks, blocking
+    return -1, checks, blocking
+
+
+@lean
+def _first_fitting_drawn(
+    order: Integers,
+    telling: Integers,
+    sweeps: PlanSweeps,
+    masks: Bits,
+    drawing: Drawing,
+    vertices: Floats,
+    piece_starts: Integers,
+    edges: Floats,
+    bounds: Bounds,
+    ends: Ends,
+) -> tuple[int, int]:
+    plan, checks, blocking = _first_drawn(
+        telling, sweeps, masks, drawing, vertices, piece_starts, edges, bounds, ends, 0
+    )
+    if plan < 0 and telling.shape[0] > 0:
+        return plan, checks
+    plan, more, _ = _first_drawn(
+        order, sweeps, masks, drawing, vertices, piece_starts, edges, bounds, ends, blocking
+    )
+    return plan, checks + more
 
 
 def first_fitting_drawn(
-    order: Integers, sweeps: PlanSweeps, masks: Bits, drawing: Drawing, problem: Problem
+    order: Integers,
+    sweeps: PlanSweeps,
+    masks: Bits,
+    drawing: Drawing,
+    problem: Problem,
+    telling: Integers = NOBODY,
 ) -> tuple[int, int]:
     """Find the first plan that fits a problem as it is stored, from the problem's drawing.
 
@@ -233,6 +265,7 @@ def first_fitting_drawn(
         masks: ``[N, 64]`` the cells that each plan sweeps.
         drawing: of the problem.
         problem: what the plan is to fit.
+        telling: ``[m]`` plans to try before; if there are some and none of them fits, no other is tried.
 
     Returns:
         The plan, -1 if none fits, and how many times a box was tried on an obstacle.
@@ -240,5 +273,6 @@ def first_fitting_drawn(
     vertices, piece_starts, _ = problem.obstacles
     edges = np.empty((len(vertices), 5))
     return _first_fitting_drawn(
-        *(order, sweeps, masks, drawing, vertices, piece_starts, edges, problem.bounds, ends_of(problem))
+        *(order, telling, sweeps, masks, drawing, vertices, piece_starts, edges, problem.bounds),
+        ends_of(problem),
     )

@@ -43,6 +43,21 @@ def test_the_drawing_says_what_the_scene_says(experiences, draw, seed, count):
     assert first[0] == first[1]
 
 
+@given(seed=SEEDS, count=st.integers(0, 12), told=st.integers(1, 8))
+def test_no_plan_is_tried_if_there_are_telling_ones_and_none_of_these_is_free(
+    experiences, draw, seed, count, told
+):
+    rng = generator(seed, "telling")
+    problem = dataclasses.replace(experiences[seed % 8].problem, obstacles=draw(rng, count), goal_radius=12.0)
+    sweeps = sweep_plans([each.plan for each in experiences])
+    window = dataclasses.replace(problem, start=CANONICAL_START, goal=CANONICAL_GOAL)
+    asked = (sweeps, masks_of(sweeps), drawing_of(window), problem)
+    order, telling = (rng.permutation(len(experiences)).astype(np.int32)[:n] for n in (8, told))
+    anyone, _ = first_fitting_drawn(telling, *asked)
+    expected = first_fitting_drawn(order, *asked)[0] if anyone >= 0 else -1
+    assert first_fitting_drawn(order, *asked, telling)[0] == expected
+
+
 @given(seed=SEEDS)
 def test_narrower_and_wider_bounds_count(experiences, draw, seed):
     rng = generator(seed, "bounds")
