@@ -200,6 +200,16 @@ def bodies_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Body]:
     return bodies
 
 
+def bodies_within(state: Floats, control: Floats, vehicle: Vehicle) -> list[Body]:
+    """The bodies in one step from a ``state [S]`` under a ``control [2]``, in ``WITHIN`` shorter steps."""
+    controls = np.tile(control, (WITHIN, 1))
+    if vehicle.first_order:  # what is commanded is there at once
+        controls[0] *= WITHIN
+        controls[1:] = 0.0
+    finer = vehicle._replace(dt=vehicle.dt / WITHIN)
+    return bodies_of(simulate_again(state, controls, finer), controls, finer)
+
+
 def _parts(
     name: str, body: Vehicle | Trailer, heading: Floats, reference: Floats, pace: _Pace, dt: float
 ) -> list[Body]:

@@ -19,7 +19,8 @@ from planners.memory.plans.experience import Experience
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans
 from planners.world.arrays import Floats
-from planners.world.authority.authority import faults, prism
+from planners.world.authority.authority import faults
+from planners.world.authority.authority_sweeps import prism
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Obstacles, Plan, Problem, start_state

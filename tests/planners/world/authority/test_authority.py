@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from planners.search.registry import PLANNERS, plan
 from planners.world.arrays import Floats
-from planners.world.authority.authority import _hits, _on_arc, _pose, _shape, faults, prism
+from planners.world.authority.authority import faults
+from planners.world.authority.authority_sweeps import _hits, _on_arc, _pose, _shape, prism
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.goal import goal_of, reaches

@@ -12,6 +12,8 @@ from planners.world.authority.authority import faults
 from planners.world.authority.authority_equations import Body, bodies_of, simulate_again
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, obstacles_of
+from planners.world.vehicles.bodies import box_corners as corners_of_boxes
+from planners.world.vehicles.bodies import swept_boxes
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, VEHICLES, Vehicle, state_size
 from tests.planners.world.authority.test_authority import kinds
 from tests.planners.world.motions import (
@@ -20,6 +22,8 @@ from tests.planners.world.motions import (
     exact_motion,
     gentle_controls,
     placed,
+    random_controls,
+    random_state,
     turning_limits,
 )
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
@@ -160,6 +164,27 @@ def test_what_the_kernel_calls_free_the_authority_calls_free(vehicle: Vehicle, s
     begun = Plan(winding.states[: max(free, 1)], winding.controls[: max(free - 1, 0)])
     if free:
         assert {"Collision", "Bounds"}.isdisjoint(kinds(faults(problem, begun, vehicle)))
+
+
+@each_vehicle
+@settings(max_examples=60, deadline=None)
+@given(seed=seeds)
+def test_what_the_kernel_calls_free_by_a_hair_the_authority_calls_free(vehicle: Vehicle, seed: int) -> None:
+    """A wall and bounds that touch the kernel's boxes of a single step, from any side."""
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, vehicle)
+    controls = random_controls(rng, state, vehicle)[np.newaxis]
+    states = simulate_again(state, controls, vehicle)
+    boxes = swept_boxes(states, vehicle)
+    corners = corners_of_boxes(boxes)
+    turn = rng.choice([rng.uniform(-np.pi, np.pi), *(np.arctan2(boxes[:, 3], boxes[:, 2]) + 0.5 * np.pi)])
+    normal = np.array([np.cos(turn), np.sin(turn)])
+    foremost = corners[np.argmax(corners @ normal)] + (1.0 + 1e-6) * normal
+    wall = box_corners(*foremost, turn, 1.0, 5.0)
+    around = (*(corners.min(axis=0) - 1e-9), *(corners.max(axis=0) + 1e-9))
+    for problem in (problem_with(obstacles_of([[wall]]), WIDE), problem_with(obstacles_of([]), around)):
+        found = kinds(faults(problem, Plan(states, controls, vehicle.dt), vehicle))
+        assert {"Collision", "Bounds"}.isdisjoint(found)
 
 
 def _corners(states: Floats, vehicle: Vehicle) -> list[tuple[str, Floats]]:

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.world.arrays import Floats
-from planners.world.authority.authority import prism
+from planners.world.authority.authority_sweeps import prism
 from planners.world.geometry import collision
 from planners.world.geometry.collision import (
     REACH_M,
