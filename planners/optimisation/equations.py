@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from planners.world.arrays import Floats
+from planners.world.vehicles.interface import SPARE
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
 
 SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
@@ -78,8 +79,8 @@ def limits_of(vehicle: Vehicle) -> VehicleLimits:
 def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     """Return a function from ``state [S]`` to discs over the bodies: centres ``[2, D]``, radii ``[D]`` (m).
 
-    The discs, ``a_body`` in a row over each body, cover it with the margin that the kernels add: half of the
-    longest path of a body point in a step into or out of the state.
+    The discs, ``a_body`` in a row over each body, cover it with the margins that the kernels add:
+    what its points do in half a step into or out of the state.
     """
     state = ca.SX.sym("state", state_size(vehicle))
     x, y, heading = state[0], state[1], state[2]
@@ -125,11 +126,13 @@ def _row(
 ) -> tuple[ca.SX, ca.SX]:
     """Centres ``[2, count]`` and radii ``[1, count]`` of discs over one body, inflated by its margin."""
     front, rear, width = body
-    margin = 0.5 * dt * ca.sqrt((speed + 0.5 * width * turn) ** 2 + (max(front, rear) * turn) ** 2)
-    half_length = 0.5 * (front + rear) + margin
+    half = 0.5 * SPARE * dt  # the rest is ``half_step_ways`` of the kernels, for symbols
+    ahead, across = speed + 0.5 * width * turn, max(front, rear) * turn
+    turned = 0.5 * half * turn
+    half_length = 0.5 * (front + rear) + half * (ahead + turned * across)
     centres = []
     for i in range(count):
         along = 0.5 * (front - rear) + (2 * i + 1 - count) / count * half_length
         centres.append(ca.vertcat(x + along * ca.cos(heading), y + along * ca.sin(heading)))
-    radius = ca.sqrt((half_length / count) ** 2 + (0.5 * width + margin) ** 2)
+    radius = ca.sqrt((half_length / count) ** 2 + (0.5 * width + half * (across + turned * ahead)) ** 2)
     return ca.horzcat(*centres), ca.repmat(radius, 1, count)

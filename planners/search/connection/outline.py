@@ -41,7 +41,7 @@ def outline_is_free(
             x += step * half_cos
             y += step * half_sin
             sin, cos = turned_by(sin, cos, turn)
-            box = box_at(x, y, cos, sin, vehicle.front, vehicle.rear, vehicle.width, 0.0)
+            box = box_at(x, y, cos, sin, vehicle.front, vehicle.rear, vehicle.width, (0.0, 0.0))
             if metres != 0.0 and not box_is_free(box, scene):
                 return False
     return True

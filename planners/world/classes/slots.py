@@ -61,7 +61,9 @@ def sizes_of(vehicle: Vehicle) -> Sizes:
     """The sizes of a ``vehicle``, in metres of its problems, with the planners' margin at rest."""
     bodies = (vehicle, *trailers_of(vehicle))
     boxes = swept_boxes(np.zeros((1, state_size(vehicle))), vehicle)
-    margins = [float(box[5]) - 0.5 * body.width for box, body in zip(boxes, bodies, strict=True)]
+    margins = [
+        float(box[4]) - 0.5 * (body.front + body.rear) for box, body in zip(boxes, bodies, strict=True)
+    ]
     turning = 0.0
     if not isinstance(vehicle, DifferentialDrive):
         turning = vehicle.wheelbase / math.tan(vehicle.max_steering)

@@ -13,7 +13,7 @@ from planners.world.jit import implements, inlined
 from planners.world.trigonometry import sincos, tan
 from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive, most_motion, turn_rates
-from planners.world.vehicles.interface import State, box_at, half_way, leading_body
+from planners.world.vehicles.interface import State, box_at, half_step_ways, leading_body
 from planners.world.vehicles.vehicle import CarWithTrailers, Trailer
 
 Three = tuple[float, float, float]  # a number of each trailer; those of missing ones count for nothing
@@ -180,8 +180,8 @@ def _behind(
     axle_x = x - length * cos
     axle_y = y - length * sin
     reach = max(trailer.front, trailer.rear)
-    margin = half_way(dt, speed, turn_here, reach, 0.5 * trailer.width)
-    box = box_at(axle_x, axle_y, cos, sin, trailer.front, trailer.rear, trailer.width, margin)
+    margins = half_step_ways(dt, speed, turn_here, reach, 0.5 * trailer.width)
+    box = box_at(axle_x, axle_y, cos, sin, trailer.front, trailer.rear, trailer.width, margins)
     return axle_x, axle_y, heading_here, turn_here, box
 
 

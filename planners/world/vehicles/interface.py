@@ -9,12 +9,18 @@ entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is aske
 
 from __future__ import annotations
 
+from typing import Final
+
 from planners.world.arrays import Box, Floats
 from planners.world.jit import by_vehicle, inlined, unseen
-from planners.world.trigonometry import length, sincos
+from planners.world.trigonometry import sincos
 from planners.world.vehicles.vehicle import About, Vehicle
 
 State = tuple[float, ...]
+
+SPARE: Final = (
+    1.0 + 1.0 / 32.0
+)  # boxes cover that much more than half a step, for an authority that rounds up
 
 unseen(About)
 
@@ -112,7 +118,7 @@ def is_folded(state: State, vehicle: Vehicle) -> bool:
 
 @by_vehicle
 def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
-    """A box around each body, inflated by half of the longest path of a body point in an admissible step.
+    """A box around each body, larger by what its points do along and across it in half a step.
 
     So the boxes at both ends of a step cover the sweep between them, and no obstacle is jumped over.
     """
@@ -126,29 +132,44 @@ def kept_within(control: float, value: float, low: float, high: float, dt: float
 
 
 @inlined
-def half_way(dt: float, speed: float, turn: float, reach: float, half_width: float) -> float:
-    """Half of the longest path, in metres, of a body point in ``dt`` seconds.
+def half_step_ways(
+    dt: float, speed: float, turn: float, reach: float, half_width: float
+) -> tuple[float, float]:
+    """How far in metres a body point gets along the body and across it, at most, in half of ``dt`` seconds.
 
-    ``speed`` (m/s) and ``turn`` (rad/s) are the largest at the body's reference point, from which the body
-    extends ``reach`` metres along and ``half_width`` metres across.
+    Both are those of the frame in which the body stands at the beginning, or at the end, and a little more.
+
+    ``speed`` (m/s) and ``turn`` (rad/s) are the largest at the body's reference point, which moves along the
+    body only, and from which the body extends ``reach`` metres along and ``half_width`` metres across.
     """
-    return 0.5 * dt * length(speed + half_width * turn, reach * turn)
+    half = 0.5 * SPARE * dt
+    ahead = speed + half_width * turn
+    across = reach * turn
+    turned = 0.5 * half * turn  # the mean angle by which the two mix
+    return half * (ahead + turned * across), half * (across + turned * ahead)
 
 
 @inlined
 def box_at(
-    x: float, y: float, cos: float, sin: float, front: float, rear: float, width: float, margin: float
+    x: float,
+    y: float,
+    cos: float,
+    sin: float,
+    front: float,
+    rear: float,
+    width: float,
+    margins: tuple[float, float],
 ) -> Box:
-    """The box of a body with its reference point at (x, y), ``margin`` metres larger on every side."""
+    """The box of a body with its reference point at (x, y), larger by ``margins`` (m) along and across."""
     ahead = 0.5 * (front - rear)
-    half_length = 0.5 * (front + rear) + margin
-    return x + ahead * cos, y + ahead * sin, cos, sin, half_length, 0.5 * width + margin
+    half_length = 0.5 * (front + rear) + margins[0]
+    return x + ahead * cos, y + ahead * sin, cos, sin, half_length, 0.5 * width + margins[1]
 
 
 @inlined
 def leading_body(state: State, speed: float, turn: float, vehicle: Vehicle) -> Box:
     """The swept box of the first body, for the largest ``speed`` (m/s) and ``turn`` (rad/s) in a step."""
     reach = max(vehicle.front, vehicle.rear)
-    margin = half_way(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
+    margins = half_step_ways(vehicle.dt, speed, turn, reach, 0.5 * vehicle.width)
     sin, cos = sincos(state[2])
-    return box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margin)
+    return box_at(state[0], state[1], cos, sin, vehicle.front, vehicle.rear, vehicle.width, margins)

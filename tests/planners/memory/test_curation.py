@@ -130,7 +130,7 @@ def test_plans_of_one_problem_compete_and_at_most_one_is_kept(candidates):
     assert (kept // 2).tolist() == curate(candidates, 20).tolist()
     longer = [Experience(each.problem, lengthened(each.plan)) for each in candidates]
     competing = [each for pair in zip(longer, candidates, strict=True) for each in pair]
-    assert (curate(competing, 20) % 2 == 1).all()
+    assert (curate(competing, 15) % 2 == 1).all()  # with more, some answer nothing that others do not
     assert curate(competing, len(candidates)).tolist() == list(range(0, len(competing), 2))
 
 
