@@ -10,11 +10,10 @@ from typing import Any, Final, NamedTuple
 import pandas as pd
 
 from dashboards.cells import duration, planner_title
-from dashboards.statistics.headline import used_by_default
+from dashboards.statistics.headline import FEW, used_by_default
 from dashboards.statistics.panels import COMBINED
 
 Row = Mapping[Any, Any]  # of a summary
-FEW: Final = 100  # problems; fewer are for trying things out
 _SAME_S: Final = 0.05  # arrivals that differ by less are called the same: they are written to 0.1 s
 
 

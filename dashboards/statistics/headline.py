@@ -15,6 +15,7 @@ import pandas as pd
 
 from dashboards.statistics.panels import COMBINED
 
+FEW: Final = 100  # problems; fewer are for trying things out
 _PREFERRED: Final = ("repair", "open", "closed", "published-open")  # the first that was measured counts
 
 

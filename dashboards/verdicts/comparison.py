@@ -28,6 +28,7 @@ CONTROL: Final = "control"  # it uses no memory, and does not differ
 ALARM: Final = "alarm"  # it uses no memory, but differs
 LATER_MARGIN: Final = 0.01  # of the time until the robot is there: so much later is no later
 MACHINE_MARGIN: Final = 0.05  # by which times without memory may differ before the machine is said to differ
+MACHINE: Final = "the machine took"  # with which the reason begins where nothing but times differs
 COLUMNS: Final = (
     "panel", "planner", "configuration", "problems", "first_ms", "ms", "reduction", "reduction_low",
     "reduction_high", "mostly", "mostly_low", "mostly_high", "checks_reduction", "checks_reduction_low",
@@ -216,5 +217,5 @@ def _of_control(judged: tuple[str, str], in_turn: bool, reduction: float) -> tup
     if judged[1]:
         return ALARM, judged[1]
     if not in_turn and abs(reduction) > MACHINE_MARGIN:
-        return ALARM, f"the machine took {abs(reduction):.0%} {'less' if reduction > 0.0 else 'more'} time"
+        return ALARM, f"{MACHINE} {abs(reduction):.0%} {'less' if reduction > 0.0 else 'more'} time"
     return CONTROL, ""

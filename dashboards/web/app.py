@@ -31,6 +31,7 @@ from dashboards.web.pages.overview_page import overview
 from dashboards.web.pages.problem_page import problem
 from dashboards.web.pages.problems_page import problems
 from dashboards.web.pages.progress_page import progress
+from dashboards.web.pages.run_before import against_the_one_before
 from dashboards.web.pages.runs_page import runs
 from dashboards.web.pages.try_it_page import check_world, plan_world, try_it
 from dashboards.web.parameters import Parameters, link
@@ -47,6 +48,7 @@ LARGEST_BODY_BYTES: Final = 1 << 20
 PAGES: Final[dict[str, PageOf]] = {
     "/": runs,
     "/runs/{run}": overview,
+    "/runs/{run}/before": against_the_one_before,
     "/runs/{run}/problems": problems,
     "/runs/{run}/problem": problem,
     "/runs/{run}/memory": memory,

@@ -37,6 +37,7 @@ Value = TypeVar("Value")
 
 KEPT: Final = 24  # values; the largest, the rows of half a million attempts, take some 60 MB
 RESAMPLES: Final = 200  # for a run without a report; the ends of an interval then stand on 5 resamples each
+_SAME_PROBLEMS: Final = ("vehicle", "difficulty", "seed")  # settings that differ where no problem is shared
 _DRAWN: Final = re.compile(r"(.+)-(easy|standard|hard)-(\d{1,12})-(\d{1,9})")
 
 
@@ -117,9 +118,24 @@ class DataReader:
         made = self.kept(key, lambda: summarise(rows, resamples=RESAMPLES))
         return made, f"The run has no report yet: made here from its rows, with {RESAMPLES} resamples only."
 
+    def earlier(self, run: RunFolder) -> RunFolder | None:
+        """The newest run before ``run`` whose settings ask for the same problems, if both attempted any."""
+        runs, asked = self.runs(), self.settings(run)
+        places = [each.path for each in runs]
+        if run.path not in places or not _has_attempts(run):
+            return None
+        for earlier in runs[places.index(run.path) + 1 :]:
+            with suppress(StorageError):
+                settings = self.settings(earlier)
+                alike = all(settings.get(name) == asked.get(name) for name in _SAME_PROBLEMS)
+                shared = set(class_names(settings)) & set(class_names(asked))
+                if alike and shared and _has_attempts(earlier):
+                    return earlier
+        return None
+
     def attempts(self, run: RunFolder) -> Attempts:
         """The attempts of a ``run``. Raises NoticeError if there are none yet."""
-        if not any(run.results.rglob("*.parquet")):
+        if not _has_attempts(run):
             raise NoticeError(
                 f"{run.path.name} has no attempts yet. Continue it with the command that began it, or run "
                 "its benchmark. This page shows what is there as soon as the first rows are written.",
@@ -163,6 +179,10 @@ def class_names(settings: Mapping[str, Any]) -> list[str]:
     """The classes of a run by its ``settings``: the generated ones, then its worlds and maps."""
     worlds = [Path(str(world)) for world in settings["worlds"]]
     return [*settings["classes"], *(path.name if path.is_dir() else path.stem for path in worlds)]
+
+
+def _has_attempts(run: RunFolder) -> bool:
+    return any(run.results.rglob("*.parquet"))
 
 
 def stamp_of(path: Path) -> Stamp:

@@ -43,7 +43,7 @@ def comparison(data: DataReader, params: Parameters) -> Page:
         raise BadRequestError(f"{first} is both runs; choose two.")
     if first and other:
         one, two = data.run(first), data.run(other)
-        table = _compared(data, one, two)
+        table = compared(data, one, two)
         if table.empty:
             values["verdict"] = (
                 f"{other} and {first} have no attempt at the same problem in common; benchmark both with the "
@@ -62,7 +62,8 @@ def comparison(data: DataReader, params: Parameters) -> Page:
     return Page("compare.html.jinja", "Compare", "Compare", run, values, charts)
 
 
-def _compared(data: DataReader, one: RunFolder, two: RunFolder) -> pd.DataFrame:
+def compared(data: DataReader, one: RunFolder, two: RunFolder) -> pd.DataFrame:
+    """The run ``two`` against ``one``; raises NoticeError if one of them has no attempts yet."""
     first, other = (
         data.attempts(run).rows.astype({"problem_id": object, "assist": object, "recall": object})
         for run in (one, two)

@@ -45,14 +45,17 @@ def overview(data: DataReader, params: Parameters) -> Page:
     run = data.run(params.run)
     name = run.path.name
     view = params.one_of("view", tuple(VIEWS), "reduction")
+    settings, before = data.settings(run), data.earlier(run)
     values: dict[str, Any] = {
-        "settings": data.settings(run),
+        "settings": settings,
+        "before": before.path.name if before else "",
+        "retrained": bool(settings.get("retraining")),
         "stages": _stages(data.stages(run)),
         "places": list(_places(data, run)),
         "views": [(key, title, params.also(view=key)) for key, title in VIEWS.items()],
         "view": view,
         "found": [],
-        "classes": class_names(data.settings(run)),
+        "classes": class_names(settings),
         "notice": "",
         "faults": (),
         "tables": [],

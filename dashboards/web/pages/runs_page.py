@@ -18,8 +18,13 @@ from storage.places.run_folder import RunFolder
 
 def runs(data: DataReader, params: Parameters) -> Page:
     """Every run with its settings and how far it is; one that cannot be read says why."""
-    rows = [_row(data, run) for run in data.runs()]
-    return Page("runs.html.jinja", "Runs", values={"rows": rows, "data": str(data.folder.path)})
+    found = data.runs()
+    values = {
+        "rows": [_row(data, run) for run in found],
+        "data": str(data.folder.path),
+        "newest": found[0].path.name if found else "",
+    }
+    return Page("runs.html.jinja", "Runs", values=values)
 
 
 def _row(data: DataReader, run: RunFolder) -> dict[str, Any]:

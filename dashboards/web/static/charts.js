@@ -37,3 +37,9 @@ document.addEventListener("keydown", (event) => {
   const rel = { ArrowLeft: "prev", ArrowRight: "next" }[event.key];
   document.querySelector(`main a[rel=${rel}]`)?.click();
 });
+// What takes longer than a page should is fetched when the page is there; without an answer its link stays.
+for (const part of document.querySelectorAll("[data-load]")) {
+  fetch(part.dataset.load)
+    .then((answer) => (answer.ok ? answer.text() : ""))
+    .then((html) => { if (html.trim()) part.innerHTML = html; part.dataset.loaded = "1"; });
+}

@@ -77,6 +77,19 @@ def test_from_the_runs_to_an_attempt_by_clicking(opened: Callable[[str], WebDriv
     assert driver.find_element(By.TAG_NAME, "h1").text != first
 
 
+@pytest.mark.parametrize("place", ["/", "/runs/second"])
+def test_the_newest_run_is_compared_with_the_one_before_and_leads_there(
+    opened: Callable[[str], WebDriver], place: str
+) -> None:
+    driver = opened(place)
+    wait(driver, lambda d: d.find_element(By.CSS_SELECTOR, "[data-load]").get_attribute("data-loaded"))
+    for size, dark in ((PHONE, True), (DESKTOP, False)):
+        shown_at(driver, size, dark)
+        assert findings(driver) == []
+    driver.find_element(By.LINK_TEXT, "Compare them").click()
+    assert "first=first&other=second" in driver.current_url
+
+
 def test_the_vehicle_drives_the_plan_to_its_end(opened: Callable[[str], WebDriver]) -> None:
     driver = opened(PAGES[4])
     assert driver.find_element(By.CSS_SELECTOR, ".moving polygon").get_attribute("points")

@@ -5,12 +5,15 @@ from __future__ import annotations
 import csv
 import html
 import io
+import os
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
 import httpx
 import pytest
 
+from dashboards.verdicts.comparison_words import NOT_SHOWN
 from dashboards.web.attempt_rows import COLUMNS, attempts_of
 from dashboards.web.memory_versions import MemoryVersion
 from dashboards.web.notices import NoticeError
@@ -18,7 +21,7 @@ from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.watched import read_watched
 from tests.dashboards.web.conftest import LocalClient
-from tests.dashboards.web.small_data import VERSIONS
+from tests.dashboards.web.small_data import VERSIONS, small_data, write_settings
 
 ADDRESSES = (
     "/", "/runs/first", "/runs/first?view=solved", "/runs/first?view=time", "/runs/first/problems",
@@ -171,3 +174,21 @@ def test_a_registry_that_does_not_answer_is_named_and_the_rest_is_shown(data: Da
     text = LocalClient(data, unreached).get("/progress").text
     assert "The registry does not answer." in text
     assert 'id="chart-runs"' in text
+
+
+def test_a_run_stands_beside_the_one_before_it(tmp_path: Path) -> None:
+    data = small_data(tmp_path, ("first", "second", "third"))
+    for age, name in enumerate(("third", "second", "first")):
+        os.utime(data.run(name).settings, (1e9 - age, 1e9 - age))
+    write_settings(data.run("second"), seed=2)
+    os.utime(data.run("second").settings, (1e9 - 1, 1e9 - 1))
+    client = LocalClient(data, lambda: VERSIONS)
+    told = client.get("/runs/third/before").text
+    assert NOT_SHOWN in told
+    (address,) = re.findall(r'href="(/compare[^"]*)"', told)
+    assert address == "/compare?first=first&amp;other=third"  # the second has other problems
+    assert client.get(html.unescape(address)).status_code == 200
+    assert address in client.get("/runs/third").text
+    for name in ("first", "second"):
+        assert "/compare?first" not in client.get(f"/runs/{name}/before").text
+    assert VERSIONS[1].why in client.get("/runs/second/before").text  # how its memory was judged
