@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 LOGGERS: Final = ("tasks", "storage")
 PROGRESS: Final = "tasks.fan_out.progress"
+COMPILING: Final = "planners.world.jit"  # which tells that kernels are being compiled
 DETAILS: Final = ("tasks.fan_out.workload",)  # whose notices are for operators, and here for ``--verbose``
 RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # what a run found, and where it lies
 COLUMNS: Final = 110  # width of tables that are not written to a terminal
@@ -101,11 +102,13 @@ def notices_shown() -> Iterator[None]:
         yield
     finally:
         _telling = Telling()
-        for name in (*LOGGERS, PROGRESS):
+        for name in (*LOGGERS, PROGRESS, COMPILING):
             logger = logging.getLogger(name)
             logger.setLevel(logging.NOTSET)
             logger.propagate = True
-            for handler in [each for each in logger.handlers if isinstance(each, Notices | ProgressShown)]:
+            for handler in [
+                each for each in logger.handlers if isinstance(each, Notices | Waits | ProgressShown)
+            ]:
                 logger.removeHandler(handler)
 
 
@@ -114,6 +117,7 @@ def show_notices() -> None:
     for name in LOGGERS:
         _listen(name, logging.INFO, Notices())
     _listen(PROGRESS, logging.DEBUG, ProgressShown())
+    _listen(COMPILING, logging.INFO, Waits())
 
 
 def _listen(name: str, level: int, handler: logging.Handler) -> None:
@@ -147,6 +151,15 @@ class Notices(logging.Handler):
                 write_files(**message)
             else:
                 write(message)
+
+
+class Waits(logging.Handler):
+    """Writes to the error stream why nothing happens for a while."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record whose message is a text."""
+        if not _telling.quiet:
+            print(record.getMessage(), file=sys.stderr, flush=True)
 
 
 class ProgressShown(logging.Handler):

@@ -10,6 +10,8 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import logging
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -23,6 +25,8 @@ from numba.core.compiler import Compiler, compile_result
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload, typeof_impl
 
+TOLD_AFTER: float = 2.0  # seconds of compiling, from which on it is worth a line
+_LOG = logging.getLogger(__name__)
 _SOURCES = Path(__file__).parents[1]
 
 
@@ -178,11 +182,44 @@ class _NoCollection(event.Listener):
             gc.enable()
 
 
+class _Told(event.Listener):
+    """Logs a line, once a process, when kernels have been compiled for ``TOLD_AFTER`` seconds in all.
+
+    A large kernel calls many others, each of which is compiled first and shows that time has passed.
+    """
+
+    def __init__(self) -> None:
+        self._depth = 0  # kernels that wait for those that they call
+        self._seconds = 0.0  # of kernels that are done
+        self._began = 0.0
+        self._is_told = False
+
+    def on_start(self, event: event.Event) -> None:
+        if _is_kernel(event):
+            if self._depth == 0:
+                self._began = time.monotonic()
+            self._depth += 1
+            self._tell()
+
+    def on_end(self, event: event.Event) -> None:
+        if _is_kernel(event):
+            self._tell()
+            self._depth -= 1
+            if self._depth == 0:
+                self._seconds += time.monotonic() - self._began
+
+    def _tell(self) -> None:
+        if not self._is_told and self._seconds + time.monotonic() - self._began >= TOLD_AFTER:
+            self._is_told = True
+            _LOG.info("Compiling the planners for this machine, once: may take some 30 s.")
+
+
 def _is_kernel(event: event.Event) -> bool:
     return isinstance(getattr(event.data["dispatcher"], "_cache", None), _KernelCache)
 
 
 event.register("numba:compile", _NoCollection())
+event.register("numba:compile", _Told())
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
