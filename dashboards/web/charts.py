@@ -268,12 +268,12 @@ def _rows_with_axis(
 
 
 def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float] | None = None) -> str:
-    room = scale.last - scale.first
+    about = max(2, int((scale.last - scale.first) / 62.0))
     marks = [element("line", x1=scale.first, x2=scale.last, y1=y, y2=y, class_="axis")]
-    for value in scale.ticks(max(2, int(room / 62.0))) if ticks is None else ticks:
+    for value, fine in _ticks(scale, about) if ticks is None else [(each, "") for each in ticks]:
         x = scale.at(value)
-        marks.append(element("line", x1=x, x2=x, y1=y, y2=y + 4.0, class_="axis"))
-        marks.append(text(short(value), x, y + 16.0, class_="tick", text_anchor="middle"))
+        marks.append(element("line", x1=x, x2=x, y1=y, y2=y + 4.0, class_=f"axis{fine}"))
+        marks.append(text(short(value), x, y + 16.0, class_=f"tick{fine}", text_anchor="middle"))
     middle, half = 0.5 * (scale.first + scale.last), 0.5 * 5.6 * len(title)
     middle = min(max(middle, half), WIDTH - half) if scale.last <= WIDTH and half < WIDTH / 2 else middle
     marks.append(text(title, middle, y + 32.0, class_="name", text_anchor="middle"))
@@ -282,8 +282,15 @@ def _x_axis(scale: Scale | LogScale, y: float, title: str, ticks: Sequence[float
 
 def _y_axis(scale: Scale | LogScale, left: float, right: float) -> list[str]:
     marks = []
-    for value in scale.ticks(4):
+    for value, fine in _ticks(scale, 4):
         y = scale.at(value)
-        marks.append(element("line", x1=left, x2=right, y1=y, y2=y, class_="grid"))
-        marks.append(text(short(value), left - 6.0, y + 4.0, class_="tick", text_anchor="end"))
+        marks.append(element("line", x1=left, x2=right, y1=y, y2=y, class_=f"grid{fine}"))
+        marks.append(text(short(value), left - 6.0, y + 4.0, class_=f"tick{fine}", text_anchor="end"))
     return marks
+
+
+def _ticks(scale: Scale | LogScale, about: int) -> list[tuple[float, str]]:
+    """``about`` as many values as wanted, then those that only show in a part of the drawing, and a class."""
+    shown = scale.ticks(about)
+    finer = [value for value in scale.ticks(4 * about) if not np.isclose(value, shown).any()]
+    return [*((value, "") for value in shown), *((value, " fine") for value in finer)]

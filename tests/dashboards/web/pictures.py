@@ -28,6 +28,9 @@ def main(data: str, run: str, other: str, out: str) -> None:
                 shown_at(driver, size)
                 driver.get("about:blank")
                 driver.get(address + place)
+                WebDriverWait(driver, 30).until(
+                    lambda d: not d.find_elements(By.CSS_SELECTOR, "[data-load]:not([data-loaded])")
+                )
                 if name == "try":
                     WebDriverWait(driver, 30).until(
                         lambda d: d.find_element(By.ID, "editor").get_attribute("data-planned")

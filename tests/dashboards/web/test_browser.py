@@ -122,6 +122,37 @@ def test_a_chart_is_saved_as_a_picture(opened: Callable[[str], WebDriver]) -> No
     wait(driver, lambda d: int(button.get_attribute("data-saved") or 0) > 5_000)
 
 
+def _view(driver: WebDriver, chart: str) -> list[float]:
+    drawing = driver.find_element(By.CSS_SELECTOR, f"{chart} .drawing > svg")
+    return [float(each) for each in str(drawing.get_dom_attribute("viewBox")).split()]
+
+
+def test_a_chart_is_zoomed_and_moved_and_its_axis_stays_in_sight(
+    opened: Callable[[str], WebDriver],
+) -> None:
+    driver, chart = opened("/runs/first/memory?memory=trap"), "#chart-map"
+    whole, size = _view(driver, chart), driver.find_element(By.CSS_SELECTOR, f"{chart} circle").size
+    zoom_in, _, all_of_it = driver.find_elements(By.CSS_SELECTOR, f"{chart} [data-zoom]")
+    for width in (DESKTOP, PHONE):
+        shown_at(driver, width)
+        for times in (2, 4):
+            zoom_in.click()
+            assert _view(driver, chart)[2:] == pytest.approx([each / times for each in whole[2:]])
+        x, y, _, height = before = _view(driver, chart)
+        for tick in driver.find_elements(By.CSS_SELECTOR, f"{chart} text.tick[text-anchor=middle]"):
+            assert y < float(tick.get_attribute("y")) < y + height
+        drawing = driver.find_element(By.CSS_SELECTOR, f"{chart} .drawing > svg")
+        ActionChains(driver).drag_and_drop_by_offset(drawing, -40, 0).perform()
+        assert _view(driver, chart)[0] > x
+        drawing.send_keys(Keys.ARROW_LEFT, Keys.ARROW_LEFT)
+        assert _view(driver, chart)[0] < before[0]
+        assert findings(driver) == []
+        all_of_it.click()
+        assert _view(driver, chart) == whole
+    shown_at(driver, DESKTOP)
+    assert driver.find_element(By.CSS_SELECTOR, f"{chart} circle").size == size
+
+
 def after(driver: WebDriver, act: Callable[[], object]) -> None:
     """Do something that changes the world, and wait for the plans that follow."""
     before = planned(driver)
