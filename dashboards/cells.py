@@ -26,21 +26,20 @@ PLANNING_TIME: Final = (
 )
 _PLANNERS: Final = {"rrt": "RRT", "gust": "GUST", "follow": "Follow", "lattice": "Lattice"}
 
-_NUMBER: Final = r"[+-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?"
-_COUNT: Final = re.compile(rf"({_NUMBER})(?: ([kMG]))?")
-_FORMS: Final = tuple(  # of cells with several numbers, each "#", and what these are
-    (re.compile(form.replace("#", f"({_NUMBER})")), names)
-    for form, names in (
-        (r"# \[ *#, *#\]", ("value", "low", "high")),
-        (r"# \[ *#, *#\] of #", ("value", "low", "high", "of")),
-        (r"# of #", ("value", "of")),
-        (r"#±#", ("value", "deviation")),
-        (r"#→#", ("first", "other")),
-        (r"#\+#", ("recalled", "repaired")),
-        (r"\(#, #\)", ("x", "y")),
-    )
-)
-_SIZES: Final = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+_NUMBER: Final = re.compile(r"[+-]?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+class Cell(str):
+    """A number as people read it, or several, that remembers for programs what was not rounded."""
+
+    value: Any
+
+    def __new__(cls, text: str, number: Any = None, /, **numbers: float) -> Cell:
+        """A ``text`` that says a ``number``, or several ``numbers`` by name."""
+        cell = super().__new__(cls, text)
+        cell.value = {name: _plain(each) for name, each in numbers.items()} if numbers else _plain(number)
+        return cell
+
 
 Rows = list[list[str]]
 
@@ -57,14 +56,14 @@ def panel_title(panel: str, planner: str) -> str:
 
 def percent(fraction: float) -> str:
     """A ``fraction`` in per cent without the sign, like ``12.3``; a dash for NaN."""
-    return NOTHING if math.isnan(fraction) else f"{100.0 * fraction:.1f}"
+    return NOTHING if math.isnan(fraction) else Cell(f"{100.0 * fraction:.1f}", 100.0 * fraction)
 
 
 def p_value(value: float) -> str:
     """A p-value to three decimals; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    return Cell("< 0.001" if value < 0.001 else f"{value:.3f}", value)
 
 
 def decimals_of(milliseconds: Floats) -> int:
@@ -74,12 +73,17 @@ def decimals_of(milliseconds: Floats) -> int:
     return max(0, min(wanted, 3 if most < 1000.0 else 2))
 
 
+def decimal(value: float, decimals: int) -> str:
+    """A ``value`` with so many ``decimals``; a dash for NaN."""
+    return NOTHING if math.isnan(value) else Cell(f"{value:z,.{decimals}f}", value)
+
+
 def count(value: float) -> str:
     """A mean count in at most six characters: 834, 47.3 k, 163 M."""
     for unit, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
         if value >= 0.9995 * size:
-            return f"{value / size:.3g} {unit}"
-    return f"{value:.0f}"
+            return Cell(f"{value / size:.3g} {unit}", value)
+    return Cell(f"{value:.0f}", value)
 
 
 def duration(milliseconds: float) -> str:
@@ -97,30 +101,25 @@ def with_interval(value: float, low: float, high: float, decimals: int = 0) -> s
     """A fraction and its interval from ``low`` to ``high`` in per cent; a dash for NaN."""
     if math.isnan(value):
         return NOTHING
-    ends = (f"{100.0 * end:{4 + decimals}.{decimals}f}" for end in (low, high))  # which align in a column
-    return f"{100.0 * value:.{decimals}f} [{', '.join(ends)}]"
+    shares = {"value": 100.0 * value, "low": 100.0 * low, "high": 100.0 * high}
+    ends = (f"{shares[end]:{4 + decimals}.{decimals}f}" for end in ("low", "high"))  # which align in a column
+    return Cell(f"{shares['value']:.{decimals}f} [{', '.join(ends)}]", **shares)
 
 
 def value_of(cell: str) -> Any:
-    """What a ``cell`` says, for programs: the functions above, backwards.
-
-    Returns:
-        a number; an object with the names of ``_FORMS`` for several; None for a dash; else the cell itself.
-    """
-    if cell == NOTHING:
-        return None
-    if found := _COUNT.fullmatch(cell):
-        return _number(found[1], found[2] or "")
-    for form, names in _FORMS:
-        if found := form.fullmatch(cell):
-            return {name: _number(digits) for name, digits in zip(names, found.groups(), strict=True)}
-    return cell
+    """What a ``cell`` says, for programs: what a ``Cell`` remembers, a number, None for a dash, or itself."""
+    if isinstance(cell, Cell):
+        return cell.value
+    if cell == NOTHING or not _NUMBER.fullmatch(cell):
+        return None if cell == NOTHING else cell
+    digits = cell.replace(",", "")
+    return int(digits) if digits.lstrip("+-").isdigit() else float(digits)
 
 
-def _number(digits: str, unit: str = "") -> int | float:
-    digits = digits.replace(",", "")
-    whole = not unit and digits.lstrip("+-").isdigit()
-    return int(digits) if whole else float(digits) * _SIZES[unit]
+def _plain(value: Any) -> Any:
+    """A number as JSON knows it; None for NaN."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(plain, float) and math.isnan(plain) else plain
 
 
 @dataclass(frozen=True)

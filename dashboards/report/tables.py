@@ -10,15 +10,18 @@ import pandas as pd
 
 from dashboards.cells import (
     NOTHING,
+    Cell,
     CellTable,
     Rows,
     as_markdown,
     count,
+    decimal,
     decimals_of,
     markdown_table,
     p_value,
     percent,
     titled_tables,
+    value_of,
     with_interval,
 )
 from dashboards.statistics.panels import PLANNERS, ranked
@@ -105,9 +108,10 @@ def sweep_table(rows: pd.DataFrame) -> CellTable:
     groups = [
         [
             [
-                str(name), f"{row['learning_rate']:g}", row["channels"], row["hidden"] or "none",
+                str(name), Cell(f"{row['learning_rate']:g}", row["learning_rate"]),
+                row["channels"], row["hidden"] or "none",
                 f"{row['parameters']:,}", percent(row["hit@1"]), percent(row["hit@5"]),
-                f"{row['seconds']:.0f}",
+                decimal(row["seconds"], 0),
             ]
             for row in of_class.sort_values("hit@1", ascending=False, kind="stable").to_dict("records")
         ]
@@ -125,12 +129,17 @@ def experience_table(rows: pd.DataFrame) -> CellTable:
         by_panel = of_count.set_index("panel")
         of_panels = [by_panel.loc[panel] for panel in panels]
         cells = [
-            f"{with_interval(row['hit'], row['low'], row['high'], 1)} of {percent(row['oracle'])}"
+            _of_oracle(with_interval(row["hit"], row["low"], row["high"], 1), percent(row["oracle"]))
             for row in of_panels
         ]
         lines.append([str(plans), *cells])
     title = "Fresh hit@5 [95 %] and oracle, % of problems"
     return CellTable(title, ["experiences", *panels], [[line] for line in lines], "experience-curve")
+
+
+def _of_oracle(hits: str, oracle: str) -> str:
+    """The cell of a share with its interval, and of what the best recall would reach."""
+    return Cell(f"{hits} of {oracle}", **{**(value_of(hits) or {"value": math.nan}), "of": value_of(oracle)})
 
 
 def claims_markdown(claims: Sequence[Claim], others: Sequence[Claim] = ()) -> str:
@@ -192,17 +201,16 @@ def full_cells(row: Row, decimals: int) -> list[str]:
     """
 
     def time(name: str) -> str:
-        value, low, high = (
-            f"{row[column]:,.{decimals}f}" for column in (f"{name}_ms", f"{name}_low_ms", f"{name}_high_ms")
-        )
-        return f"{value} [{low}, {high}]"
+        ends = {"value": row[f"{name}_ms"], "low": row[f"{name}_low_ms"], "high": row[f"{name}_high_ms"]}
+        value, low, high = (f"{each:,.{decimals}f}" for each in ends.values())
+        return Cell(f"{value} [{low}, {high}]", **ends)
 
     return [
         percent(row["solved"]),
         time("mean"),
         reduction_cell(row),
         percent(row["slower"]),
-        NOTHING if math.isnan(row["slowdown"]) else f"{row['slowdown']:.2f} ×",
+        NOTHING if math.isnan(row["slowdown"]) else Cell(f"{row['slowdown']:.2f} ×", row["slowdown"]),
         p_value(row["p_value"]),
         *[time(name) for name in ("median", "p90", "interquartile_mean")],
         *driving_cells(row, 2),
@@ -227,17 +235,19 @@ def driving_cells(row: Row, decimals: int = 1) -> list[str]:
     """
     if math.isnan(row["driving_s"]):
         return [NOTHING, NOTHING]
-    alone = row["assist"] == "none" or math.isnan(row["sooner_s"])
-    ends = (f"{row[name]:+.{decimals}f}" for name in ("sooner_low_s", "sooner_high_s"))
-    sooner = NOTHING if alone else f"{row['sooner_s']:+.{decimals}f} [{', '.join(ends)}]"
-    return [f"{row['driving_s']:.1f}", sooner]
+    driving = decimal(row["driving_s"], 1)
+    if row["assist"] == "none" or math.isnan(row["sooner_s"]):
+        return [driving, NOTHING]
+    ends = {"value": row["sooner_s"], "low": row["sooner_low_s"], "high": row["sooner_high_s"]}
+    sooner, low, high = (f"{each:+.{decimals}f}" for each in ends.values())
+    return [driving, Cell(f"{sooner} [{low}, {high}]", **ends)]
 
 
 def _cells(row: Row, decimals: int) -> list[str]:
     """The figures of one configuration that fit a terminal."""
     return [
         percent(row["solved"]),
-        f"{row['mean_ms']:,.{decimals}f}",
+        decimal(row["mean_ms"], decimals),
         reduction_cell(row, 0),
         percent(row["slower"]),
         NOTHING if row["assist"] == "none" else _hits(row),
@@ -249,7 +259,9 @@ def _hits(row: Row) -> str:
     """The share of problems whose plan was recalled, and after a plus those whose plan was repaired."""
     repairs = str(row["assist"]).endswith("repair")
     recalled, repaired = 100.0 * row["recalled"], 100.0 * row["repaired"]
-    return f"{recalled:.0f}+{repaired:.0f}" if repairs else percent(row["recalled"])
+    if not repairs:
+        return percent(row["recalled"])
+    return Cell(f"{recalled:.0f}+{repaired:.0f}", recalled=recalled, repaired=repaired)
 
 
 def retrieval_groups(retrieval: pd.DataFrame) -> list[Rows]:
@@ -289,5 +301,7 @@ def _with_deviation(share: float, deviation: float) -> str:
     """A share in per cent, and its standard deviation over training seeds where there are several."""
     if math.isnan(share):
         return NOTHING
-    digits = 1 if deviation < 0.0995 else 0
-    return percent(share) + ("" if math.isnan(deviation) else f"±{100.0 * deviation:.{digits}f}")
+    if math.isnan(deviation):
+        return percent(share)
+    value, spread = 100.0 * share, 100.0 * deviation
+    return Cell(f"{percent(share)}±{spread:.{1 if spread < 9.95 else 0}f}", value=value, deviation=spread)

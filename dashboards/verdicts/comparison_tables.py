@@ -9,6 +9,7 @@ import pandas as pd
 
 from dashboards.cells import (
     NOTHING,
+    Cell,
     CellTable,
     Rows,
     decimals_of,
@@ -63,13 +64,16 @@ def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
 
 
 def _cells(row: dict[Any, Any], decimals: int, in_turn: bool) -> list[str]:
-    low, high = row["sooner_low_s"], row["sooner_high_s"]
+    sooner, low, high = row["sooner_s"], row["sooner_low_s"], row["sooner_high_s"]
+    first_ms, other_ms = row["first_ms"], row["ms"]
     counted = [_interval(row, "checks_reduction"), _both(row["first_recalled"], row["recalled"])]
     return [
         row["planner"],
         row["configuration"],
-        f"{row['first_ms']:,.{decimals}f}→{row['ms']:,.{decimals}f}",
-        NOTHING if low != low else f"{row['sooner_s']:+.1f} [{low:+.1f}, {high:+.1f}]",
+        Cell(f"{first_ms:,.{decimals}f}→{other_ms:,.{decimals}f}", first=first_ms, other=other_ms),
+        NOTHING
+        if low != low
+        else Cell(f"{sooner:+.1f} [{low:+.1f}, {high:+.1f}]", value=sooner, low=low, high=high),
         _both(row["first_solved"], row["solved"]),
         *([_interval(row, "reduction"), _interval(row, "mostly")] if in_turn else counted),
         f"{row['verdict']}: {row['why']}" if row["why"] else row["verdict"],
@@ -81,4 +85,6 @@ def _interval(row: dict[Any, Any], name: str) -> str:
 
 
 def _both(first: float, other: float) -> str:
-    return percent(other) if first == other else f"{percent(first)}→{percent(other)}"
+    if first == other:
+        return percent(other)
+    return Cell(f"{percent(first)}→{percent(other)}", first=100.0 * first, other=100.0 * other)

@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import pandas as pd
 
-from dashboards.cells import CellTable, Rows, as_markdown, decimals_of, percent, titled_tables
+from dashboards.cells import Cell, CellTable, Rows, as_markdown, decimal, decimals_of, percent, titled_tables
 from dashboards.statistics.intervals import CONFIDENCE, bootstrap
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
@@ -210,9 +210,14 @@ def _cells(row: dict[Any, Any], decimals: int) -> list[str]:
     return [
         row["planner"],
         row["configuration"],
-        *[f"{row[name]:,.{decimals}f}" for name in ("champion_ms", "ms")],
-        *[f"{row[name]:.1f}" for name in ("champion_driving_s", "driving_s")],
-        f"{_seconds(row['sooner_s'])} [{_seconds(row['low_s'])}, {_seconds(row['high_s'])}]",
+        *[decimal(row[name], decimals) for name in ("champion_ms", "ms")],
+        *[decimal(row[name], 1) for name in ("champion_driving_s", "driving_s")],
+        Cell(
+            f"{_seconds(row['sooner_s'])} [{_seconds(row['low_s'])}, {_seconds(row['high_s'])}]",
+            value=row["sooner_s"],
+            low=row["low_s"],
+            high=row["high_s"],
+        ),
         *[percent(row[name]) for name in ("champion_solved", "solved", "champion_hits", "hits")],
         row["verdict"],
     ]

@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from dashboards.cells import NOTHING
+from dashboards.cells import NOTHING, decimal
 from storage.places.files import read_json, write_json
 from storage.places.mirror import is_there
 from storage.places.run_folder import RunFolder
@@ -74,10 +74,10 @@ def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
 def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
     """The row of one stage; dashes if it did no chunk."""
     if load is None:
-        return [name, f"{seconds:,.1f}", *[NOTHING] * 5]
-    megabytes = [f"{size / 1e6:,.0f}" for size in (load.first_bytes, load.last_bytes)]
-    share = f"{100.0 * load.orchestration:.1f}"
-    return [name, f"{seconds:,.1f}", f"{load.chunks:,}", str(load.workers), share, *megabytes]
+        return [name, decimal(seconds, 1), *[NOTHING] * 5]
+    megabytes = [decimal(size / 1e6, 0) for size in (load.first_bytes, load.last_bytes)]
+    share = decimal(100.0 * load.orchestration, 1)
+    return [name, decimal(seconds, 1), f"{load.chunks:,}", str(load.workers), share, *megabytes]
 
 
 @functools.cache

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from dashboards.cells import NOTHING, CellTable
+from dashboards.cells import CellTable, decimal
 from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
@@ -228,15 +228,12 @@ def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
         whole = Plan(states, leg.controls, assistant.vehicle.dt)
         retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
         used_memory = leg.attempt.assist not in WITHOUT_MEMORY
+        figures = [scale * driven, scale * (whole.length_m - driven), whole.duration_s, scale * leg.begin[3]]
+        seconds = [leg.attempt.planning_seconds, retrieval if used_memory else math.nan]
         cells = [
-            f"{number}",
-            leg.source,
-            f"{scale * driven:.1f}",
-            f"{scale * (whole.length_m - driven):.1f}",
-            f"{whole.duration_s:.1f}",
-            f"{round(scale * leg.begin[3], 1) + 0.0:.1f}",
-            f"{1000.0 * leg.attempt.planning_seconds:.2f}",
-            f"{1000.0 * retrieval:.2f}" if used_memory else NOTHING,
+            *(f"{number}", leg.source),
+            *(decimal(figure, 1) for figure in figures),
+            *(decimal(1000.0 * each, 2) for each in seconds),
         ]
         rows.append(cells)
     return CellTable("", HEADINGS, [rows], "legs", FIELDS)

@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import Final, NamedTuple
 
-from dashboards.cells import NOTHING, CellTable
+from dashboards.cells import NOTHING, CellTable, decimal
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from storage.archives.libraries import is_library, save_library
@@ -123,7 +123,7 @@ def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
             each.name,
             f"{each.questions:,}",
             f"{len(each.seconds):,}",
-            f"{fmean(each.seconds):.1f}" if each.seconds else NOTHING,
+            decimal(fmean(each.seconds), 1) if each.seconds else NOTHING,
         ]
         for each in counts
     ]

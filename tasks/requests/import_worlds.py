@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-from dashboards.cells import CellTable
+from dashboards.cells import CellTable, decimal
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
@@ -194,7 +194,13 @@ def _cells(source: Source, part: str, imported: Imported, seconds: float) -> lis
     pieces = sum(len(problem.obstacles.piece_starts) - 1 for problem in imported.problems)
     mean = pieces / len(imported.problems) if imported.problems else 0.0
     counts = (len(imported.problems), len(imported.skipped), pieces)
-    return [source.class_name, part, *(f"{count:,}" for count in counts), f"{mean:.1f}", f"{seconds:.1f}"]
+    return [
+        source.class_name,
+        part,
+        *(f"{count:,}" for count in counts),
+        decimal(mean, 1),
+        decimal(seconds, 1),
+    ]
 
 
 def _warn_of_skipped(skipped: list[tuple[str, str]]) -> None:
