@@ -41,8 +41,23 @@ def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]
 
     On the way to a pose it is shorter: half as long again as the ``vehicle`` is ahead of its axle.
     """
-    x, y, heading = problem.start
-    metres = HEADING_M if problem.arrival is None else min(HEADING_M, 1.5 * vehicle.front)
+    return _tip(problem.start, HEADING_M if problem.arrival is None else _ahead_m(vehicle))
+
+
+def goal_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float] | None:
+    """The end of the line that shows the heading in the goal pose of ``problem``; None if any will do."""
+    arrival = problem.arrival
+    if arrival is None or arrival.heading is None:
+        return None
+    return _tip((*problem.goal, arrival.heading), _ahead_m(vehicle))
+
+
+def _ahead_m(vehicle: Vehicle) -> float:
+    return min(HEADING_M, 1.5 * vehicle.front)
+
+
+def _tip(pose: tuple[float, float, float], metres: float) -> tuple[float, float]:
+    x, y, heading = pose
     return x + metres * math.cos(heading), y + metres * math.sin(heading)
 
 

@@ -21,6 +21,7 @@ from dashboards.world_outlines import (
     checked,
     footprint_spacing_m,
     goal_state,
+    goal_tip,
     heading_tip,
     outlines,
     shown_states,
@@ -66,6 +67,9 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
     arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}
     axes.annotate("", heading_tip(problem, vehicle), problem.start[:2], arrowprops=arrow, zorder=6)
+    tip = goal_tip(problem, vehicle)
+    if tip is not None:
+        axes.annotate("", tip, problem.goal, arrowprops=arrow | {"color": ORANGE}, zorder=6)
     tip = speed_tip(problem)
     if tip is not None:
         speed = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.4}

@@ -11,6 +11,7 @@ from dashboards.web.svg import element, points, tooltip
 from dashboards.world_outlines import (
     CheckedPlan,
     goal_state,
+    goal_tip,
     heading_tip,
     outlines,
     shown_states,
@@ -62,6 +63,10 @@ def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
     (x, y, _), marks = problem.start, []
     if pose is not None:
         marks.append(_bodies(pose, vehicle, "goal pose"))
+    ahead = goal_tip(problem, vehicle)
+    if ahead is not None:
+        (x1, y1), (x2, y2) = problem.goal, ahead
+        marks.append(element("line", x1=x1, y1=y1, x2=x2, y2=y2, class_="heading asked"))
     if tip is not None:
         speed = tooltip(f"{problem.start_motion[0]:g} m/s at the start")
         marks.append(element("line", speed, x1=x, y1=y, x2=tip[0], y2=tip[1], class_="speed"))

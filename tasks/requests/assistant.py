@@ -20,7 +20,7 @@ from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.exchange.problems import read_problems
@@ -101,7 +101,13 @@ class Assistant:
             address = _folder_of(class_name, Path(address))
         if address not in self._memories:
             self._memories[address] = load_from(address, self.vehicle)
-        return self._memories[address]
+        memory, recall = self._memories[address], self.settings.recall
+        if isinstance(memory, PlanLibrary) and recall is not None:
+            raise UsageError(
+                f"--recall {recall} is for memories of runs; {address} is a library, which recalls in one "
+                "way. Leave --recall out."
+            )
+        return memory
 
     def warm_up(self, problem: Problem) -> None:
         """Attempt the mirror image of a problem at least once, and for ``WARM_SECONDS`` if it is quick.
@@ -226,7 +232,8 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
     memory = assistant.memory_of(problem.class_name)
     ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
-    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale)
+    by_parts = isinstance(memory, PlanLibrary) or not is_canonical(canonical)
+    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, by_parts)
 
 
 def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:

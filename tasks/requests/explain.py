@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
-from dashboards.cells import NOTHING, CellTable
+from dashboards.cells import NOTHING, Cell, CellTable
 from planners.attempt import Attempt
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
@@ -19,6 +19,12 @@ USES: Final = {
     "repaired": "repaired",
     "guide": "guided the search",
     "": "",
+}
+_PARTS: Final = {  # by the source of the answer, where parts of plans are recalled and not whole ones
+    "recalled": "parts {}, driven again",
+    "repaired": "the search joined the end of one {}",
+    "searched": "no part {} leads to the goal more quickly than what was found without them",
+    None: "no part {} leads to the goal, and nothing else was found",
 }
 HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
 FIELDS: Final = (
@@ -34,6 +40,7 @@ def log_explanation(
     memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
+    by_parts: bool,
 ) -> None:
     """Log how the memory was used, a table of the recalled plans, the work done and the times.
 
@@ -42,8 +49,9 @@ def log_explanation(
         memory: the memory or library that was used, or None.
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
         scale: how many metres of the problem are one canonical metre.
+        by_parts: whether parts of plans can answer the problem, and not whole ones.
     """
-    _LOG.info(_recall_line(attempt, memory, recalled))
+    _LOG.info(_recall_line(attempt, memory, recalled, by_parts))
     if recalled:
         _LOG.info(_table(recalled, scale))
     work = f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions"
@@ -52,29 +60,31 @@ def log_explanation(
 
 
 def _recall_line(
-    attempt: Attempt, memory: Memory | PlanLibrary | None, recalled: Sequence[tuple[Recollection, Plan]]
+    attempt: Attempt,
+    memory: Memory | PlanLibrary | None,
+    recalled: Sequence[tuple[Recollection, Plan]],
+    by_parts: bool,
 ) -> str:
     if memory is None:
         return f"recall   no memory was used ({attempt.assist}, {attempt.planner})"
-    line = f"recall   {attempt.recall}, {len(recalled)} of {len(memory.plans):,} plans of {memory.class_name}"
-    if not recalled and attempt.source == "recalled":
-        return f"recall   parts of {len(memory.plans):,} plans of {memory.class_name}, driven again"
-    if not recalled and attempt.source == "repaired":
-        return (
-            f"recall   the search joined the end of one of {len(memory.plans):,} plans of {memory.class_name}"
-        )
+    of_them = f"of {len(memory.plans):,} plans of {memory.class_name}"
     if not recalled:
-        return f"{line}: no stored plan seemed likely to fit"
+        told = _PARTS[attempt.source] if by_parts else "no plan {} seemed likely to fit"
+        return f"recall   {told.format(of_them)}"
     free = sum(
         not (recollection.blocked.any() or recollection.goal_missed_m > 1e-9) for recollection, _ in recalled
     )
-    return f"{line}, {free or 'none'} of them free; rank by the encoder, cells and states in collision:"
+    quicker = ", but the search found a quicker one" if free and attempt.source == "searched" else ""
+    return (
+        f"recall   {attempt.recall}, {len(recalled)} {of_them}, {free or 'none'} of them free{quicker}; "
+        "rank by the encoder, cells and states in collision:"
+    )
 
 
 def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellTable:
     rows = []
     for position, (recollection, plan) in enumerate(recalled, start=1):
-        first = recollection.first_blocked
+        first, blocked = recollection.first_blocked, int(recollection.blocked.sum())
         x, y = (0.0, 0.0) if first is None else scale * plan.states[first, :2]
         missed_m = recollection.goal_missed_m
         missed = f"ends {scale * missed_m:.1f} m off the goal" if missed_m > 1e-9 else ""
@@ -83,9 +93,9 @@ def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellT
             f"{recollection.plan}",
             f"{recollection.encoder_rank}",
             NOTHING if recollection.blocked_cells is None else f"{recollection.blocked_cells}",
-            f"{int(recollection.blocked.sum())} of {len(recollection.blocked)}",
+            Cell(f"{blocked} of {len(recollection.blocked)}", value=blocked, of=len(recollection.blocked)),
             NOTHING if first is None else f"{first}",
-            NOTHING if first is None else f"({x:.1f}, {y:.1f})",
+            NOTHING if first is None else Cell(f"({x:.1f}, {y:.1f})", x=x, y=y),
             USES[recollection.use] or missed,
         ]
         rows.append(cells)

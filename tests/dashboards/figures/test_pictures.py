@@ -15,7 +15,14 @@ from shapely import Polygon, affinity, box
 
 from dashboards.figures.pictures import Example, draw_plan, draw_recalled, gallery, picture
 from dashboards.figures.style import save
-from dashboards.world_outlines import CheckedPlan, checked, footprint_spacing_m, goal_state, speed_tip
+from dashboards.world_outlines import (
+    CheckedPlan,
+    checked,
+    footprint_spacing_m,
+    goal_state,
+    goal_tip,
+    speed_tip,
+)
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import (
     BOUNDS,
@@ -124,7 +131,11 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
         [len(figure.findobj(kind)) for figure in drawn] for kind in (PolyCollection, Annotation)
     )
     assert bodies[1] == bodies[0] + 1
-    assert arrows[1] == arrows[0] + 1
+    assert arrows[1] == arrows[0] + 2  # the speed, and the heading at the goal
+    tip = goal_tip(asked, vehicle)
+    assert tip is not None
+    assert math.atan2(tip[1] - CANONICAL_GOAL[1], tip[0] - CANONICAL_GOAL[0]) == pytest.approx(1.0)
+    assert goal_tip(plain, vehicle) is None
     state = goal_state(asked, vehicle)
     assert state is not None
     assert state[0, :3] == pytest.approx((*CANONICAL_GOAL, 1.0))

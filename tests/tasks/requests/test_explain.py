@@ -10,6 +10,7 @@ import pytest
 
 from flows.cli.main import call
 from planners.explanation import recollections
+from planners.memory.library.plan_library import gathered_library
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.search.help import PATIENCE
@@ -19,6 +20,7 @@ from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
+from storage.archives.libraries import save_library
 from storage.archives.memories import save_memory
 from storage.exchange.problems import write_problems
 from storage.tables.attempts import read_attempts
@@ -77,6 +79,44 @@ def test_the_command_tells_and_draws_it(
     assert marked.read_bytes() != plain.read_bytes()
     assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
     assert "no memory" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Plans that turn round a wall which no other problem has."""
+    found = [solve(strewn(seed, 30), "lattice").plan for seed in range(3)]
+    folder = tmp_path_factory.mktemp("library") / "library"
+    plans = [("test", plan) for plan in found if plan is not None]
+    save_library(folder, gathered_library("test", CAR, plans))
+    return folder
+
+
+def test_it_never_says_that_a_library_had_nothing_likely(
+    library: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = {}
+    for seed in range(20, 26):
+        write_problems(tmp_path / "one.json", [strewn(seed, 30)])
+        asked = ["plan", str(tmp_path / "one.json"), "--memory", str(library), "--explain"]
+        assert call(asked) == 0
+        line, *_, source = (line for line in capsys.readouterr().out.splitlines() if line)
+        told[source.partition(",")[0]] = line
+        assert "likely" not in line
+    assert len(set(told.values())) == len(told)  # where the answer came from is told
+
+
+@pytest.mark.parametrize("command", ["plan", "solve"])
+def test_a_strategy_of_recall_is_refused_for_a_library(
+    library: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    write_problems(tmp_path / "one.json", [strewn(20, 30)])
+    out = tmp_path / ("plan.json" if command == "plan" else "rows.parquet")
+    asked = [command, str(tmp_path / "one.json"), "--memory", str(library), "--out", str(out)]
+    assert call([*asked, "--recall", "encoder"]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "--recall encoder" in told
+    assert not out.exists()
 
 
 def test_a_memory_that_is_given_is_used_whether_an_assist_is_named_or_not(
