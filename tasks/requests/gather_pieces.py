@@ -171,7 +171,7 @@ def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:
 
 def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
     """What is kept for a question: a polished plan, perhaps that of the search too, or nothing."""
-    attempt = solve(question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
+    attempt = solve(*(question, COLLECTOR), seed=seed, vehicle=vehicle, workspace=workspace, polished=False)
     if attempt.plan is None:
         return []
     scene = scene_of(question)

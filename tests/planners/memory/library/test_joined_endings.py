@@ -30,7 +30,7 @@ def slot(number: int) -> Problem:
 
 def alone(number: int, workspace: Workspace) -> Attempt:
     """The search without memory."""
-    return solve(slot(number), "lattice", workspace=workspace)
+    return solve(slot(number), "lattice", workspace=workspace, polished=False)
 
 
 def library_of(numbers: range, workspace: Workspace) -> PlanLibrary:
@@ -57,3 +57,14 @@ def test_what_is_only_recalled_joins_nothing(workspace: Workspace) -> None:
         solve(slot(number), "lattice", "closed", memory=library, workspace=workspace) for number in SLOTS
     ]
     assert all(attempt.source != "repaired" for attempt in closed)
+
+
+@pytest.mark.parametrize("number", SLOTS)
+def test_a_polished_plan_to_a_pose_drives_no_longer_and_is_right(number: int, workspace: Workspace) -> None:
+    found = alone(number, workspace)
+    polished = solve(slot(number), "lattice", workspace=workspace)
+    assert found.plan is not None
+    assert polished.plan is not None
+    assert polished.plan.duration_s <= found.plan.duration_s
+    assert (polished.source, polished.expansions) == (found.source, found.expansions)
+    assert not faults(slot(number), polished.plan, CAR)
