@@ -11,8 +11,8 @@
 
 By cells, the plans that are likely to be free are tried, the quickest first, and then some that may be free.
 To check all others in vain would cost a planner that is soon done more than the few that are free would save.
-So where more than half of the plans seem free, the least blocked half is looked at first: if none of these is
-free, no other is tried.
+So where more than three quarters of the plans seem free, that many, the least blocked, are looked at first:
+if none of these is free, no other is tried.
 
 In a large memory ``hybrid`` and ``exhaustive`` try the first thousand plans before the others. If any plan is
 free, one of these mostly is, so the time to find it does not grow with the memory.
@@ -43,7 +43,7 @@ CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
 LIKELY_CELLS: Final = 16  # blocked cells: where a plan with more is free, one with fewer mostly is, too
 POSSIBLE_CELLS: Final = 24  # blocked cells: on curves at hard only such plans are free in 9 % of problems
-TELLING: Final = 48  # the least blocked plans, and at least half of all: if none is free, no other is tried
+TELLING: Final = 72  # the least blocked, and at least three quarters: if none is free, no other is tried
 
 
 class Recalled(NamedTuple):
@@ -115,7 +115,7 @@ def recall(
         worth = int(ends[WORTH_CELLS])
         if strategy == "mask":
             order, tries = order[: min(k, worth)], None
-        elif len(tries) > (told := max(TELLING, len(order) // 2)):
+        elif len(tries) > (told := max(TELLING, 3 * len(order) // 4)):
             telling = order[:told]
     if tries is None:
         tries = shortest_first(memory, order, likely)
