@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import time
@@ -14,11 +13,12 @@ import distributed
 import psycopg2
 import pytest
 
-from storage.places.data_folder import DataFolder, open_data_folder
+from storage.places.data_folder import open_data_folder
 from storage.places.mirror import fetch, files_in
 from storage.places.run_folder import RunFolder
-from tests.cluster.machines import ROOT, Fleet, fleet, wait_for
+from tests.cluster.machines import Fleet, fleet, wait_for
 from tests.flows.same_rows import assert_same_rows
+from tests.flows.small_run import in_one_process
 
 RUN = (
     "run", "--preset", "smoke", "--classes", "trap", "--experiences", "4", "--candidates", "8",
@@ -38,17 +38,6 @@ def machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fleet]
         yield made
 
 
-def _local_run(folder: Path) -> subprocess.Popen[bytes]:
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(("PREFECT_", "MLFLOW_", "MOTION_MEMORY_", "DASK_"))
-    }
-    command = [sys.executable, "-m", "flows.cli.main", *RUN, "--data", str(folder), "--workers", "2"]
-    with (folder.parent / "local.log").open("wb") as log:
-        return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
-
-
 def _is_at(client: distributed.Client, name: str, what: str) -> bool:
     """Whether the worker of that name is in a chunk of that kind."""
     named = {
@@ -63,7 +52,7 @@ def _fetched(run: RunFolder) -> RunFolder:
     return run
 
 
-def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of_a_local_run(
+def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of_one_process(
     machines: Fleet, tmp_path: Path
 ) -> None:
     import boto3
@@ -75,10 +64,8 @@ def test_two_machines_one_killed_and_every_service_failing_once_give_the_rows_of
         run = _disturb(machines, running)
     except AssertionError as error:
         raise AssertionError(f"{error}\n{machines.logs()}") from error
-    local = _local_run(tmp_path / "local")
+    undisturbed = in_one_process(run, tmp_path / "local")
     assert running.wait(timeout=300) == 0, machines.logs()
-    assert local.wait(timeout=300) == 0, (tmp_path / "local.log").read_text()[-2000:]
-    (undisturbed,) = DataFolder(tmp_path / "local").runs()
     assert len(assert_same_rows(_fetched(run), undisturbed)) >= 6
     _check_databases(machines, run.path.name)
     _check_nobody_holds_it(machines)

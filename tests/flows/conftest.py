@@ -37,7 +37,8 @@ def small_runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Smal
             command = ["run", *small_run.OPTIONS, "--data", str(first), "--workers", "2"]
             watched = watch(command, shared / "small-run.log", PLANTED)
             assert watched.code == 0, watched.output[-2000:]
-            small_run.in_one_process(first, second)
+            (run,) = DataFolder(first).runs()
+            small_run.in_one_process(run, second)
             seen.write_text(json.dumps([watched.output, sorted(watched.ports)]))
     output, ports = json.loads(seen.read_text())
     (two,), (one,) = DataFolder(first).runs(), DataFolder(second).runs()

@@ -7,6 +7,7 @@ from typing import Any, Final
 from unittest.mock import patch
 
 from storage.places.data_folder import DataFolder, open_data_folder
+from storage.places.run_folder import RunFolder
 from tasks.fan_out.stage import Stage
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.stages import build_memory
@@ -31,11 +32,12 @@ COLLECTING: Final[tuple[Stage[Any], ...]] = (COLLECT, COLLECT_GAINED, CURATE, KE
 LATER: Final[tuple[Stage[Any], ...]] = (HALLUCINATE, RELABEL, TRAIN, BUILD_MEMORY, MEASURE_RECALL, BENCHMARK)
 
 
-def in_one_process(first: Path, second: Path) -> None:
-    """Do the stages of the run in the first data folder once more, in the second, chunks in reverse order."""
-    (run,) = DataFolder(first).runs()
+def in_one_process(run: RunFolder, second: Path) -> RunFolder:
+    """Do the stages of a run once more in this process, in a second data folder, chunks in reverse order."""
     settings, data = recorded_settings(run), str(open_data_folder(second).path)
     with patch.object(build_memory, "_draw"):  # seconds of pictures
         collect(data, settings, backwards=True)
         for stage in LATER:
             run_stage(stage, data, settings, backwards=True)
+    (again,) = DataFolder(second).runs()
+    return again
