@@ -51,7 +51,7 @@ for command in (
     *(stages.run, stages.collect, stages.hallucinate, stages.train, stages.build_memory, stages.benchmark),
     *(stages.report, stages.sweep, stages.experience_curve),
     *(problems.draw, problems.plan, problems.optimise, problems.solve),
-    *(maps.import_worlds, maps.gather, maps.route),
+    *(maps.import_worlds, maps.gather, maps.adapt, maps.route),
     *(results.verify, results.export, results.compare, serving.dashboard),
     *(serving.serve_memory, serving.servers),
     *(operations.retrain, operations.serve, operations.promote, operations.rollback),

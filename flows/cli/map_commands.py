@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -14,6 +15,7 @@ from flows.cli.solve_options import MapOptions, SolveOptions
 from flows.cli.terminal import write, write_answer, write_files
 
 if TYPE_CHECKING:
+    from tasks.requests.adapt_pieces import AdaptPiece, Driven
     from tasks.requests.gather_pieces import Gathered, GatherRequest
 
 _AS_IT_IS: Final = MapOptions()
@@ -109,6 +111,40 @@ def _gather_pieces(request: GatherRequest) -> list[Gathered]:
     from flows.gather import gather as flow  # late: Prefect reads its environment when it is imported
 
     return flow(request)
+
+
+def adapt(
+    memory: str,
+    /,
+    *,
+    vehicle: str,
+    out: Path,
+    seed: int = 1,
+    workers: int | None = None,
+) -> None:
+    """Drive the plans of a memory or library again as another vehicle, and keep those that pass the judge.
+
+    A repeated command continues where it stopped.
+
+    Args:
+        memory: Folder of a memory, a library or a run, or a model in MLflow.
+        vehicle: Who is to drive: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of
+            another.
+        out: Folder of the new memory or library, which may replace an earlier one.
+        seed: Decides the problems by which the plans of a memory are ranked anew.
+        workers: Worker processes; default one for each core.
+    """
+    from tasks.requests.adapt import adapt as task
+
+    kept = task(memory, vehicle, out, seed, worker_count(workers), _adapt_pieces)
+    write_answer(kept.summary, **kept.answer)
+    write_files(memory=out)
+
+
+def _adapt_pieces(pieces: Sequence[AdaptPiece]) -> Sequence[Driven]:
+    from flows.adapt import adapt as flow  # late: Prefect reads its environment when it is imported
+
+    return flow(pieces)
 
 
 def route(

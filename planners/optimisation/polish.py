@@ -28,6 +28,7 @@ ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 240  # where a drive must arrive as asked; some 80 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 ROOM: Final = 256  # steps, in which buffers grow
+MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
 NEVER: Final = 1 << 30  # steps
 # strength, range and least gain in metres: obstacles push from far and softly first, then only close to them
 STAGES: Final = ((0.1, 1.0, 0.2), (0.03, 0.5, 0.06), (0.01, 0.3, 0.02))
@@ -73,6 +74,43 @@ def polish(
     model.states[: steps + 1] = simulate(start_state(problem, vehicle), plan.controls, vehicle)
     arriving = problem.arrival not in (None, Arrival())
     return _polished(plan, model, steps, goal, arriving, vehicle, scene, iterations, margin_m, seconds)
+
+
+def driven_near(
+    problem: Problem, guess: Floats, vehicle: Vehicle, scene: Scene, workspace: Workspace
+) -> Polished:
+    """Find a drive near a guess whose steps need not lead from state to state: the gaps are closed.
+
+    Args:
+        problem: what the drive is for; it asks for a pose.
+        guess: states ``[T, S]`` of the vehicle, the first one at the problem's start.
+        vehicle: what is driven.
+        scene: ``scene_of(problem)``.
+        workspace: the caller's buffers.
+
+    Returns:
+        The first free drive that arrives as asked, with a little more time if it needs it; else no plan.
+    """
+    steps = len(guess) - 1
+    model, goal = _ready(problem, 2 * steps + ROOM, vehicle, workspace)
+    model.best_states[: steps + 1] = guess
+    model.best_states[0] = start_state(problem, vehicle)
+    circles = circles_around(scene)
+    widest = min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
+    used = 0
+    for share in MORE_TIME:
+        more = math.ceil(share * steps)
+        for way in WAYS:
+            barrier = Barrier(way.strength, RANGE_M, 0.0, widest)
+            tries, done = shorten(
+                *(model, steps, -more, way, MOST_TRIES, goal, barrier, vehicle, scene, circles)
+            )
+            used += tries
+            if done:
+                found = steps + more
+                states, controls = model.best_states[: found + 1].copy(), model.best_controls[:found].copy()
+                return Polished(Plan(states, controls, vehicle.dt), used)
+    return Polished(None, used)
 
 
 def most_iterations(problem: Problem) -> int:

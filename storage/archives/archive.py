@@ -23,7 +23,7 @@ from storage.errors import StorageError
 from storage.fields import parse_json
 from storage.places.files import local_text, whole_folder
 from storage.places.mirror import fetch_folder
-from storage.vehicles.recorded_vehicle import fields_of, refuse_another
+from storage.vehicles.recorded_vehicle import fields_of, refuse_another, vehicle_recorded
 
 VERSION: Final = 2  # one more whenever an older program could no longer read an archive
 LARGEST_HEADER_BYTES: Final = 1 << 24
@@ -105,6 +105,14 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
         if digest != listed[name]["sha256"]:
             raise _damaged(folder / name, kind)
     return header, {name: contents for name, (contents, _) in files.items()}
+
+
+def archived_vehicle(folder: Path, kind: str) -> Vehicle:
+    """The vehicle that an archive is made for; raises StorageError as ``read_archive`` does."""
+    vehicle = vehicle_recorded(_header(folder, kind).get("vehicle"))
+    if vehicle is None:
+        raise StorageError(f"{folder} was made for a vehicle that this program does not know; make it again.")
+    return vehicle
 
 
 def _header(folder: Path, kind: str) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from planners.memory.memory import Memory
 from planners.memory.plans.plan_arrays import StoredPlans
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
-from storage.archives.archive import read_archive, write_archive
-from storage.archives.memories import load_memory
+from storage.archives.archive import archived_vehicle, read_archive, write_archive
+from storage.archives.memories import is_memory, load_memory
 from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
 from storage.errors import StorageError
 from storage.fields import scale_of, short, text_of
@@ -66,6 +66,16 @@ def is_library(folder: Path) -> bool:
     """Whether a ``folder`` holds a library, whole or not, and nothing else."""
     names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
     return _HEADER in names and names <= {_HEADER, *PLAN_FILES}
+
+
+def is_memory_or_library(folder: Path) -> bool:
+    """Whether a ``folder`` holds a memory or a library, whole or not, and nothing else."""
+    return is_memory(folder) or is_library(folder)
+
+
+def vehicle_of(folder: Path) -> Vehicle:
+    """The vehicle for which the memory or the library in a ``folder`` was made. Raises as loading does."""
+    return archived_vehicle(folder, _KIND if (folder / _HEADER).is_file() else "memory")
 
 
 def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:

@@ -118,6 +118,12 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         raise StorageError(f"{folder} is no whole memory ({reason}); build it again.") from None
 
 
+def is_memory(folder: Path) -> bool:
+    """Whether a ``folder`` holds a memory, whole or not, and nothing else."""
+    names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
+    return f"{_KIND}.json" in names and names <= {f"{_KIND}.json", _LISTS, _UNREAD, *_FILES}
+
+
 def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
     """The sweeps with the stored boxes. Raises ValueError if boxes or masks are not those of the plans."""
     sweeps = sweeps_with(boxes, plans)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from statistics import fmean
@@ -16,7 +17,6 @@ from storage.archives.libraries import is_library, save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
-from tasks.fan_out.progress import progress
 from tasks.requests.gather_pieces import (
     GATHER,
     Gathered,
@@ -24,7 +24,13 @@ from tasks.requests.gather_pieces import (
     GatherRequest,
     gather_pieces,
 )
-from tasks.requests.part_folder import part_workers, parts_folder, unfinished
+from tasks.requests.part_folder import (
+    do_here,
+    part_workers,
+    parts_folder,
+    refuse_foreign,
+    unfinished,
+)
 from tasks.requests.question_sources import is_drawn
 from tasks.settings.checks import check_count, check_outputs
 from tasks.settings.errors import RunError, UsageError
@@ -90,11 +96,11 @@ def gather(
     if not 0.0 <= poses <= 1.0:
         raise UsageError(f"A share of {poses:g} poses: give 0 to 1.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
-    _refuse_foreign(out)
+    refuse_foreign(out, is_library, "library")
     request = GatherRequest(tuple(sources), out, plans, poses, settings)
     with unfinished(out):
         if flow is None or workers == 1 or plans <= FEW_PLANS:
-            results = gather_pieces(request, _in_this_process)
+            results = gather_pieces(request, partial(do_here, GATHER))
         else:
             with part_workers(out, workers):
                 results = flow(request)
@@ -137,23 +143,6 @@ def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
     own = {f"plans_{each.name}": float(len(each.seconds)) for each in counts}
     totals = {"questions": questions, "plans": len(seconds), "answered": len(seconds) / questions}
     return {**totals, "driving_seconds": fmean(seconds), **own}
-
-
-def _refuse_foreign(out: Path) -> None:
-    """Raise UsageError if there is anything at ``out`` but an earlier library."""
-    if out.exists() and not (is_library(out) or (out.is_dir() and not any(out.iterdir()))):
-        raise UsageError(f"{out} exists and is no library; give --out the name of a new folder.")
-
-
-def _in_this_process(pieces: Sequence[GatherPiece]) -> list[Gathered]:
-    results = []
-    done = 0
-    with progress(GATHER.title, sum(map(GATHER.units, pieces))) as show:
-        for piece in pieces:
-            results.append((GATHER.kept(piece) or GATHER.run(piece)).result)
-            done += GATHER.units(piece)
-            show(done)
-    return results
 
 
 def _kept(request: GatherRequest, results: Sequence[Gathered]) -> tuple[list[Answered], Counter[int]]:

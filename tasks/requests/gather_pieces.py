@@ -17,17 +17,14 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
-from storage.errors import StorageError
 from storage.tables.experiences import write_experiences
-from storage.tables.schemas import EXPERIENCES
-from storage.tables.shards import read_table, shard_is_done
 from storage.vehicles.definitions import definition_of
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import source_at
 from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.part_folder import parts_folder
+from tasks.requests.part_folder import is_readable, parts_folder
 from tasks.requests.question_sources import QuestionSource, is_drawn, question_source
 
 COLLECTOR: Final = "lattice"
@@ -115,20 +112,12 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     return Gathered(asked, rows)
 
 
-def _is_readable(shard: Path, key: str) -> bool:
-    """Whether all of a shard can be read, and it was made from ``key``."""
-    try:
-        return shard_is_done(shard, key) and read_table(shard, EXPERIENCES) is not None
-    except StorageError:
-        return False
-
-
 GATHER: Final = Job(
     name="gather",
     do=gather_piece,
     result=Gathered,
     output=lambda piece: piece.shard,
-    is_whole=_is_readable,
+    is_whole=is_readable,
     units=lambda piece: PIECE,
     unit="questions",
 )

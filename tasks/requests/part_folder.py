@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from storage.errors import StorageError
 from storage.places.data_folder import MARK
 from storage.places.files import locked, remove_folder, remove_leftovers
+from storage.tables.schemas import EXPERIENCES
+from storage.tables.shards import read_table, shard_is_done
+from tasks.fan_out.progress import progress
+from tasks.fan_out.stage import AnyPiece, Job, Result
 from tasks.servers.prefect_server import local_server
+from tasks.settings.errors import UsageError
 
 
 def parts_folder(out: Path) -> Path:
@@ -45,6 +50,32 @@ def _is_own(entry: Path) -> bool:
     """Whether an ``entry`` of a parts folder is one that a command has left there."""
     is_part = entry.name[:6].isdigit() and entry.suffix in (".parquet", ".json")
     return is_part or entry.name.startswith(".") or entry.name in (MARK, "prefect")
+
+
+def do_here(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Result]:
+    """Do the pieces that are not done yet, in this process, and return the results of all."""
+    results = []
+    done = 0
+    with progress(job.title, sum(map(job.units, pieces))) as show:
+        for piece in pieces:
+            results.append((job.kept(piece) or job.run(piece)).result)
+            done += job.units(piece)
+            show(done)
+    return results
+
+
+def is_readable(shard: Path, key: str) -> bool:
+    """Whether all of a shard of experiences can be read, and it was made from ``key``."""
+    try:
+        return shard_is_done(shard, key) and read_table(shard, EXPERIENCES) is not None
+    except StorageError:
+        return False
+
+
+def refuse_foreign(out: Path, is_own: Callable[[Path], bool], called: str) -> None:
+    """Raise UsageError if there is anything at ``out`` but an empty folder or what ``is_own``."""
+    if out.exists() and not (is_own(out) or (out.is_dir() and not any(out.iterdir()))):
+        raise UsageError(f"{out} exists and is no {called}; give --out the name of a new folder.")
 
 
 @contextmanager

@@ -30,6 +30,7 @@ SECTIONS: Final = {
     "curation": "tests.speed.curation",
     "hallucination": "tests.speed.hallucination",
     "growth": "tests.speed.growth",
+    "adapted": "tests.speed.adapted",
 }
 
 

@@ -1,0 +1,137 @@
+"""The command ``adapt``: drive the plans of a memory as another vehicle, and keep those that pass."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from planners.memory.adaptation import Outcome
+from planners.memory.growth import grow
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.memory.memory import Memory
+from planners.memory.plans.experience import Experience
+from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.vehicles.vehicle import Vehicle, name_of
+from storage.archives.libraries import (
+    HEADERS,
+    is_memory_or_library,
+    load_memory_or_library,
+    save_library,
+    vehicle_of,
+)
+from storage.archives.memories import save_memory
+from storage.places.files import remove_folder
+from storage.tables.experiences import read_experiences
+from storage.vehicles.definitions import is_built_in
+from storage.vehicles.vehicle_files import label_of, said_vehicle
+from tasks.registry.memory_at import memory_at
+from tasks.requests.adapt_pieces import ADAPT, AdaptPiece, AdaptRequest, Driven
+from tasks.requests.part_folder import (
+    do_here,
+    part_workers,
+    parts_folder,
+    refuse_foreign,
+    unfinished,
+)
+from tasks.settings.checks import check_outputs, check_seed, checked_vehicle
+from tasks.settings.errors import RunError
+
+AdaptFlow = Callable[[Sequence[AdaptPiece]], Sequence[Driven]]
+
+FEW_PLANS: Final = 200  # so many take less time here than starting a server and workers
+LABELLED: Final = 500  # problems of each class, from which the readout of a memory is made anew
+GOOD: Final = (Outcome.WHOLE, Outcome.PART)
+
+
+class Kept(NamedTuple):
+    """What became of the stored plans."""
+
+    summary: str
+    answer: dict[str, Any]  # for programs
+
+
+def adapt(
+    memory: str, vehicle: str, out: Path, seed: int, workers: int = 1, flow: AdaptFlow | None = None
+) -> Kept:
+    """Drive the plans of a memory or a library as another vehicle, and write those that pass.
+
+    The same arguments give the same bytes, whatever the number of workers. If the command is killed, the same
+    command drives only the plans that are left.
+
+    Args:
+        memory: the address of a memory or a library: a folder, a run, or a model in MLflow.
+        vehicle: the other vehicle: a name, or the path of a file.
+        out: the folder to write; it may replace an earlier memory or library.
+        seed: of the problems from which the readout of a memory is made anew.
+        workers: number of worker processes.
+        flow: does the pieces in worker processes; None does everything in this process.
+
+    Raises:
+        UsageError: a name or a number is wrong, or there is something else at ``out``.
+        StorageError: the memory cannot be read.
+        RunError: no plan can be kept.
+    """
+    check_seed(seed)
+    new = said_vehicle(checked_vehicle(vehicle))
+    with memory_at(memory) as folder:
+        check_outputs([folder], [out])
+        refuse_foreign(out, is_memory_or_library, "memory or library")
+        old = vehicle_of(folder)
+        stored = load_memory_or_library(folder, old)
+        header = next(folder / name for name in HEADERS if (folder / name).is_file())
+        digest = hashlib.sha256(header.read_bytes()).hexdigest()
+        request = AdaptRequest(folder.absolute(), digest, len(stored.plans), old, new, out)
+        with unfinished(out):
+            if flow is None or workers == 1 or request.plans <= FEW_PLANS:
+                results: Sequence[Driven] = do_here(ADAPT, request.pieces)
+            else:
+                with part_workers(out, workers):
+                    results = flow(request.pieces)
+            kept = [each for piece in request.pieces for each in read_experiences(piece.shard, new)]
+            told = _told(old, new, [Outcome[name] for result in results for name in result.outcomes])
+            if not kept:
+                remove_folder(parts_folder(out))
+                raise RunError(f"{told.summary}. Gather plans of {name_of(new)} instead.")
+            _save(out, stored, new, kept, seed)
+            remove_folder(parts_folder(out))
+    return told
+
+
+def _told(old: Vehicle, new: Vehicle, outcomes: Sequence[Outcome]) -> Kept:
+    counts = Counter(outcomes)
+    good = sum(counts[each] for each in GOOD)
+    dropped = {each: counts[each] for each in Outcome if counts[each] and each not in GOOD}
+    parts = f" ({counts[Outcome.PART]} of them {Outcome.PART})" if counts[Outcome.PART] else ""
+    why = "; not kept: " + ", ".join(f"{count} {each}" for each, count in dropped.items()) if dropped else ""
+    answer = {
+        "vehicle": label_of(new),
+        "made_for": label_of(old),
+        "plans": len(outcomes),
+        "kept": good,
+        "kept_from_a_later_stop": counts[Outcome.PART],
+        "not_kept": {each.name.lower(): count for each, count in dropped.items()},
+    }
+    return Kept(f"{good} of {len(outcomes)} plans kept for {name_of(new)}{parts}{why}", answer)
+
+
+def _save(
+    out: Path, stored: Memory | PlanLibrary, vehicle: Vehicle, kept: Sequence[Experience], seed: int
+) -> None:
+    scales = stored.scales if is_built_in(vehicle) else (vehicle.scale,)
+    if isinstance(stored, PlanLibrary):
+        answered = [(each.problem.id, each.plan) for each in kept]
+        save_library(out, gathered_library(stored.class_name, vehicle, answered, scales))
+        return
+    metadata = {"adapted_from": label_of(stored.vehicle), "scales": list(scales)}
+    begun = replace(stored, vehicle=vehicle, metadata=metadata)
+    names = [name for name in stored.metadata.get("classes", [stored.class_name]) if name in CLASSES]
+    problems = [
+        problem_class(name, vehicle=vehicle).draw(seed, index)
+        for name in names or CLASSES
+        for index in range(LABELLED)
+    ]
+    save_memory(out, grow(begun, [each.plan for each in kept], problems))

@@ -1,0 +1,122 @@
+"""Pieces of adapting: some stored plans are driven as another vehicle, judged, and kept in a file."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from planners.memory.adaptation import Adaptation
+from planners.memory.library.plan_library import PlanLibrary
+from planners.memory.memory import Memory
+from planners.memory.plans.experience import Experience
+from planners.world.vehicles.vehicle import Vehicle
+from planners.world.workspace import Workspace
+from storage.archives.libraries import load_memory_or_library
+from storage.tables.experiences import write_experiences
+from storage.vehicles.definitions import definition_of
+from tasks.fan_out.keys import key_of
+from tasks.fan_out.stage import Job
+from tasks.requests.part_folder import is_readable, parts_folder
+
+PIECE: Final = 25  # plans: some seconds of work
+
+
+@dataclass(frozen=True)
+class AdaptRequest:
+    """Which memory to adapt, from which vehicle to which."""
+
+    memory: Path  # of a memory or a library
+    digest: str  # of its header, which holds checksums of everything else
+    plans: int  # that it holds
+    old: Vehicle
+    new: Vehicle
+    out: Path
+
+    @functools.cached_property
+    def key(self) -> str:
+        """A digest of everything that the plans depend on."""
+        return key_of("adapt", self.digest, definition_of(self.new))
+
+    @property
+    def pieces(self) -> list[AdaptPiece]:
+        """All plans, piece by piece."""
+        return [AdaptPiece(self, index) for index in range(-(-self.plans // PIECE))]
+
+
+@dataclass(frozen=True)
+class AdaptPiece:
+    """Some consecutive plans."""
+
+    request: AdaptRequest
+    index: int  # counted from 0
+    class_name: str = "plans"  # for messages
+
+    @property
+    def key(self) -> str:
+        """A digest of everything that its plans depend on."""
+        return key_of(self.request.key, self.index)
+
+    @property
+    def result(self) -> Path:
+        """The file that keeps its ``Driven``."""
+        return parts_folder(self.request.out) / f"{self.index:06d}-{self.key}.json"
+
+    @property
+    def shard(self) -> Path:
+        """The file with its plans."""
+        return parts_folder(self.request.out) / f"{self.index:06d}.parquet"
+
+    @property
+    def numbers(self) -> range:
+        """The numbers of its stored plans."""
+        return range(self.index * PIECE, min((self.index + 1) * PIECE, self.request.plans))
+
+
+class Driven(NamedTuple):
+    """What became of a piece."""
+
+    outcomes: list[str]  # of each stored plan
+
+
+def adapt_piece(chunk: AdaptPiece) -> Driven:
+    """Drive the plans of a piece as the new vehicle, and write those that the authority accepts."""
+    request, workspace = chunk.request, Workspace()
+    memory = _loaded(request.memory, request.digest, request.old)
+    canonical = isinstance(memory, Memory)
+    adaptation = Adaptation(request.old, request.new)
+    outcomes, kept = [], []
+    for number in chunk.numbers:
+        question = f"{memory.class_name}-{number}" if isinstance(memory, Memory) else memory.questions[number]
+        adapted = adaptation.adapted(memory.plans[number], question, canonical, workspace)
+        outcomes.append(adapted.outcome.name)
+        if adapted.question is not None:
+            kept += [Experience(adapted.question, plan, request.new) for plan in adapted.plans]
+    write_experiences(
+        chunk.shard,
+        kept,
+        planners=["adapt"] * len(kept),
+        seeds=[0] * len(kept),
+        planning_seconds=[0.0] * len(kept),
+        key=chunk.key,
+        vehicle=request.new,
+    )
+    return Driven(outcomes)
+
+
+@functools.lru_cache(maxsize=1)
+def _loaded(folder: Path, _digest: str, vehicle: Vehicle) -> Memory | PlanLibrary:
+    """The memory of this process, which is read once as long as it is the same."""
+    return load_memory_or_library(folder, vehicle)
+
+
+ADAPT: Final = Job(
+    name="adapt",
+    do=adapt_piece,
+    result=Driven,
+    output=lambda piece: piece.shard,
+    is_whole=is_readable,
+    units=lambda piece: len(piece.numbers),
+    unit="plans",
+)
