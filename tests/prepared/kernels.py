@@ -15,7 +15,7 @@ from planners.world.problem import Arrival
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle
 from planners.world.workspace import Workspace
 from tasks.attempts.compile_assists import EMPTY
-from tasks.session.warm_up import GROUPS
+from tasks.session.kernel_groups import GROUPS
 
 
 def compile_library(vehicle: Vehicle) -> None:
