@@ -19,7 +19,7 @@ from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
 from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import Recalled, default_recall, recall
 from planners.optimisation.polish import polish
-from planners.search.anytime import improve
+from planners.search.anytime import improve, search_and_polish
 from planners.search.guides.detour import SECOND_LOOK, is_detour, is_detour_from_motion
 from planners.search.guides.guidance import published_guidance
 from planners.search.help import PATIENCE, Help, fresh_guide
@@ -97,8 +97,9 @@ def solve(
     ``fresh``: search guided by a path over the grid.
     ``random-`` before an assist picks the plans blindly.
 
-    A plan to more than a place, a pose for example, is polished: in some milliseconds its drive gets seconds
-    shorter, because what parts and arcs are put together to stops and creeps where it need not.
+    A plan to more than a place, a pose for example, is polished, and a search for one goes on while shorter
+    ones are found soon: in some milliseconds the drive gets seconds shorter, because what parts and arcs are
+    put together to stops and creeps where it need not.
 
     Args:
         problem: its start at (0, 0), its goal on the diagonal (``to_canonical``).
@@ -111,7 +112,7 @@ def solve(
         vehicle: what is to be driven.
         strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
         workspace: the caller's buffers; by default new ones.
-        polished: whether plans to more than a place are polished; else they are as they were found.
+        polished: whether plans to more than a place are polished; else the first is as it was found.
 
     Raises:
         ValueError: Planner, assist or strategy is unknown, or the memory is missing or of another vehicle or
@@ -190,7 +191,8 @@ def solve(
             plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
             query = replace(query, guide=published_guidance(plans))
             view.lap("guide")
-        searched = PLANNERS[planner](query)
+        polishes = polished and problem.arrival is not None
+        searched = search_and_polish(planner, query, seed) if polishes else PLANNERS[planner](query)
         work += searched.collision_checks, searched.expansions, searched.nodes
         view.seconds["roadmap"] = searched.roadmap_seconds
         view.lap("search")
@@ -204,7 +206,7 @@ def solve(
             answer, source = searched.plan, "repaired" if repaired else "searched"
         elif answer is None:
             status = searched.status
-    if polished and answer is not None and problem.arrival is not None:
+    if source == "recalled" and polished and answer is not None and problem.arrival is not None:
         answer = polish(problem, answer, vehicle, view.scene, view.workspace).plan or answer
         view.lap("search")
     planning_seconds = perf_counter() - view.began

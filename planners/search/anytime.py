@@ -1,6 +1,7 @@
 """Improves a plan: polishes it, then searches again and again for one that is better once it is polished.
 
-Each search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with
+Plans to more than a place are always improved a little, since the first is rarely a good drive. Otherwise
+each search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with
 any of the planners as x). A plan within the bound is polished. The bound is a little above the best driving
 time at first, because a plan as a search finds it takes longer, and falls with each search in vain.
 """
@@ -9,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import NamedTuple
 
 from planners.optimisation.polish import most_iterations, polish
 from planners.search.guides.guidance import guidance
+from planners.search.outcome import Outcome
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.geometry.collision import Scene, scene_of
@@ -29,6 +31,9 @@ LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when a
 FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer before it is polished
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
+SHORTER = 0.9  # of the driving time of the plan before: so long may the next one to a pose take ...
+AGAIN = 1000  # ... and so many expansions its search
+POLISHED = 2  # of the last plans: which of them is quickest when polished cannot be told before
 
 
 class Improvement(NamedTuple):
@@ -127,3 +132,46 @@ def improve(
             budget *= GROWTH
             slack *= SLACK_KEPT
     return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes)
+
+
+def search_and_polish(planner: str, query: Query, seed: int) -> Outcome:
+    """Search, and again for a shorter plan while one is found soon; polish the last ones, keep the quickest.
+
+    Args:
+        planner: one of ``PLANNERS``.
+        query: what it is asked.
+        seed: of the further searches.
+
+    Returns:
+        The first search's outcome if it has no plan; else that of the search with the plan that drives
+        shortest, polished, with the work and the time of all.
+    """
+    found = [PLANNERS[planner](query)]
+    plan = found[0].plan
+    while plan is not None:
+        limits = replace(
+            query.limits,
+            expansions=min(AGAIN, query.limits.expansions),
+            bound_s=min(SHORTER * plan.duration_s, query.limits.bound_s),
+        )
+        rng = generator(seed, "again", query.problem.id, planner, len(found))
+        found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
+        plan = found[-1].plan
+    solved = found[:-1][-POLISHED:]
+    if not solved:
+        return found[0]
+    plans = [_polished(each.plan, query) for each in solved if each.plan is not None]
+    plan, best = min(zip(plans, solved, strict=True), key=lambda pair: pair[0].duration_s)
+    return replace(
+        best,
+        plan=plan,
+        collision_checks=sum(each.collision_checks for each in found),
+        expansions=sum(each.expansions for each in found),
+        nodes=sum(each.nodes for each in found),
+        roadmap_seconds=sum(each.roadmap_seconds for each in found),
+        search_seconds=sum(each.search_seconds for each in found),
+    )
+
+
+def _polished(plan: Plan, query: Query) -> Plan:
+    return polish(query.problem, plan, query.vehicle, query.scene, query.workspace).plan or plan

@@ -41,7 +41,10 @@ def library_of(numbers: range, workspace: Workspace) -> PlanLibrary:
 
 def test_ends_of_stored_plans_are_joined_and_the_drive_is_right(workspace: Workspace) -> None:
     library = library_of(SLOTS, workspace)
-    joined = [solve(slot(number), "lattice", "join", memory=library, workspace=workspace) for number in SLOTS]
+    joined = [
+        solve(slot(number), "lattice", "join", memory=library, workspace=workspace, polished=False)
+        for number in SLOTS
+    ]
     assert all(attempt.solved for attempt in joined)
     assert any(attempt.source == "repaired" for attempt in joined)
     for number, attempt in zip(SLOTS, joined, strict=True):
@@ -60,11 +63,13 @@ def test_what_is_only_recalled_joins_nothing(workspace: Workspace) -> None:
 
 
 @pytest.mark.parametrize("number", SLOTS)
-def test_a_polished_plan_to_a_pose_drives_no_longer_and_is_right(number: int, workspace: Workspace) -> None:
+def test_a_plan_to_a_pose_drives_no_longer_than_the_first_found_and_is_right(
+    number: int, workspace: Workspace
+) -> None:
     found = alone(number, workspace)
     polished = solve(slot(number), "lattice", workspace=workspace)
     assert found.plan is not None
     assert polished.plan is not None
     assert polished.plan.duration_s <= found.plan.duration_s
-    assert (polished.source, polished.expansions) == (found.source, found.expansions)
+    assert polished.expansions >= found.expansions
     assert not faults(slot(number), polished.plan, CAR)
