@@ -78,7 +78,8 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     and its boxes and masks must be the same to the last bit (kernels give the same bits everywhere): no plan
     may count as free because of boxes that are not its own, or that an older program made smaller. For 100
     plans that takes 4 ms, for 10,000 a quarter of a second (hashing the files: a sixth). Boxes are compared
-    and not replaced, so that processes go on sharing the files' memory.
+    and not replaced, so that processes go on sharing the files' memory; unless all are of other sizes, as
+    where an older version took other margins.
 
     Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version, for
     another vehicle or grid.
@@ -97,13 +98,14 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         check_floats(weights, weight_shapes(architecture))
         check_floats(readout, {"centroids": rows, "vectors": rows, "biases": rows[:1]})
         _check_scores(readout["vectors"], embedding_bound(weights))
-        masks = array_of(files["masks.npy"], "<u8", (GRID,))
+        boxes, masks = array_of(files["boxes.npy"], "<f8", (6,)), array_of(files["masks.npy"], "<u8", (GRID,))
+        sweeps, masks = _swept(boxes, masks, plans, vehicle)
         rows_of_lists = {"vectors": readout["vectors"], "biases": readout["biases"]}
         return Memory(
             class_name=checked_name(text_of(header["class"], "class")),
             vehicle=vehicle,
             plans=plans,
-            sweeps=_sweeps(array_of(files["boxes.npy"], "<f8", (6,)), masks, plans, vehicle),
+            sweeps=sweeps,
             masks=masks,
             centroids=readout["centroids"],
             vectors=readout["vectors"],
@@ -124,17 +126,26 @@ def is_memory(folder: Path) -> bool:
     return f"{_KIND}.json" in names and names <= {f"{_KIND}.json", _LISTS, _UNREAD, *_FILES}
 
 
-def _sweeps(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> PlanSweeps:
-    """The sweeps with the stored boxes. Raises ValueError if boxes or masks are not those of the plans."""
+def _swept(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> tuple[PlanSweeps, Bits]:
+    """The sweeps with the stored boxes, and masks; made anew if all stored boxes are of other sizes.
+
+    Raises ValueError if boxes or masks are not those of the plans.
+    """
     sweeps = sweeps_with(boxes, plans)
+    anew: list[tuple[Floats, Bits]] = []
     for first in range(0, len(plans), SWEPT_AT_ONCE):
         some = slice(first, first + SWEPT_AT_ONCE)
         again = sweep_plans(plans[some], vehicle)
-        begin = sweeps.starts[first]
-        same = np.array_equal(boxes[begin : begin + len(again.boxes)], again.boxes)
-        if not (same and np.array_equal(masks[some], masks_of(again))):
+        cells = masks_of(again)
+        stored = boxes[sweeps.starts[first] : sweeps.starts[first] + len(again.boxes)]
+        if np.array_equal(stored[:, :4], again.boxes[:, :4]) and (stored != again.boxes)[:, 4:].all():
+            anew.append((again.boxes, cells))
+        elif anew or not (np.array_equal(stored, again.boxes) and np.array_equal(masks[some], cells)):
             raise ValueError("its swept boxes or cells are not those of its plans")
-    return sweeps
+    if not anew:
+        return sweeps, masks
+    boxes, masks = (np.concatenate(parts) for parts in zip(*anew, strict=True))
+    return sweeps_with(boxes, plans), masks
 
 
 def _check_scores(vectors: Floats32, largest: float) -> None:
