@@ -27,6 +27,7 @@ from planners.world.workspace import Workspace
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 240  # where a drive must arrive as asked; some 80 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
+LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
 NEVER: Final = 1 << 30  # steps
@@ -225,10 +226,10 @@ def _shortened(
         model.best_controls[:steps] = model.controls[:steps]
     else:
         steps = best
-    fewer = 1 if best < NEVER else 0
-    used = number = in_vain = 0
-    growing = True
-    while used < iterations and in_vain < len(WAYS) and fewer < steps and perf_counter() < until:
+    leaps = LEAPS if best < NEVER else (0,)
+    fewer, growing = leaps[0], True
+    used = in_vain = number = 0
+    while used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and perf_counter() < until:
         way = WAYS[number]
         pushed = barrier._replace(strength=way.strength, range_m=RANGE_M)
         most = min(MOST_TRIES, iterations - used)
@@ -237,10 +238,11 @@ def _shortened(
         if done:
             steps -= fewer
             fewer = max(2 * fewer if growing else fewer, 1)
-            best, in_vain, growing = steps, 0, True
-        elif fewer > 1:
+            best, leaps, in_vain, growing = steps, LEAPS, 0, True
+        elif fewer > leaps[in_vain // len(WAYS)]:
             fewer, growing = fewer // 2, False
         else:
             in_vain += 1
             number = (number + 1) % len(WAYS)
+            fewer, growing = leaps[min(in_vain // len(WAYS), len(leaps) - 1)], True
     return best, used
