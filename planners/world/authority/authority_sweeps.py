@@ -204,15 +204,27 @@ Arc = tuple[Floats, Floats, Floats, Floats]  # centre and direction [2] at the b
 
 def _hits(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.CollisionObject) -> bool:
     """Whether ``body``, with corners within ``reach`` m of its centre, meets ``other`` on its arc."""
-    if fcl.collide(body, other, _TOUCHING, fcl.CollisionResult()):
+    begin, along, end, along_end = arc
+    at_begin, at_end = _pose(begin, along), _pose(end, along_end)
+    body.setTransform(at_end)  # what is met at the end only, FCL's continuous check misses sometimes
+    touches = _touches(body, other)
+    body.setTransform(at_begin)
+    if touches or _touches(body, other):
         return True
     result = fcl.ContinuousCollisionResult()
-    fcl.continuousCollide(body, _pose(*arc[2:]), other, other.getTransform(), _MOTION, result)
+    fcl.continuousCollide(body, at_end, other, other.getTransform(), _MOTION, result)
     return bool(result.is_collide) and _comes_near(body, arc, reach, other)
 
 
+def _touches(body: fcl.CollisionObject, other: fcl.CollisionObject) -> bool:
+    return bool(fcl.collide(body, other, _TOUCHING, fcl.CollisionResult()))
+
+
 def _comes_near(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.CollisionObject) -> bool:
-    """The same by conservative advancement: the body goes on as far as it is apart from the other."""
+    """The same by conservative advancement: the body goes on as far as it is apart from the other.
+
+    FCL's distances are sometimes too large, too, so it goes on by an eighth of the arc at most.
+    """
     begin, along, end, along_end = arc
     turn = math.atan2(along[0] * along_end[1] - along[1] * along_end[0], along @ along_end)
     half = 0.5 * turn
@@ -222,7 +234,9 @@ def _comes_near(body: fcl.CollisionObject, arc: Arc, reach: float, other: fcl.Co
     while share < 1.0 and apart >= _TOUCH:
         body.setTransform(_on_arc(begin, along, end, turn, share))
         apart = fcl.distance(body, other, _APART, fcl.DistanceResult())
-        share += apart / max(most, apart)
+        if _touches(body, other):
+            apart = 0.0
+        share += min(apart / max(most, apart), 1.0 / 8.0)
     body.setTransform(_pose(begin, along))
     return bool(apart < _TOUCH)
 

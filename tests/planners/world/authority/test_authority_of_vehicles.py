@@ -187,6 +187,18 @@ def test_what_the_kernel_calls_free_by_a_hair_the_authority_calls_free(vehicle: 
         assert {"Collision", "Bounds"}.isdisjoint(found)
 
 
+def test_what_is_met_in_the_last_state_only_is_found() -> None:
+    """A long thin triangle that FCL's continuous check passes by."""
+    start = np.array([0.31159235, 18.63086796, -1.71816949, 2.8829006, -0.618371066])
+    controls = np.array([[2.0, -0.6419639611204353]])
+    states = simulate_again(start, controls, CAR)
+    triangle = np.array([[-0.63508612, 16.81540298], [-13.65128994, 1.74187815], [-13.65086937, 1.74151492]])
+    _, (_, last) = _corners(states, CAR)
+    problem = problem_with(obstacles_of([[triangle]]), WIDE)
+    assert shapely.Polygon(last).intersects(shapely.Polygon(triangle))
+    assert "Collision" in kinds(faults(problem, Plan(states, controls), CAR))
+
+
 def _corners(states: Floats, vehicle: Vehicle) -> list[tuple[str, Floats]]:
     return [
         (body.name, np.array(polygon.exterior.coords[:-1]))
