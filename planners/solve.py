@@ -18,7 +18,6 @@ from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
 from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import Recalled, default_recall, recall
-from planners.optimisation.polish import polish
 from planners.search.anytime import improve, search_and_polish
 from planners.search.guides.detour import SECOND_LOOK, is_detour, is_detour_from_motion
 from planners.search.guides.guidance import published_guidance
@@ -153,13 +152,14 @@ def solve(
     status = Status.SOLVED
     work = np.array([recalled.checks + parts.checks, 0, 0])  # collision checks, expansions, nodes
     long = False
+    improves = polished and problem.arrival is not None
     if parts.plan is not None:
         answer, source = parts.plan, "recalled" if parts.recalled else "searched"
-        long = is_detour_from_motion(answer, parts.seconds, planner, problem)
+        long = not improves and is_detour_from_motion(answer, parts.seconds, planner, problem)
     elif memory is not None and recalled.free >= 0:
         answer, source = turned(memory.plans[recalled.free], problem.start[2]), "recalled"
         long = strategy != "centroid" and is_detour(answer, planner, view, vehicle)
-    if answer is None or long:
+    if answer is None or long or improves:
         given = limits or Limits()
         helps = (
             isinstance(memory, Memory)
@@ -178,7 +178,7 @@ def solve(
 
         query = Query(
             *(problem, generator(seed, "search", problem.id, planner), view.scene, view.workspace),
-            limits=given if answer is None else replace(given, expansions=min(given.expansions, SECOND_LOOK)),
+            limits=replace(given, expansions=min(given.expansions, SECOND_LOOK)) if long else given,
             vehicle=vehicle,
             occupied=view.drawn,
             beside=beside if helps else None,
@@ -191,8 +191,11 @@ def solve(
             plans = [turned(memory.plans[i], problem.start[2]).states for i in recalled.plans]
             query = replace(query, guide=published_guidance(plans))
             view.lap("guide")
-        polishes = polished and problem.arrival is not None
-        searched = search_and_polish(planner, query, seed) if polishes else PLANNERS[planner](query)
+        kept = False  # whether the plan that comes of it is the answer so far, polished
+        if improves:
+            searched, kept = search_and_polish(planner, query, seed, answer)
+        else:
+            searched = PLANNERS[planner](query)
         work += searched.collision_checks, searched.expansions, searched.nodes
         view.seconds["roadmap"] = searched.roadmap_seconds
         view.lap("search")
@@ -201,14 +204,13 @@ def solve(
             work += helper.cost()
             view.seconds["repair"] = helper.repair_seconds
             view.seconds["search"] -= helper.repair_seconds
-        if searched.plan is not None and (answer is None or searched.plan.duration_s < answer.duration_s):
+        if kept:
+            answer = searched.plan
+        elif searched.plan is not None and (answer is None or searched.plan.duration_s < answer.duration_s):
             repaired = searched.joined or (helper is not None and helper.is_repair(searched.plan))
             answer, source = searched.plan, "repaired" if repaired else "searched"
         elif answer is None:
             status = searched.status
-    if source == "recalled" and polished and answer is not None and problem.arrival is not None:
-        answer = polish(problem, answer, vehicle, view.scene, view.workspace).plan or answer
-        view.lap("search")
     planning_seconds = perf_counter() - view.began
 
     return Attempt(

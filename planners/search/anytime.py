@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from planners.optimisation.polish import most_iterations, polish
 from planners.search.guides.guidance import guidance
-from planners.search.outcome import Outcome
+from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.geometry.collision import Scene, scene_of
@@ -134,35 +134,47 @@ def improve(
     return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes)
 
 
-def search_and_polish(planner: str, query: Query, seed: int) -> Outcome:
+def search_and_polish(
+    planner: str, query: Query, seed: int, given: Plan | None = None
+) -> tuple[Outcome, bool]:
     """Search, and again for a shorter plan while one is found soon; polish the last ones, keep the quickest.
 
     Args:
         planner: one of ``PLANNERS``.
-        query: what it is asked.
+        query: what it is asked; its limits are those of all searches together.
         seed: of the further searches.
+        given: a plan to begin with in place of the first search.
 
     Returns:
-        The first search's outcome if it has no plan; else that of the search with the plan that drives
-        shortest, polished, with the work and the time of all.
+        The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
+        with the work and the time of all; and whether it is the given plan.
     """
-    found = [PLANNERS[planner](query)]
+    began = perf_counter()
+    found = (
+        [PLANNERS[planner](query)] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
+    )
     plan = found[0].plan
-    while plan is not None:
+    while plan is not None and plan.duration_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
-            expansions=min(AGAIN, query.limits.expansions),
+            expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
+            seconds=query.limits.seconds - (perf_counter() - began),
             bound_s=min(SHORTER * plan.duration_s, query.limits.bound_s),
         )
+        if limits.expansions <= 0 or limits.seconds <= 0.0:
+            break
         rng = generator(seed, "again", query.problem.id, planner, len(found))
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
         plan = found[-1].plan
-    solved = found[:-1][-POLISHED:]
+    solved = [(each, each.plan) for each in found if each.plan is not None][-POLISHED:]
     if not solved:
-        return found[0]
-    plans = [_polished(each.plan, query) for each in solved if each.plan is not None]
-    plan, best = min(zip(plans, solved, strict=True), key=lambda pair: pair[0].duration_s)
-    return replace(
+        return found[0], False
+    polished = [
+        (each, polish(query.problem, plan, query.vehicle, query.scene, query.workspace).plan or plan)
+        for each, plan in solved
+    ]
+    best, plan = min(polished, key=lambda pair: pair[1].duration_s)
+    whole = replace(
         best,
         plan=plan,
         collision_checks=sum(each.collision_checks for each in found),
@@ -171,7 +183,4 @@ def search_and_polish(planner: str, query: Query, seed: int) -> Outcome:
         roadmap_seconds=sum(each.roadmap_seconds for each in found),
         search_seconds=sum(each.search_seconds for each in found),
     )
-
-
-def _polished(plan: Plan, query: Query) -> Plan:
-    return polish(query.problem, plan, query.vehicle, query.scene, query.workspace).plan or plan
+    return whole, given is not None and best is found[0]

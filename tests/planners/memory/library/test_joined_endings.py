@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.search.query import Limits
+from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family
-from planners.world.problem import Problem
+from planners.world.problem import Arrival, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
+from tests.planners.world.strategies import problem_with
 
 SLOTS = range(6)
 
@@ -60,6 +67,23 @@ def test_what_is_only_recalled_joins_nothing(workspace: Workspace) -> None:
         solve(slot(number), "lattice", "closed", memory=library, workspace=workspace) for number in SLOTS
     ]
     assert all(attempt.source != "repaired" for attempt in closed)
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("arrival", [Arrival(), Arrival(heading=0.5, heading_tolerance=0.1)])
+def test_who_stands_at_the_goal_stays_there(planner: str, arrival: Arrival, workspace: Workspace) -> None:
+    there = replace(problem_with(obstacles_of([])), start=(1.0, 1.0, 0.5), goal=(1.03, 1.0), arrival=arrival)
+    attempt = solve(to_canonical(there)[0], planner, workspace=workspace)
+    assert attempt.duration_s == 0.0
+
+
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 2000))
+def test_all_searches_for_a_pose_keep_its_limit_together(
+    workspace: Workspace, number: int, expansions: int
+) -> None:
+    attempt = solve(slot(number), "lattice", limits=Limits(expansions=expansions), workspace=workspace)
+    assert attempt.expansions <= expansions
 
 
 @pytest.mark.parametrize("number", SLOTS)
