@@ -79,7 +79,9 @@ def plan(
     lines = []
     if found is not None:
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
-        lines.append(f"{attempt.source}, {times}")
+        gears = answer["gear_changes"]
+        changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
+        lines.append(f"{attempt.source}, {times}{changes}")
     write_answer(*lines, **answer)
     write_files(plan=out, picture=picture)
     if failure is not None:
@@ -168,9 +170,11 @@ def _write_summary(solved: SolvedMany) -> None:
     named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
     speed = f"{solved.solved_now / solved.seconds:,.0f} problems/s"
     mean_s, median_s, ninth_s = solved.planning_seconds
+    driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
         f"planning mean {1e3 * mean_s:.2f} ms, median {1e3 * median_s:.2f} ms, 90 % {1e3 * ninth_s:.2f} ms",
+        *([] if driving_s is None else [f"driving  mean {driving_s:.2f} s"]),
         f"speed    {speed}: {solved.solved_now:,} in {solved.seconds:,.1f} s",
         problems=count,
         solved=with_plan,
@@ -178,6 +182,7 @@ def _write_summary(solved: SolvedMany) -> None:
         planning_mean_seconds=mean_s,
         planning_median_seconds=median_s,
         planning_p90_seconds=ninth_s,
+        driving_mean_seconds=driving_s,
         solved_now=solved.solved_now,
         seconds=solved.seconds,
     )

@@ -63,6 +63,12 @@ class SolvedMany(NamedTuple):
         median, ninth = np.quantile(self.tally.seconds, [0.5, 0.9]).tolist()
         return float(self.tally.seconds.mean()), median, ninth
 
+    @property
+    def driving_seconds(self) -> float | None:
+        """Mean of the driving times, None if no plan was found."""
+        driving = self.tally.driving[np.isfinite(self.tally.driving)]
+        return float(driving.mean()) if len(driving) else None
+
 
 def solve_many(
     settings: AssistantSettings,

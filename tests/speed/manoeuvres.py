@@ -6,7 +6,8 @@ and planner the solved share, planning times (failures included), driving times 
 all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
 Bench-MR instead, where they lie beside the repository, and prints each beside the best driving time that is
 published. ``--memory LIBRARY`` also has the planners join plans of a library, of the one vehicle that
-``--vehicles`` names; "recalled" is the share of questions answered by a plan of which a part was stored.
+``--vehicles`` names; "recalled" is the share of questions answered by a plan of which a part was stored, and
+a line says how much sooner the robot is there so, with the 95 % interval, problems resampled.
 ``--optimise`` has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over
 Reeds-Shepp curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame
 of its problem.
@@ -22,6 +23,7 @@ from typing import Final
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy.stats import bootstrap
 
 from planners.search.registry import PLANNERS
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
@@ -37,6 +39,7 @@ from tests.speed.manoeuvre_attempts import SEED, Peer, Row, attempted
 
 OMPL: Final = "OMPL RRT-Connect, paths"
 OMPL_LIMIT_S: Final = 5.0
+NOTICED_S: Final = 0.05  # by so much a robot is later at least to be counted as later
 
 
 def measured(
@@ -56,11 +59,12 @@ def measured(
     return rows
 
 
-def family_table(asked: argparse.Namespace) -> tuple[Table, list[str]]:
-    """The table of the families, and what the authority refused."""
+def family_table(asked: argparse.Namespace) -> tuple[Table, list[str], list[str]]:
+    """The table of the families, what the authority refused, and what the library is worth."""
     title = f"Manoeuvres from scratch, {asked.questions} questions each, seed {SEED}"
     table = _table(title, ("family", "difficulty", "vehicle", "planner"))
     refused = []
+    worth = []
     for name, difficulty, vehicle in _asked_families(asked):
         drawn = family(name, difficulty, vehicle)
         problems = [drawn.draw(SEED, index) for index in range(asked.questions)]
@@ -70,10 +74,29 @@ def family_table(asked: argparse.Namespace) -> tuple[Table, list[str]]:
             refused += [f"{row.attempt.problem_id} {planner}: {row.fault}" for row in found if row.fault]
             label = name, difficulty, vehicle.about.name.decode()
             table.add_row(*label, str(planner), *_cells(found, by_all))
+        worth += [
+            f"{name} {difficulty}, {planner}: {_sooner(rows[planner._replace(library=None)], found)}"
+            for planner, found in rows.items()
+            if planner.library is not None
+        ]
         if asked.ompl and not trailers_of(vehicle):
             table.add_row(*label, OMPL, *_ompl_cells(problems, vehicle))
         table.add_section()
-    return table, refused
+    return table, refused, worth
+
+
+def _sooner(alone: list[Row], joined: list[Row]) -> str:
+    """How much sooner the robot is there with a library, planning and driving counted, where both solve."""
+    total = np.array(
+        [
+            [row.attempt.planning_seconds + (row.attempt.duration_s or np.nan) for row in rows]
+            for rows in (alone, joined)
+        ]
+    )
+    sooner = (total[0] - total[1])[~np.isnan(total).any(axis=0)]
+    low, high = bootstrap((sooner,), np.mean, rng=np.random.default_rng(1)).confidence_interval
+    later = np.count_nonzero(sooner < -NOTICED_S)
+    return f"{sooner.mean():.2f} s sooner [{low:.2f}, {high:.2f}], later in {later} of {len(sooner)}"
 
 
 def _peers(asked: argparse.Namespace, vehicle: Vehicle | None = None) -> list[Peer]:
@@ -156,7 +179,7 @@ def report(console: Console, asked: argparse.Namespace | None = None) -> None:
     if asked.given:
         table, refused, lines = given_table(_peers(asked))
     else:
-        (table, refused), lines = family_table(asked), []
+        table, refused, lines = family_table(asked)
     console.print(table)
     for line in lines:
         console.print(line)
