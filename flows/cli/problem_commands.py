@@ -64,7 +64,7 @@ def plan(
         problem: A .json, .jsonl or .parquet file with one problem.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to improve the plan; 0 keeps the first plan.
+        improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json.
         picture: Where to draw it, .png, .svg or .pdf.
@@ -142,7 +142,7 @@ def solve(
         problems: A .json, .jsonl or .parquet file.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to improve the plan; 0 keeps the first plan.
+        improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
         learn: Data folder that remembers the newly solved problems.

@@ -1,16 +1,16 @@
 """How fast manoeuvres are planned from scratch, cold, on one core, and how long the drives take.
 
-``python -m tests.speed manoeuvres [--families …] [--difficulties …] [--vehicles …] [--questions 100]
-[--planners …] [--optimise] [--ompl] [--given]`` draws questions of the families and prints for each family
-and planner the solved share, planning times (failures included), driving times and changes of gear of what
-all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
+``python -m tests.speed manoeuvres [--families …] [--difficulties …] [--vehicles …] [--questions 100] [--seed
+79] [--planners …] [--optimise] [--ompl] [--given]`` draws questions of the families and prints for each
+family and planner the solved share, planning times (failures included), driving times and changes of gear of
+what all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
 Bench-MR instead, where they lie beside the repository, and prints each beside the best driving time that is
 published. ``--memory LIBRARY`` also has the planners join plans of a library, of the one vehicle that
 ``--vehicles`` names; "recalled" is the share of questions answered by a plan of which a part was stored, and
-a line says how much sooner the robot is there so, with the 95 % interval, problems resampled.
-``--optimise`` has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over
-Reeds-Shepp curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame
-of its problem.
+a line says how much sooner the robot is there so, with the 95 % interval, problems resampled. ``--optimise``
+has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over Reeds-Shepp
+curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame of its
+problem.
 """
 
 from __future__ import annotations
@@ -61,13 +61,13 @@ def measured(
 
 def family_table(asked: argparse.Namespace) -> tuple[Table, list[str], list[str]]:
     """The table of the families, what the authority refused, and what the library is worth."""
-    title = f"Manoeuvres from scratch, {asked.questions} questions each, seed {SEED}"
+    title = f"Manoeuvres from scratch, {asked.questions} questions each, seed {asked.seed}"
     table = _table(title, ("family", "difficulty", "vehicle", "planner"))
     refused = []
     worth = []
     for name, difficulty, vehicle in _asked_families(asked):
         drawn = family(name, difficulty, vehicle)
-        problems = [drawn.draw(SEED, index) for index in range(asked.questions)]
+        problems = [drawn.draw(asked.seed, index) for index in range(asked.questions)]
         rows = measured(problems, _peers(asked, vehicle), vehicle)
         by_all = np.all([[row.attempt.solved for row in found] for found in rows.values()], axis=0)
         for planner, found in rows.items():
@@ -194,6 +194,7 @@ def _parser() -> argparse.ArgumentParser:
         "--vehicles", nargs="+", default=["car", "car-1-trailer"], help="names or .yaml files"
     )
     parser.add_argument("--questions", type=int, default=100, help="of each family")
+    parser.add_argument("--seed", type=int, default=SEED, help="of the questions")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=["lattice"])
     parser.add_argument("--memory", type=Path, help="a library of `gather`, of the one vehicle that is asked")
     parser.add_argument("--optimise", action="store_true", help="optimise each plan too")
