@@ -14,13 +14,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from dashboards.cells import NAMES
 from dashboards.palette import style_sheet
 from dashboards.report.findings import findings, for_pages
-from dashboards.report.tables import (
-    FULL_HEADINGS,
-    RETRIEVAL_HEADINGS,
-    full_cells,
-    retrieval_groups,
-    titled_rows,
-)
+from dashboards.report.retrieval_tables import RETRIEVAL_HEADINGS, retrieval_groups
+from dashboards.report.tables import FULL_HEADINGS, full_cells, titled_rows
 from dashboards.verdicts.claim_rules import FAILS, HOLDS, OPEN, Claim
 
 _KINDS: Final = {HOLDS: "holds", FAILS: "fails", OPEN: "open"}

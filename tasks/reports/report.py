@@ -17,11 +17,10 @@ from dashboards.figures.planning_curves import continual_improvement, performanc
 from dashboards.figures.recall_curves import retrieval_curves
 from dashboards.figures.style import save
 from dashboards.report.findings import findings, findings_markdown
+from dashboards.report.retrieval_tables import retrieval_markdown, retrieval_table
 from dashboards.report.tables import (
     as_csv,
     claims_markdown,
-    retrieval_markdown,
-    retrieval_table,
     stages_table,
     summary_markdown,
     summary_tables,

@@ -8,12 +8,11 @@ import pandas as pd
 import pytest
 
 from dashboards.cells import CellTable
+from dashboards.report.retrieval_tables import retrieval_markdown, retrieval_table
 from dashboards.report.tables import (
     FULL_HEADINGS,
     NOTHING,
     as_csv,
-    retrieval_markdown,
-    retrieval_table,
     summary_markdown,
     summary_tables,
 )

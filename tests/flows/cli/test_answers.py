@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dashboards.report import tables
+from dashboards.report import retrieval_tables, tables
 from dashboards.verdicts import comparison_tables, promotion
 from flows.cli.main import call
 from storage.exchange.problems import fields_of, write_problems
@@ -124,7 +124,7 @@ def test_no_plan_is_an_answer_too(
     ("name", "command", "headings", "fields"),
     [
         ("summary", "run", tables._HEADINGS, tables._FIELDS),
-        ("retrieval", "report", tables.RETRIEVAL_HEADINGS, tables._RETRIEVAL_FIELDS),
+        ("retrieval", "report", retrieval_tables.RETRIEVAL_HEADINGS, retrieval_tables._RETRIEVAL_FIELDS),
         ("stages", "report", tables.STAGE_HEADINGS, tables._STAGE_FIELDS),
         ("sweep", "sweep", tables._SWEEP_HEADINGS, tables._SWEEP_FIELDS),
         ("comparison", "compare", comparison_tables.HEADINGS, comparison_tables.FIELDS),
