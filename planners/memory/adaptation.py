@@ -19,7 +19,7 @@ import numpy as np
 
 from planners.memory.retiming import retimed
 from planners.optimisation.polish import driven_near, polish
-from planners.search.manoeuvres.endings import endings_of
+from planners.search.manoeuvres.endings import STANDS, last_of_stops, worth_storing
 from planners.search.tracking import ARRIVED, TRACKING, track
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
@@ -41,7 +41,6 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size
 from planners.world.workspace import Workspace
 
-STANDS: Final = 1e-6  # m/s
 SAME: Final = 1e-6  # metres, radians, m/s: a drive that is so near to the stored one is the stored one
 OPEN_M: Final = 30.0  # around a plan on open ground
 POSE: Final = (0.1, 0.05)  # metres, radians: what a pose on open ground tolerates
@@ -156,8 +155,7 @@ class Adaptation:
         guess = retimed(stored, self.old, self.new, factor)
         if drawn is not None:
             guess = _placed(guess, drawn, factor)
-        stands = np.abs(guess[:, 3]) < STANDS
-        begins = np.flatnonzero(stands[:-1] & ~stands[1:])  # the last moment of each stop
+        begins = last_of_stops(guess)
         found = Adapted(Outcome.BLOCKED, None, [])
         for begin in begins[::-1]:
             asked = _asked(guess[begin:], drawn and drawn[1], question, False, self.new)
@@ -178,8 +176,7 @@ class Adaptation:
         polished = polish(asked, plan, self.new, scene_of(asked), workspace).plan
         if polished is None or faults(asked, polished, self.new):
             return found
-        stops = len(endings_of([(plan.states, plan.controls)], self.new).follows)
-        return found._replace(plans=[polished, plan] if stops > 1 else [polished])
+        return found._replace(plans=worth_storing(plan, polished, self.new))
 
     def _to_place(self, stored: Plan, question: str, canonical: bool, workspace: Workspace) -> Adapted:
         guess = retimed(stored, self.old, self.new)

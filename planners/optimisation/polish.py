@@ -97,7 +97,7 @@ def driven_near(
     model.best_states[: steps + 1] = guess
     model.best_states[0] = start_state(problem, vehicle)
     circles = circles_around(scene)
-    widest = min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
+    widest = _widest_hitch(vehicle)
     used = 0
     for share in MORE_TIME:
         more = math.ceil(share * steps)
@@ -148,6 +148,10 @@ def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace)
     return model, goal_of(problem)
 
 
+def _widest_hitch(vehicle: Vehicle) -> float:
+    return min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
+
+
 def _polished(
     given: Plan | None,
     model: Model,
@@ -172,8 +176,7 @@ def _polished(
             best = steps
             model.best_states[: steps + 1] = model.states[: steps + 1]
             model.best_controls[:steps] = model.controls[:steps]
-    widest = min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
-    nowhere = Barrier(0.0, 0.0, margin_m, widest)
+    nowhere = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle))
     descended = _shortened if arriving else _descended
     best, used = descended(model, steps, best, goal, nowhere, vehicle, scene, iterations, until)
     if best == NEVER:

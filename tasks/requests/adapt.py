@@ -59,8 +59,8 @@ def adapt(
 ) -> Kept:
     """Drive the plans of a memory or a library as another vehicle, and write those that pass.
 
-    The same arguments give the same bytes, whatever the number of workers. If the command is killed, the same
-    command drives only the plans that are left.
+    The same arguments give the same bytes, whatever the number of workers. After a kill, the command drives
+    only the plans that it had not driven before.
 
     Args:
         memory: the address of a memory or a library: a folder, a run, or a model in MLflow.

@@ -18,7 +18,7 @@ from storage.tables.experiences import write_experiences
 from storage.vehicles.definitions import definition_of
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.part_folder import is_readable, parts_folder
+from tasks.requests.part_folder import NumberedPiece, is_readable
 
 PIECE: Final = 25  # plans: some seconds of work
 
@@ -28,16 +28,16 @@ class AdaptRequest:
     """Which memory to adapt, from which vehicle to which."""
 
     memory: Path  # of a memory or a library
-    digest: str  # of its header, which holds checksums of everything else
+    memory_digest: str  # of its header, which holds checksums of everything else
     plans: int  # that it holds
     old: Vehicle
     new: Vehicle
     out: Path
 
     @functools.cached_property
-    def key(self) -> str:
+    def digest(self) -> str:
         """A digest of everything that the plans depend on."""
-        return key_of("adapt", self.digest, definition_of(self.new))
+        return key_of("adapt", self.memory_digest, definition_of(self.new))
 
     @property
     def pieces(self) -> list[AdaptPiece]:
@@ -45,28 +45,8 @@ class AdaptRequest:
         return [AdaptPiece(self, index) for index in range(-(-self.plans // PIECE))]
 
 
-@dataclass(frozen=True)
-class AdaptPiece:
+class AdaptPiece(NumberedPiece[AdaptRequest]):
     """Some consecutive plans."""
-
-    request: AdaptRequest
-    index: int  # counted from 0
-    class_name: str = "plans"  # for messages
-
-    @property
-    def key(self) -> str:
-        """A digest of everything that its plans depend on."""
-        return key_of(self.request.key, self.index)
-
-    @property
-    def result(self) -> Path:
-        """The file that keeps its ``Driven``."""
-        return parts_folder(self.request.out) / f"{self.index:06d}-{self.key}.json"
-
-    @property
-    def shard(self) -> Path:
-        """The file with its plans."""
-        return parts_folder(self.request.out) / f"{self.index:06d}.parquet"
 
     @property
     def numbers(self) -> range:
@@ -83,7 +63,7 @@ class Driven(NamedTuple):
 def adapt_piece(chunk: AdaptPiece) -> Driven:
     """Drive the plans of a piece as the new vehicle, and write those that the authority accepts."""
     request, workspace = chunk.request, Workspace()
-    memory = _loaded(request.memory, request.digest, request.old)
+    memory = _loaded(request.memory, request.memory_digest, request.old)
     canonical = isinstance(memory, Memory)
     adaptation = Adaptation(request.old, request.new)
     outcomes, kept = [], []

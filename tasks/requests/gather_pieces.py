@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.optimisation.polish import polish
-from planners.search.manoeuvres.endings import endings_of
+from planners.search.manoeuvres.endings import worth_storing
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import scene_of
@@ -24,7 +24,7 @@ from storage.worlds.sources import source_at
 from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
-from tasks.requests.part_folder import is_readable, parts_folder
+from tasks.requests.part_folder import NumberedPiece, is_readable
 from tasks.requests.question_sources import QuestionSource, is_drawn, question_source
 
 COLLECTOR: Final = "lattice"
@@ -53,27 +53,10 @@ class GatherRequest:
 
 
 @dataclass(frozen=True)
-class GatherPiece:
+class GatherPiece(NumberedPiece[GatherRequest]):
     """Some consecutive numbers of questions; the sources take turns, number by number."""
 
-    request: GatherRequest
-    index: int  # counted from 0
-    class_name: str = "questions"  # for messages
-
-    @property
-    def key(self) -> str:
-        """A digest of everything that its plans depend on."""
-        return key_of(self.request.digest, self.index)
-
-    @property
-    def result(self) -> Path:
-        """The file that keeps its ``Gathered``."""
-        return parts_folder(self.request.out) / f"{self.index:06d}-{self.key}.json"
-
-    @property
-    def shard(self) -> Path:
-        """The file with its plans."""
-        return parts_folder(self.request.out) / f"{self.index:06d}.parquet"
+    class_name: str = "questions"
 
 
 class Gathered(NamedTuple):
@@ -166,10 +149,7 @@ def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspa
     scene = scene_of(question)
     margin = MARGIN_M if question.arrival is None else 0.0  # a pose may be in a tight slot
     polished = polish(question, attempt.plan, vehicle, scene, workspace, margin_m=margin).plan
-    variants = [polished or attempt.plan]
-    stops = endings_of([(attempt.plan.states, attempt.plan.controls)], vehicle).follows
-    if polished is not None and len(stops) > 1:  # of which the start is one
-        variants.append(attempt.plan)
+    variants = worth_storing(attempt.plan, polished, vehicle)
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)
     return variants

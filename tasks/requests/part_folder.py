@@ -4,17 +4,59 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 from storage.errors import StorageError
 from storage.places.data_folder import MARK
 from storage.places.files import locked, remove_folder, remove_leftovers
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import read_table, shard_is_done
+from tasks.fan_out.keys import key_of
 from tasks.fan_out.progress import progress
 from tasks.fan_out.stage import AnyPiece, Job, Result
 from tasks.servers.prefect_server import local_server
 from tasks.settings.errors import UsageError
+
+
+class Request(Protocol):
+    """What a command was asked for, whose work is done piece by piece."""
+
+    @property
+    def out(self) -> Path:
+        """What the command writes."""
+
+    @property
+    def digest(self) -> str:
+        """A digest of everything that its plans depend on."""
+
+
+AnyRequest = TypeVar("AnyRequest", bound=Request)
+
+
+@dataclass(frozen=True)
+class NumberedPiece(Generic[AnyRequest]):
+    """A piece of a request that writes plans; it lies in the request's parts folder under its number."""
+
+    request: AnyRequest
+    index: int  # counted from 0
+    class_name: str = "plans"  # for messages
+
+    @property
+    def key(self) -> str:
+        """A digest of everything that its plans depend on."""
+        return key_of(self.request.digest, self.index)
+
+    @property
+    def result(self) -> Path:
+        """The file that keeps its result."""
+        return parts_folder(self.request.out) / f"{self.index:06d}-{self.key}.json"
+
+    @property
+    def shard(self) -> Path:
+        """The file with its plans."""
+        return parts_folder(self.request.out) / f"{self.index:06d}.parquet"
 
 
 def parts_folder(out: Path) -> Path:

@@ -9,9 +9,10 @@ import numpy as np
 
 from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, add_known_node
 from planners.search.query import Endings
-from planners.world.arrays import Floats, Integers
+from planners.world.arrays import Floats, Indices, Integers
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
+from planners.world.problem import Plan
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -32,7 +33,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
         if not stands[-1]:
             continue
         local = _in_frame_of_end(drive)
-        begins = np.flatnonzero(stands[:-1] & ~stands[1:])  # the last moment of each stop
+        begins = last_of_stops(drive)
         after = -1
         end = len(drive) - 1
         for begin in begins[::-1]:
@@ -49,6 +50,23 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
     return Endings(
         np.vstack(states), np.vstack(controls), np.array(starts, np.int32), np.array(follows, np.int32)
     )
+
+
+def last_of_stops(drive: Floats) -> Indices:
+    """The numbers of those states ``[T, S]`` of a drive that are the last of a stop."""
+    stands = np.abs(drive[:, 3]) < STANDS
+    return np.flatnonzero(stands[:-1] & ~stands[1:])
+
+
+def worth_storing(found: Plan, polished: Plan | None, vehicle: Vehicle) -> list[Plan]:
+    """The polished plan, and beside it the one that was found if it has stops, which polish melts away.
+
+    At these stops others can join it.
+    """
+    if polished is None:
+        return [found]
+    stops = endings_of([(found.states, found.controls)], vehicle).follows  # of which the start is one
+    return [polished, found] if len(stops) > 1 else [polished]
 
 
 def no_endings(size: int) -> Endings:

@@ -18,9 +18,7 @@ from planners.world.vehicles.vehicle import About, Vehicle
 
 State = tuple[float, ...]
 
-SPARE: Final = (
-    1.0 + 1.0 / 32.0
-)  # boxes cover that much more than half a step, for an authority that rounds up
+SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority rounds up
 
 unseen(About)
 
