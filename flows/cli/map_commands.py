@@ -15,7 +15,7 @@ from flows.cli.solve_options import MapOptions, SolveOptions
 from flows.cli.terminal import write, write_answer, write_files
 
 if TYPE_CHECKING:
-    from tasks.requests.adapt_pieces import AdaptPiece, Driven
+    from tasks.requests.adapt_pieces import AdaptRequest, Driven
     from tasks.requests.gather_pieces import Gathered, GatherRequest
 
 _AS_IT_IS: Final = MapOptions()
@@ -141,10 +141,10 @@ def adapt(
     write_files(memory=out)
 
 
-def _adapt_pieces(pieces: Sequence[AdaptPiece]) -> Sequence[Driven]:
+def _adapt_pieces(request: AdaptRequest) -> Sequence[Driven]:
     from flows.adapt import adapt as flow  # late: Prefect reads its environment when it is imported
 
-    return flow(pieces)
+    return flow(request)
 
 
 def route(

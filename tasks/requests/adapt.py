@@ -29,7 +29,7 @@ from storage.tables.experiences import read_experiences
 from storage.vehicles.definitions import is_built_in
 from storage.vehicles.vehicle_files import label_of, said_vehicle
 from tasks.registry.memory_at import memory_at
-from tasks.requests.adapt_pieces import ADAPT, AdaptPiece, AdaptRequest, Driven
+from tasks.requests.adapt_pieces import ADAPT, AdaptRequest, Driven
 from tasks.requests.part_folder import (
     do_here,
     part_workers,
@@ -40,7 +40,7 @@ from tasks.requests.part_folder import (
 from tasks.settings.checks import check_outputs, check_seed, checked_vehicle
 from tasks.settings.errors import RunError
 
-AdaptFlow = Callable[[Sequence[AdaptPiece]], Sequence[Driven]]
+AdaptFlow = Callable[[AdaptRequest], Sequence[Driven]]
 
 FEW_PLANS: Final = 200  # so many take less time here than starting a server and workers
 LABELLED: Final = 500  # problems of each class, from which the readout of a memory is made anew
@@ -90,7 +90,7 @@ def adapt(
                 results: Sequence[Driven] = do_here(ADAPT, request.pieces)
             else:
                 with part_workers(out, workers):
-                    results = flow(request.pieces)
+                    results = flow(request)
             kept = [each for piece in request.pieces for each in read_experiences(piece.shard, new)]
             told = _told(old, new, [Outcome[name] for result in results for name in result.outcomes])
             if not kept:
