@@ -134,7 +134,7 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
     return _flow_of(flow.name, flow.task_runner, body, [*options, *own], _told(flow.fn, Options))
 
 
-def _command(command: Callable[..., None]) -> Flow[..., None]:
+def _command(command: Callable[..., int | None]) -> Flow[..., None]:
     """A command for one's own problems or maps as a flow; its options are parameters one by one."""
     types = get_type_hints(command)
     own: list[inspect.Parameter] = []

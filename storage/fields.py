@@ -66,6 +66,12 @@ def _plain_object(text: str | bytes) -> dict[str, Any] | None:
     return value if text.count(quote) == 2 * texts else None  # type: ignore[arg-type]  # as above
 
 
+def nearest(given: str, names: Iterable[str]) -> str:
+    """What a message adds to a name that is unknown: in brackets the one that was meant, or nothing."""
+    near = get_close_matches(given[:LONGEST].lower(), names, 1)
+    return f" (nearest is {near[0]!r})" if near else ""
+
+
 def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
     """Raise ValueError if one of ``fields`` is not among the supported ``names``, or occurs twice.
 
@@ -75,9 +81,8 @@ def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
     """
     for field in fields:
         if field not in names:
-            nearest = get_close_matches(str(field)[:LONGEST].lower(), names, 1)
-            meant = f" (nearest is {nearest[0]!r})" if nearest else ""
-            raise ValueError(f"has the unknown field {short(field)}{meant}; supported are {', '.join(names)}")
+            near = nearest(str(field), names)
+            raise ValueError(f"has the unknown field {short(field)}{near}; supported are {', '.join(names)}")
     if len(set(fields)) < len(fields):
         raise ValueError(_repeated(fields))
 

@@ -148,7 +148,8 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit.daemon = True
     forced_exit.start()
     print(
-        "Interrupted. Give the same command again: it goes on after what was done (plan: anew).",
+        "Interrupted. Give the same command again: it keeps what was finished and does the rest "
+        "(`plan` and `route` begin anew).",
         file=sys.stderr,
     )
     raise KeyboardInterrupt

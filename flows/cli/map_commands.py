@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from cyclopts import Parameter
 
-from flows.cli.choices import AssistName
+from flows.cli.choices import AssistName, Difficulty
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
-from flows.cli.terminal import write, write_answer, write_files
+from flows.cli.terminal import SHORT, write, write_answer, write_files
 
 if TYPE_CHECKING:
     from tasks.requests.adapt_pieces import AdaptRequest, Driven
@@ -68,12 +68,13 @@ def gather(
     out: Path,
     plans: int = 1000,
     poses: float = 0.25,
+    difficulty: Difficulty = "standard",
     vehicle: str = "car",
     seed: int = 1,
     model: str | None = None,
     workers: int | None = None,
     reading: MapOptions = _AS_IT_IS,
-) -> None:
+) -> int:
     """Ask general questions in worlds and on maps, and keep the plans as a library for --memory.
 
     A repeated command continues where it stopped.
@@ -83,8 +84,9 @@ def gather(
             and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
             problems: these are the questions.
         out: Folder of the library, which may replace an earlier one.
-        plans: How many questions to have answered.
+        plans: How many questions to have answered; where fewer can be, the library holds those.
         poses: Share of the drawn questions that ask for a pose, not for a place.
+        difficulty: Difficulty of classes and families.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
         model: Log the library in MLflow, and register it as a version of the model of this name.
@@ -95,16 +97,25 @@ def gather(
     from tasks.requests.import_worlds import import_settings
 
     settings = import_settings(vehicle, seed, **asdict(reading))
-    counts = task.gather(sources, out, plans, poses, settings, worker_count(workers), _gather_pieces)
+    counts = task.gather(
+        sources, out, plans, poses, difficulty, settings, worker_count(workers), _gather_pieces
+    )
     write(task.gathered_table(counts))
     write_files(library=out)
     if model is not None:
         from tasks.registry.registered_library import registered_library  # late: MLflow takes seconds
 
-        asked = {"sources": " ".join(sources), "plans": plans, "poses": poses, "seed": seed}
+        asked = {
+            "sources": " ".join(sources),
+            "plans": plans,
+            "poses": poses,
+            "difficulty": difficulty,
+            "seed": seed,
+        }
         write_files(
             model=registered_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
         )
+    return SHORT if sum(len(each.seconds) for each in counts) < plans else 0
 
 
 def _gather_pieces(request: GatherRequest) -> list[Gathered]:

@@ -66,7 +66,7 @@ def plan(
             without.
         improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
-        out: Where to write the plan, .json.
+        out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
         learn: Data folder that remembers the plan if it is new.
         options: How the problem is solved.
@@ -75,7 +75,7 @@ def plan(
     from tasks.settings.errors import RunError
 
     assistant = Assistant(options.settings(assist, improve_seconds))
-    attempt, found, answer, failure = plan_one(assistant, problem, out, picture, explain, learn)
+    attempt, found, answer, failure, written = plan_one(assistant, problem, out, picture, explain, learn)
     lines = []
     if found is not None:
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
@@ -83,7 +83,7 @@ def plan(
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
         lines.append(f"{attempt.source}, {times}{changes}")
     write_answer(*lines, **answer)
-    write_files(plan=out, picture=picture)
+    write_files(plan=written, picture=picture)
     if failure is not None:
         raise RunError(failure)
 
@@ -110,7 +110,7 @@ def optimise(
         clearance_weight: Weight of the distance to obstacles against the duration of the plan.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.
-        out: Where to write the plan, .json.
+        out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw the guess and the plan, .png, .svg or .pdf.
     """
     from tasks.requests.optimise_one import initial_guess, optimise_one

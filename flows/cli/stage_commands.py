@@ -7,12 +7,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final
 
 from flows.cli.run_options import Options, worker_count
+from flows.cli.terminal import SHORT
 
 if TYPE_CHECKING:
     from tasks.settings.run_settings import RunSettings
 
 NO_OPTIONS: Final = Options()
-SHORT: Final = 3  # exit code: done, but with fewer experiences than wanted
 
 
 def run(options: Options = NO_OPTIONS) -> int:

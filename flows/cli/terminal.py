@@ -29,6 +29,7 @@ PROGRESS: Final = "tasks.fan_out.progress"
 COMPILING: Final = "planners.world.jit"  # which tells that kernels are being compiled
 DETAILS: Final = ("tasks.fan_out.workload",)  # whose notices are for operators, and here for ``--verbose``
 RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # what a run found, and where it lies
+SHORT: Final = 3  # exit code: done, but with less than was asked for
 COLUMNS: Final = 110  # width of tables that are not written to a terminal
 WIDEST: Final = 10_000  # columns of any table
 LINE_SECONDS: Final = 5.0  # between two lines of progress, if the error stream is no terminal

@@ -5,13 +5,12 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, name_of
 from storage.errors import StorageError
-from storage.fields import parse_json, scale_of, short
+from storage.fields import nearest, parse_json, scale_of, short
 from storage.vehicles.definitions import FIELDS, definition_of, is_built_in, vehicle_of
 from storage.yaml_text import yaml_fields
 
@@ -50,8 +49,8 @@ def scale_for_vehicle(stated: object, vehicle: Vehicle) -> float:
     scale = vehicle.scale if stated is None else scale_of(stated)
     if scale != vehicle.scale and not is_built_in(vehicle):
         raise ValueError(
-            f"scale is {scale:g}, but that of {name_of(vehicle)} is {vehicle.scale:g}, which follows from "
-            "its size; leave the scale out"
+            f"scale is {scale:g}, but the scale of {name_of(vehicle)} is {vehicle.scale:g}, which follows "
+            "from its size; leave the field out, or name the vehicle that the problem is for (--vehicle)"
         )
     return scale
 
@@ -103,8 +102,7 @@ def _path(given: str) -> Path:
     path = Path(given)
     if path.suffix in ENDINGS:
         return path
-    near = get_close_matches(given[:60].lower(), VEHICLES, 1)
-    meant = f" (nearest is {near[0]!r})" if near else ""
     raise StorageError(
-        f"Unknown vehicle {short(given)}{meant}. Known: {', '.join(VEHICLES)}, or a vehicle's .yaml file."
+        f"Unknown vehicle {short(given)}{nearest(given, VEHICLES)}. Known: {', '.join(VEHICLES)}, or a "
+        "vehicle's .yaml file."
     )

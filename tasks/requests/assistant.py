@@ -22,7 +22,7 @@ from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
-from storage.exchange.plans import PlanRecord, write_plan
+from storage.exchange.plans import PlanRecord
 from storage.exchange.problems import read_problems
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
@@ -30,8 +30,15 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.requests.plan_answers import plan_answer
-from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
+from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
+from tasks.settings.checks import (
+    check_known,
+    check_outputs,
+    check_picture,
+    check_plan_file,
+    check_seed,
+    checked_vehicle,
+)
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -59,6 +66,7 @@ class PlannedOne(NamedTuple):
     plan: Plan | None  # in the frame of the problem
     answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
     failure: str | None  # why there is no plan, in one line
+    written: Path | None  # the file of the plan
 
 
 class Assistant:
@@ -183,7 +191,7 @@ def plan_one(
     Args:
         assistant: solves the problem.
         problem: the file; it must hold one problem.
-        out: where to write the plan, or None.
+        out: where to write the plan, or None. Why there is none is written too, but over no older file.
         drawing: where to draw it, or None.
         explained: whether to log and draw the recalled plans, where they collide and how they were used.
         learn: the data folder to which the problem and its plan are added as an experience, or None.
@@ -192,9 +200,10 @@ def plan_one(
         what came of it; finding no plan is an answer too.
 
     Raises:
-        UsageError: the picture's format is unknown, or an output would be written over an input.
+        UsageError: the name of an output has a wrong ending, or an output would be written over an input.
         RunError: the file does not hold exactly one problem.
     """
+    check_plan_file(out)
     check_picture(drawing)
     check_outputs([problem, *assistant.files], [out, drawing])
     problems = read_problems(problem, assistant.vehicle)
@@ -204,8 +213,7 @@ def plan_one(
         assistant.warm_up(problems[0])
         attempt, plan = assistant(problems[0])
     record = plan_record(assistant, problems[0], attempt, plan)
-    if out is not None:
-        write_plan(out, record)
+    written = write_answer_file(out, record)
     if learn is not None:
         remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
@@ -220,9 +228,10 @@ def plan_one(
         save_picture(figure, drawing)
     if explained:
         _explain(assistant, problems[0], attempt, recalled)
-    failure = f"No plan for {problems[0].id or problem}: {summary}." if plan is None else None
+    failure = None if plan else no_plan(problems[0].id or str(problem), summary, out, written)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
-    return PlannedOne(attempt, plan, plan_answer(record, out, attempt.verified) | parts, failure)
+    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
+    return PlannedOne(attempt, plan, answer, failure, written)
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:

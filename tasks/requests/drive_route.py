@@ -28,7 +28,7 @@ from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import plan_answer
-from tasks.settings.checks import check_known, check_outputs, check_picture
+from tasks.settings.checks import check_known, check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
@@ -104,6 +104,7 @@ def drive_route(
         RunError: no route was found.
         PlanFaultError: the independent judge refuses the route.
     """
+    check_plan_file(out)
     check_picture(drawing)
     check_known("format", [] if map_format is None else [map_format], FORMATS)
     pose = _numbers_of(start, 3, "--from", "x,y,heading in metres and radians")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -13,6 +14,7 @@ from typing import Final, NamedTuple
 from dashboards.cells import NOTHING, CellTable, decimal
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
+from planners.world.classes.problem_classes import DIFFICULTIES
 from storage.archives.libraries import is_library, save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
@@ -32,11 +34,12 @@ from tasks.requests.part_folder import (
     unfinished,
 )
 from tasks.requests.question_sources import is_drawn
-from tasks.settings.checks import check_count, check_outputs
+from tasks.settings.checks import check_count, check_known, check_outputs
 from tasks.settings.errors import RunError, UsageError
 
 GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
+_LOG = logging.getLogger(__name__)
 FEW_PLANS: Final = 200  # gathering so many here takes less time than starting a server and workers
 HEADINGS: Final = ("source", "questions", "plans", "driving s")
 FIELDS: Final = ("source", "questions", "plans", "driving_s")
@@ -62,6 +65,7 @@ def gather(
     out: Path,
     plans: int,
     poses: float,
+    difficulty: str,
     settings: ImportSettings,
     workers: int = 1,
     flow: GatherFlow | None = None,
@@ -72,13 +76,15 @@ def gather(
     holds. Each plan is polished and judged. Where the search stands still on its way to a pose, its own plan
     is kept as well: other drives can join it there (``PlanLibrary.endings``), and polish melts such stops.
     The same sources and settings give the same bytes, whatever the number of workers. If the command is
-    killed, the same command asks only what is left.
+    killed, the same command asks only what is left. Where fewer questions can be answered than wanted, the
+    library holds the plans that there are, and a warning says so.
 
     Args:
         sources: names of classes and families; paths of maps, of worlds or of files of problems.
         out: the folder to write.
         plans: how many questions to have answered.
         poses: the share of drawn questions that ask for a pose; the others ask for a place.
+        difficulty: of classes and families: easy, standard or hard.
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
         workers: number of worker processes.
         flow: gathers in worker processes. It is called once Prefect's environment is set, so it may import
@@ -90,14 +96,15 @@ def gather(
     Raises:
         UsageError: a number is out of range, or ``out`` would be written over a source.
         StorageError: a source cannot be read.
-        RunError: too few questions could be answered.
+        RunError: no question could be answered.
     """
     check_count("plans", plans)
     if not 0.0 <= poses <= 1.0:
         raise UsageError(f"A share of {poses:g} poses: give 0 to 1.")
+    check_known("difficulty", [difficulty], DIFFICULTIES)
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
     refuse_foreign(out, is_library, "library")
-    request = GatherRequest(tuple(sources), out, plans, poses, settings)
+    request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
     with unfinished(out):
         if flow is None or workers == 1 or plans <= FEW_PLANS:
             results = gather_pieces(request, partial(do_here, GATHER))
@@ -105,10 +112,15 @@ def gather(
             with part_workers(out, workers):
                 results = flow(request)
         kept, tried = _kept(request, results)
-        if len(kept) < plans:
+        if not kept:
             raise RunError(
-                f"Only {len(kept)} of the {tried.total()} questions asked were answered, fewer than the "
-                f"{plans} plans wanted; ask for fewer plans or give more sources."
+                f"None of the {tried.total()} questions asked was answered; give easier or other sources."
+            )
+        if len(kept) < plans:
+            _LOG.warning(
+                "%d of the %d questions asked were answered, fewer than the %d plans wanted: the library "
+                "holds those; more sources give more.",
+                *(len(kept), tried.total(), plans),
             )
         _save(request, kept)
         remove_folder(parts_folder(out))

@@ -41,6 +41,7 @@ class GatherRequest:
     out: Path  # the library
     plans: int
     poses: float  # the share of drawn questions that ask for a pose
+    difficulty: str  # of classes and families
     settings: ImportSettings
 
     @functools.cached_property
@@ -49,7 +50,7 @@ class GatherRequest:
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
         contents = ["" if is_drawn(name) else source_at(Path(name)).digest() for name in self.sources]
-        return key_of("gather", how, self.plans, self.poses, self.sources, contents)
+        return key_of("gather", how, self.plans, self.poses, self.difficulty, self.sources, contents)
 
 
 @dataclass(frozen=True)
@@ -133,7 +134,8 @@ def gather_pieces(
 @functools.lru_cache(maxsize=1)
 def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
     """The sources of this process, which keeps the worlds that it has read as long as they are the same."""
-    return [question_source(name, request.plans, request.poses, request.settings) for name in request.sources]
+    how = (request.plans, request.poses, request.difficulty, request.settings)
+    return [question_source(name, *how) for name in request.sources]
 
 
 def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:

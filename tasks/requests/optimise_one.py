@@ -18,11 +18,18 @@ from planners.world.alignment import shifted
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
-from storage.exchange.plans import PlanRecord, read_plan, write_plan
+from storage.exchange.plans import PlanRecord, read_plan
 from storage.exchange.problems import read_problems
 from storage.vehicles.vehicle_files import said_vehicle
-from tasks.requests.plan_answers import plan_answer
-from tasks.settings.checks import check_known, check_outputs, check_picture, check_seed, checked_vehicle
+from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
+from tasks.settings.checks import (
+    check_known,
+    check_outputs,
+    check_picture,
+    check_plan_file,
+    check_seed,
+    checked_vehicle,
+)
 from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
@@ -115,14 +122,15 @@ def optimise_one(
         problem_file: the file; it must hold one problem.
         clearance_weight: weight of the clearance in the objective, 0 or more; 0 asks for the least time
             alone.
-        out: where to write the plan, or None.
+        out: where to write the plan, or None. Why there is none is written too, but over no older file.
         drawing: where to draw it, or None.
 
     Raises:
-        UsageError: the weight is negative or infinite, the picture's format is unknown, or an output would be
-            written over an input.
+        UsageError: the weight is negative or infinite, the name of an output has a wrong ending, or an output
+            would be written over an input.
         RunError: the file does not hold exactly one problem, or the optimisation does not converge.
     """
+    check_plan_file(out)
     check_picture(drawing)
     check_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], [out, drawing])
     if not 0.0 <= clearance_weight < float("inf"):
@@ -139,15 +147,14 @@ def optimise_one(
     optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)
     seconds = perf_counter() - start
     record = _record(problem, optimised, planner, seconds, initial.vehicle)
-    if out is not None:
-        write_plan(out, record)
+    written = write_answer_file(out, record)
     summary = f"{optimised.status}, {optimised.iterations} iterations, {1000 * seconds:.0f} ms"
     if drawing is not None:
         caption = f"optimised, {planner}: {summary}"
         figure = picture(problem, optimised.plan, caption, [guess], initial.vehicle, called="guess")
         save_picture(figure, drawing)
     if optimised.plan is None:
-        raise RunError(f"No plan for {problem.id or problem_file}: {summary}.")
+        raise RunError(no_plan(problem.id or str(problem_file), summary, out, written))
     clearance_m = problem.scale * least_clearance(problem, optimised.plan.states, initial.vehicle)
     more = {
         "iterations": optimised.iterations,

@@ -6,7 +6,21 @@ from pathlib import Path
 from typing import Any
 
 from dashboards.world_outlines import cusps_of
-from storage.exchange.plans import PlanRecord, plan_fields
+from storage.exchange.plans import PlanRecord, plan_fields, write_plan
+
+
+def write_answer_file(out: Path | None, record: PlanRecord) -> Path | None:
+    """Write a plan, or why there is none, which is written over no older file; return what was written."""
+    if out is None or (record.plan is None and out.exists()):
+        return None
+    write_plan(out, record)
+    return out
+
+
+def no_plan(name: str, summary: str, out: Path | None, written: Path | None) -> str:
+    """The line that says that there is no plan for the problem ``name``, and that an older one is kept."""
+    kept = f"; {out} is left as it was" if out != written else ""
+    return f"No plan for {name}: {summary}{kept}."
 
 
 def plan_answer(record: PlanRecord, out: Path | None, verified: bool | None) -> dict[str, Any]:

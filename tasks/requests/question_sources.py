@@ -14,6 +14,7 @@ from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.exchange.problems import read_problems
+from storage.fields import nearest
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
 
@@ -33,13 +34,16 @@ def is_drawn(name: str) -> bool:
     return name in (*CLASSES, *FAMILIES) and not Path(name).exists()
 
 
-def question_source(name: str, plans: int, poses: float, settings: ImportSettings) -> QuestionSource:
+def question_source(
+    name: str, plans: int, poses: float, difficulty: str, settings: ImportSettings
+) -> QuestionSource:
     """The questions of a source; the same arguments give the same ones.
 
     Args:
         name: of a class or a family, or the path of a map, of worlds or of a file of problems.
         plans: how many plans are wanted: into as many windows is a map cut.
         poses: the share of drawn questions that ask for a pose.
+        difficulty: of a class or a family.
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
 
     Raises:
@@ -48,14 +52,17 @@ def question_source(name: str, plans: int, poses: float, settings: ImportSetting
     vehicle = settings.vehicle
     seed = OWN_SEEDS + settings.seed
     if is_drawn(name) and name in FAMILIES:
-        manoeuvres = family(name, vehicle=vehicle)
+        manoeuvres = family(name, difficulty, vehicle)
         return QuestionSource(lambda number: manoeuvres.draw(seed, number))
     if is_drawn(name):
-        drawn = problem_class(name, vehicle=vehicle)
+        drawn = problem_class(name, difficulty, vehicle)
         return _asked_in(lambda number: drawn.draw(seed, number), poses, settings)
     if not Path(name).exists():
-        known = ", ".join([*CLASSES, *FAMILIES])
-        raise StorageError(f"{name} is neither a file or folder nor one of {known}; check the name.")
+        known = [*CLASSES, *FAMILIES]
+        raise StorageError(
+            f"{name} is no file or folder, and no class or family{nearest(name, known)}: {', '.join(known)}; "
+            "check the name."
+        )
     source = source_at(Path(name))
     if source.format == "problems" and source.path.is_file():
         problems = read_problems(source.path, vehicle)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from storage.errors import StorageError
+from storage.fields import nearest
 from storage.vehicles.vehicle_files import text_of_vehicle
 from tasks.settings.errors import UsageError
 
@@ -27,7 +28,7 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
     """
     for name in names:
         if name not in choices:
-            raise UsageError(f"Unknown {kind} {name!r}. Known: {', '.join(choices)}.")
+            raise UsageError(f"Unknown {kind} {name!r}{nearest(name, choices)}. Known: {', '.join(choices)}.")
 
 
 def checked_vehicle(given: str) -> str:
@@ -64,6 +65,12 @@ def check_picture(path: Path | None) -> None:
         raise UsageError(f"{path} is not the name of a picture. Known: {', '.join(PICTURES)}.")
 
 
+def check_plan_file(path: Path | None) -> None:
+    """Refuse a path that does not end like the file of a plan."""
+    if path is not None and path.suffix != ".json":
+        raise UsageError(f"{path} is not the name of a plan's file, which ends in .json.")
+
+
 def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> None:
     """Refuse to write over what is read.
 
@@ -79,7 +86,8 @@ def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> Non
         for path, real in read:
             if Path(os.path.realpath(output)).is_relative_to(real) or _is_one_file(path, output):
                 raise UsageError(
-                    f"{output} would be written over or into {path}, which is read; name another."
+                    f"{output} cannot be written: {path}, which is read, would be overwritten or added to. "
+                    "Give the output another name."
                 )
 
 

@@ -56,7 +56,7 @@ def _told(words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any,
     assert (told["error"] is None) == (code == 0)
     assert all(Path(path).exists() for path in told["files"].values())
     name = words.split()[0]
-    assert sorted(told["answer"] or []) == sorted(ANSWERS.get(name, []))
+    assert told["answer"] is None or sorted(told["answer"]) == sorted(ANSWERS.get(name, []))
     for table in told["tables"]:
         shapes = [fields for known, of, fields in TABLES if known == table["name"] and name in of[0]]
         assert all(list(row) in shapes for row in table["rows"]), table
@@ -118,6 +118,33 @@ def test_no_plan_is_an_answer_too(
         None,
         [],
     )
+
+
+@pytest.mark.parametrize("command", ["plan walled.json --planner gust", "optimise walled.json --straight"])
+def test_without_a_plan_an_older_one_is_kept(
+    command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    older = place / "older.json"
+    older.write_text("the plan of yesterday")
+    told = _told(f"{command} --out older.json", place, monkeypatch, capsys, code=1)
+    assert older.read_text() == "the plan of yesterday"
+    assert told["files"] == {}
+    assert "older.json" in told["error"]
+    (place / "newer.json").unlink(missing_ok=True)
+    _told(f"{command} --out newer.json", place, monkeypatch, capsys, code=1)
+    assert json.loads((place / "newer.json").read_text())["status"] != "solved"
+
+
+@pytest.mark.parametrize(
+    "command", ["plan one.json", "optimise empty.parquet", "route town.npy --from 20,20,0 --to 120,120"]
+)
+def test_a_plan_is_written_under_no_name_but_that_of_a_plan(
+    command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = _told(f"{command} --out plan.txt", place, monkeypatch, capsys, code=2)
+    assert "plan.txt" in told["error"]
+    assert ".json" in told["error"]
+    assert not (place / "plan.txt").exists()
 
 
 @pytest.mark.parametrize(

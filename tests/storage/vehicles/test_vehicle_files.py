@@ -220,5 +220,5 @@ def test_a_vehicle_with_a_file_has_its_own_scale() -> None:
     assert scale_for_vehicle(None, big) == big.scale == 4.0
     assert scale_for_vehicle(None, CAR) == 1.0
     assert scale_for_vehicle(2.0, CAR) == 2.0
-    with pytest.raises(ValueError, match="scale is 2, but that of small is 4"):
+    with pytest.raises(ValueError, match="scale is 2, but the scale of small is 4"):
         scale_for_vehicle(2.0, big)

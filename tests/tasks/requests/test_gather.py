@@ -15,6 +15,7 @@ from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
 from tasks.requests import gather
 from tasks.requests import gather_pieces as pieces
+from tasks.requests.question_sources import question_source
 from tests.storage.worlds.samples import town_cells, write_map
 from tests.worlds import strewn, walled_goal
 
@@ -41,12 +42,13 @@ def test_the_questions_of_a_file_are_asked_as_they_stand(
     problems = tmp_path / "asked.jsonl"
     write_problems(problems, [strewn(1, 10), walled_goal(), strewn(2, 10)])
     asked = ["gather", str(problems), "--out", str(tmp_path / "library"), "--workers", "1"]
-    assert call([*asked, "--plans", "3"]) == 1
+    assert call([*asked, "--plans", "2"]) == 0
+    library = load_library(tmp_path / "library")
+    assert library.questions == ("strewn-1-10", "strewn-2-10")
+    assert call([*asked, "--plans", "3"]) == 3  # there are no more
     told = capsys.readouterr().err
     assert "2 of the 3 questions" in told
     assert "3 plans" in told
-    assert not (tmp_path / "library").exists()
-    assert call([*asked, "--plans", "2"]) == 0
     assert load_library(tmp_path / "library").questions == ("strewn-1-10", "strewn-2-10")
 
 
@@ -68,7 +70,7 @@ def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pyt
     def gathered(name: str, workers: int) -> None:
         out = tmp_path / name
         flow = partial(pieces.gather_pieces, do=backwards)
-        gather.gather(["random"], out, 14, 0.5, ImportSettings(), workers, flow)
+        gather.gather(["random"], out, 14, 0.5, "easy", ImportSettings(), workers, flow)
 
     with monkeypatch.context() as patch:
         patch.setattr(gather, "part_workers", lambda *_: nullcontext())  # they would have nothing to do here
@@ -106,13 +108,31 @@ def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: 
     problems, out = tmp_path / "asked.jsonl", tmp_path / "library"
     for seed in (1, 2):
         write_problems(problems, [strewn(seed, 10)])
-        gather.gather([str(problems)], out, 1, 0.0, ImportSettings())
+        gather.gather([str(problems)], out, 1, 0.0, "standard", ImportSettings())
         assert load_library(out).questions == (f"strewn-{seed}-10",)
+
+
+def test_without_any_answer_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_problems(tmp_path / "asked.jsonl", [walled_goal()])
+    out = tmp_path / "library"
+    assert call(["gather", str(tmp_path / "asked.jsonl"), "--out", str(out), "--plans", "1"]) == 1
+    assert "None of the 1 questions" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_the_difficulty_of_drawn_questions_can_be_chosen(tmp_path: Path) -> None:
+    settings = ImportSettings()
+    for name in ("random", "parallel"):
+        easy, hard = (question_source(name, 1, 0.0, each, settings).draw(0) for each in ("easy", "hard"))
+        assert easy is not None
+        assert hard is not None
+        assert easy.obstacles.vertices.tolist() != hard.obstacles.vertices.tolist()
 
 
 @pytest.mark.parametrize(
     ("options", "line"),
     [
+        (["--difficulty", "odd"], "odd"),
         (["--plans", "0"], "0 plans: give 1 or more."),
         (["--poses", "1.5"], "A share of 1.5 poses: give 0 to 1."),
     ],
