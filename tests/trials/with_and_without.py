@@ -2,10 +2,10 @@
 
 ``python -m tests.trials.with_and_without RUN…`` reads the attempts of runs (folders such as
 ``data/runs/laptop-labels-…``) together, and prints a table of their classes: what is solved; mean, median and
-99 % of planning time, and by how much its mean is less than that of the same planner alone; mean driving
-time; the share of stored plans among the answers; and how much sooner the robot is there than with the
-lattice alone, planning and driving counted, on the problems that both solved. Intervals are of 95 %, problems
-resampled.
+99 % of planning time; by how much its mean, and the mean work of searching and checking, are less than those
+of the same planner alone; mean driving time; the share of stored plans among the answers; and how much sooner
+the robot is there than with the lattice alone, planning and driving counted, on the problems that both
+solved. Intervals are of 95 %, problems resampled.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rich.console import Console
 from dashboards.cells import markdown_table
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
 from dashboards.statistics.panels import Panel, panels
+from planners.search.outcome import EXPANSION
 from planners.world.arrays import Floats
 from storage.tables.attempts import read_attempts
 
@@ -33,8 +34,8 @@ WAYS: Final = {
     ("lattice", "repair 5 exhaustive"): "lattice with memory",
 }
 HEADINGS: Final = (
-    "class", "", "solved, %", "planning, ms: mean (median, 99 %)", "less than alone, %", "driving, s",
-    "a stored plan, %", "sooner than the lattice alone, s",
+    "class", "", "solved, %", "planning, ms: mean (median, 99 %)", "less than alone, %", "less work, %",
+    "driving, s", "a stored plan, %", "sooner than the lattice alone, s",
 )  # fmt: skip
 
 
@@ -51,17 +52,23 @@ def lesser(values: Floats, alone: Floats) -> tuple[float, float, float]:
     return float(1.0 - values.mean() / alone.mean()), float(low[0]), float(high[0])
 
 
+def percent(share: float, low: float, high: float) -> str:
+    """A share and the ends of its interval, in percent."""
+    return f"{100 * share:.0f} [{100 * low:.0f}, {100 * high:.0f}]"
+
+
 def lines_of(panel: Panel) -> Iterator[list[str]]:
     """The cells of a class, a line for each of ``WAYS`` that was measured."""
     column = {(planner, way.label): number for number, (planner, way) in enumerate(panel.columns)}
     times, driving, solved = panel.milliseconds(), panel.matrix("duration_s"), panel.matrix("solved")
+    works = panel.matrix("collision_checks") + EXPANSION * panel.matrix("expansions")
     rows = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
     recalled = panel._replace(rows=rows).matrix("recalled")
     total = driving + 1e-3 * times
     alone = column["lattice", "none"]
     for number, (way, name) in enumerate((way, name) for way, name in WAYS.items() if way in column):
         here = column[way]
-        less = lesser(times[:, here], times[:, column[way[0], "none"]])
+        less, work = (lesser(each[:, here], each[:, column[way[0], "none"]]) for each in (times, works))
         median, tail = np.quantile(times[:, here], [0.5, 0.99])
         sooner, least, most = mean_and_ends(total[:, alone] - total[:, here])
         yield [
@@ -69,7 +76,7 @@ def lines_of(panel: Panel) -> Iterator[list[str]]:
             name,
             f"{100 * solved[:, here].mean():.1f}",
             f"{times[:, here].mean():.2f} ({median:.2f}, {tail:.1f})",
-            "" if way[1] == "none" else "{:.0f} [{:.0f}, {:.0f}]".format(*(100 * each for each in less)),
+            *("" if way[1] == "none" else percent(*each) for each in (less, work)),
             f"{np.nanmean(driving[:, here]):.2f}",
             "" if way[1] in ("none", "fresh") else f"{100 * recalled[:, here].mean():.1f}",
             "" if here == alone else f"{sooner:+.2f} [{least:+.2f}, {most:+.2f}]",

@@ -70,7 +70,7 @@ def hits(rows: list[Row], what: str) -> Table:
 def times(rows: list[Row]) -> Table:
     """Share and cold time of each way in large memories."""
     result = table(
-        "Large memories: free first / among five, %; median / 99 % us, cold",
+        "Large memories: free first / among five, %; median / 99 % us of the processor, cold",
         *("plans", "world", "way", "first", "among five", "median us", "99 % us"),
     )
     for row in rows:
