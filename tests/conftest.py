@@ -43,6 +43,16 @@ LONGEST: Final = (  # files that take more than ten seconds, the longest first (
 )
 
 
+@pytest.fixture(autouse=True)
+def _environment_of_its_own() -> Generator[None]:
+    """Put back the variables that a command sets for its process, as tests share processes."""
+    before = dict(os.environ)
+    yield
+    if os.environ != before:
+        os.environ.clear()
+        os.environ.update(before)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Import everything without the garbage collector, and let it never look at what was imported.

@@ -23,6 +23,9 @@ PAGES = (
     "/progress", "/compare?first=first&other=second", "/runs/nothing",
 )  # fmt: skip
 
+# a busy browser may come back from ``get`` before the page is there
+LOADED = "return location.href !== 'about:blank' && document.readyState === 'complete'"
+
 
 @pytest.fixture
 def opened(driver: WebDriver, server: str) -> Iterator[Callable[[str], WebDriver]]:
@@ -32,6 +35,7 @@ def opened(driver: WebDriver, server: str) -> Iterator[Callable[[str], WebDriver
     def opened(place: str) -> WebDriver:
         driver.get("about:blank")
         driver.get(server + place)
+        wait(driver, lambda d: d.execute_script(LOADED))
         return driver
 
     yield opened
