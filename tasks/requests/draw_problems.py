@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from planners.world.classes.families import FAMILIES, family
-from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
+from planners.world.classes.families import FAMILIES, class_or_family
+from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.problem_files import format_of
@@ -44,9 +44,7 @@ def draw_problems(
     format_of(out)
     driven = said_vehicle(checked_vehicle(vehicle))
     try:
-        source = (
-            family(name, difficulty, driven) if name in FAMILIES else problem_class(name, difficulty, driven)
-        )
+        source = class_or_family(name, difficulty, driven)
     except ValueError as error:
         raise UsageError(str(error)) from None
     drawn = [source.draw(seed, index) for index in range(problems)]

@@ -20,7 +20,8 @@ from planners.search.registry import PLANNERS
 from planners.solve import solve
 from planners.world.alignment import from_canonical, shifted, to_canonical
 from planners.world.arrays import Floats
-from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.classes.families import class_or_family, families_of
+from planners.world.classes.problem_classes import CLASSES
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -34,25 +35,26 @@ MOST_CORNERS: Final = 4_000
 LIMITS: Final = Limits(seconds=0.4)  # for each attempt
 REPEATS: Final = 5  # of an attempt; the median time is shown ...
 REPEAT_SECONDS: Final = 0.1  # ... of as many as fit in this
-_WARM: Final[set[tuple[str, str, Vehicle]]] = set()
+_WARM: Final[set[tuple[str, str, Vehicle, bool]]] = set()  # planner, assist, vehicle, whether to a place
 
 
 def try_it(data: DataReader, params: Parameters) -> Page:
-    """The editor with a problem of the run, or a fresh one of its class."""
+    """The editor with a problem of the run, or a fresh one of a class or a family of manoeuvres."""
     run = data.run(params.run)
     settings, vehicle, names = data.settings(run), data.vehicle(run), run.memory_names()
     classes = [name for name in settings["classes"] if name in CLASSES]
     class_name = params.text("class", classes[0] if classes else "random")
+    drawable = (*CLASSES, *families_of(vehicle))
     identity, index = params.text("problem"), params.number("index", 0, 10**9, 0)
     if identity:
         problem = data.problem(run, class_name, identity)
-    elif class_name in CLASSES:
+    elif class_name in drawable:
         difficulty, seed = (
             str(settings.get("difficulty", "standard")),
             params.number("seed", 0, 10**9, 10**6),
         )
         try:
-            problem = problem_class(class_name, difficulty, vehicle).draw(seed, index)
+            problem = class_or_family(class_name, difficulty, vehicle).draw(seed, index)
         except ValueError as error:
             raise BadRequestError(str(error)) from None
     else:
@@ -62,7 +64,7 @@ def try_it(data: DataReader, params: Parameters) -> Page:
     assist = params.one_of("assist", ASSISTS, "repair")
     values: dict[str, Any] = {
         "menus": [
-            menu("class", "Fresh world of", tuple(CLASSES), class_name),
+            menu("class", "Fresh world of", drawable, class_name),
             menu("memory", "Memory", names, memory),
             menu("planner", "Planner", tuple(PLANNERS), planner),
             menu("assist", "Use of memory", ASSISTS, assist),
@@ -134,7 +136,7 @@ def _median(
     canonical: Problem, planner: str, assist: str, memory: Memory | None, vehicle: Vehicle
 ) -> tuple[Attempt, float]:
     """An attempt, and the median milliseconds of a few: the first one may find everything cold."""
-    key, workspace = (planner, assist, vehicle), Workspace()
+    key, workspace = (planner, assist, vehicle, canonical.arrival is None), Workspace()
     times: list[float] = []
     began = perf_counter()
     while True:

@@ -1,17 +1,11 @@
 "use strict";
 // A world that can be edited. After each change it is planned in again, with and without memory.
-const SVG = "http://www.w3.org/2000/svg";
+const NONE = -1; // what is chosen: an obstacle by its number, or after the last of them the vehicle, then the goal
 const svg = document.getElementById("editor");
 const given = JSON.parse(document.getElementById("start-world").textContent);
 const choices = document.getElementById("choices");
-let world = given.world, outline = given.start, chosen = -1, answers = [], past = [], requests = 0, timer = null;
-
-const make = (name, attributes, parent) => {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return parent ? parent.appendChild(made) : made;
-};
-const written = (points) => points.map(([x, y]) => `${x},${y}`).join(" ");
+const TURN = Math.PI / 12; // at a press of a key or a button
+let world = given.world, outline = given.start, chosen = NONE, answers = [], past = [], requests = 0, timer = null;
 
 // Polygons that were pieces of one obstacle stay together: groups of polygons, as the file says.
 let things = [];
@@ -21,34 +15,50 @@ const take = (fields) => {
   things = [];
   let at = 0;
   for (const size of sizes) { things.push(fields.obstacles.slice(at, at + size)); at += size; }
-  chosen = -1;
+  chosen = NONE;
 };
+const vehicleItem = () => things.length, goalItem = () => things.length + 1;
+const isPose = () => world.goal.length === 3;
 const fields = () => {
   const { groups, ...rest } = world;
-  const round = (value) => Math.round(value * 1000) / 1000;
   const made = { ...rest, obstacles: things.flat().map((polygon) => polygon.map(([x, y]) => [round(x), round(y)])) };
   if (things.some((thing) => thing.length > 1)) made.groups = things.map((thing) => thing.length);
   return made;
 };
-const centre = (thing) => {
-  const every = thing.flat();
-  return [0, 1].map((i) => (Math.min(...every.map((point) => point[i])) + Math.max(...every.map((point) => point[i]))) / 2);
+// The vehicle as it would stand at a goal pose, bent as at the start.
+const outlineAtGoal = () => {
+  const [x, y, heading] = world.start;
+  return moved(turned(outline, world.goal[2] - heading, [x, y]), world.goal[0] - x, world.goal[1] - y);
 };
-const moved = (thing, dx, dy) => thing.map((polygon) => polygon.map(([x, y]) => [x + dx, y + dy]));
-const turned = (thing, angle) => {
-  const [cx, cy] = centre(thing), cos = Math.cos(angle), sin = Math.sin(angle);
-  return thing.map((polygon) => polygon.map(([x, y]) => [cx + cos * (x - cx) - sin * (y - cy), cy + sin * (x - cx) + cos * (y - cy)]));
+const pivot = (item) => (item < things.length ? centre(things[item]) : item === vehicleItem() ? world.start : world.goal);
+const around = (item) => (item < things.length ? things[item] : item === vehicleItem() ? outline : outlineAtGoal());
+const turns = (item) => item !== NONE && (item < goalItem() || isPose());
+const change = (item, dx, dy, angle) => {
+  if (item < things.length) things[item] = moved(turned(things[item], angle, centre(things[item])), dx, dy);
+  else if (item === goalItem()) world = { ...world, goal: placed(world.goal, dx, dy, angle) };
+  else {
+    outline = moved(turned(outline, angle, world.start), dx, dy);
+    world = { ...world, start: placed(world.start, dx, dy, angle) };
+  }
 };
+const kept = () => ({ things: [...things], world, outline });
+const put = (state) => { things = [...state.things]; ({ world, outline } = state); };
 
 const draw = (focus = false) => {
   const [xMin, yMin, xMax, yMax] = world.bounds, margin = (xMax - xMin) / 64;
   svg.setAttribute("viewBox", `${xMin - margin} ${-yMax - margin} ${xMax - xMin + 2 * margin} ${yMax - yMin + 2 * margin}`);
+  svg.style.setProperty("--unit", (xMax - xMin) / 64); // lines look as wide in a small world
   svg.replaceChildren();
   const flipped = make("g", { transform: "scale(1 -1)" }, svg);
   make("rect", { x: xMin, y: yMin, width: xMax - xMin, height: yMax - yMin, class: "bounds" }, flipped);
-  make("circle", { cx: world.goal[0], cy: world.goal[1], r: world.goal_radius ?? world.goal_tolerance?.[0] ?? 2, class: "goal" }, flipped);
+  const item = (index, name, parent) => make("g", { class: `item ${name}${index === chosen ? " chosen" : ""}`, "data-item": index }, parent);
+  const reach = 1.4 * Math.max(...outline.flat().map(([x, y]) => Math.hypot(x - world.start[0], y - world.start[1])));
+  const pointing = ([x, y, heading], parent, name) => {
+    make("line", { x1: x, y1: y, x2: x + reach * Math.cos(heading), y2: y + reach * Math.sin(heading), class: `heading ${name}` }, parent);
+  };
+  if (!isPose()) make("circle", { cx: world.goal[0], cy: world.goal[1], r: world.goal_radius ?? 2, class: "goal" }, item(goalItem(), "place", flipped));
   things.forEach((thing, i) => {
-    const group = make("g", { class: `obstacle${i === chosen ? " chosen" : ""}`, "data-thing": i }, flipped);
+    const group = item(i, "obstacle", flipped);
     for (const polygon of thing) make("polygon", { points: written(polygon) }, group);
   });
   const far = 99, inner = `M${xMin} ${yMin}H${xMax}V${yMax}H${xMin}Z`;
@@ -63,23 +73,30 @@ const draw = (focus = false) => {
     }
     make("polyline", { points: written(answer.way), class: alone ? "alone-plan" : "with-plan" }, flipped);
   }
-  const start = make("g", { class: "start" }, flipped);
-  for (const body of outline) make("polygon", { points: written(body) }, start);
-  const [x, y, heading] = world.start;
-  make("line", { x1: x, y1: y, x2: x + 4.5 * Math.cos(heading), y2: y + 4.5 * Math.sin(heading), class: "heading" }, flipped);
-  if (chosen >= 0) {
-    const [cx, cy] = centre(things[chosen]);
-    const high = Math.max(...things[chosen].flat().map((point) => point[1])) + 2.5;
-    make("line", { x1: cx, y1: cy, x2: cx, y2: high, class: "stem" }, flipped);
-    make("circle", { cx, cy: high, r: 1.1, class: "handle" }, flipped);
+  if (isPose()) {
+    const goal = item(goalItem(), "pose", flipped);
+    for (const body of outlineAtGoal()) make("polygon", { points: written(body) }, goal);
+    pointing(world.goal, goal, "asked");
   }
-  for (const id of ["turn", "remove"]) document.getElementById(id).disabled = chosen < 0;
+  const start = item(vehicleItem(), "start", flipped);
+  for (const body of outline) make("polygon", { points: written(body) }, start);
+  pointing(world.start, start, "");
+  if (turns(chosen)) {
+    const [cx, cy] = pivot(chosen), size = (xMax - xMin) / 58;
+    const high = Math.max(...around(chosen).flat().map((point) => point[1])) + 2.3 * size;
+    make("line", { x1: cx, y1: cy, x2: cx, y2: high, class: "stem" }, flipped);
+    make("circle", { cx, cy: high, r: size, class: "handle" }, flipped);
+  }
+  document.getElementById("turn").disabled = !turns(chosen);
+  document.getElementById("remove").disabled = chosen === NONE || chosen >= things.length;
+  document.getElementById("arrive").textContent = isPose() ? "Goal: a pose" : "Goal: a place";
+  document.getElementById("arrive").setAttribute("aria-pressed", String(isPose()));
   document.getElementById("undo").disabled = !past.length;
   if (focus) svg.focus();
 };
 
 const say = (text) => { document.getElementById("said").textContent = text; };
-const remember = () => { past.push(JSON.stringify(things)); if (past.length > 100) past.shift(); };
+const remember = () => { past.push(kept()); if (past.length > 100) past.shift(); };
 const value = (name) => choices.elements[name]?.value ?? "";
 const number = (value, decimals) => value.toLocaleString("en", { minimumFractionDigits: decimals, maximumFractionDigits: decimals });
 const tell = (where, answer) => {
@@ -95,6 +112,11 @@ const tell = (where, answer) => {
   }
 };
 
+const compared = (faster, sooner) => {
+  const planned = Math.max(faster, 1 / faster).toFixed(1), driven = Math.abs(sooner).toFixed(1);
+  const time = planned === "1.0" ? "Planned as fast with memory" : `Planned ${planned} times as ${faster > 1 ? "fast" : "long"} with memory`;
+  return driven === "0.0" ? `${time}.` : `${time}; the drive is ${driven} s ${sooner > 0 ? "shorter" : "longer"}.`;
+};
 const post = async (where, content) => {
   const base = location.pathname.replace(/\/try$/, "");
   const response = await fetch(`${base}/${where}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(content) });
@@ -112,8 +134,7 @@ const plan = async () => {
     tell("alone", alone);
     tell("with", withMemory);
     if (withMemory?.solved && alone.solved) {
-      const ratio = alone.ms / withMemory.ms;
-      say(ratio >= 1 ? `With memory ${ratio.toFixed(1)} times as fast.` : `With memory ${(1 / ratio).toFixed(1)} times as long.`);
+      say(compared(alone.ms / withMemory.ms, alone.duration_s - withMemory.duration_s));
     } else say(withMemory?.solved ? "Only with memory is a plan found." : alone.solved ? "A plan is found without memory." : "No plan is found in time.");
   } catch (error) {
     if (mine !== requests) return;
@@ -140,11 +161,11 @@ const at = (event) => {
 };
 let drag = null;
 svg.addEventListener("pointerdown", (event) => {
-  const handle = event.target.closest(".handle"), thing = event.target.closest(".obstacle");
+  const handle = event.target.closest(".handle"), item = event.target.closest(".item");
   const was = chosen;
-  if (!handle) chosen = thing ? +thing.dataset.thing : -1;
-  if (chosen >= 0 && (handle || thing)) {
-    drag = { from: at(event), thing: things[chosen], turning: Boolean(handle), begun: false };
+  if (!handle) chosen = item ? +item.dataset.item : NONE;
+  if (handle || item) {
+    drag = { from: at(event), before: kept(), turning: Boolean(handle), begun: false };
     svg.setPointerCapture(event.pointerId);
     event.preventDefault();
   }
@@ -154,38 +175,48 @@ svg.addEventListener("pointermove", (event) => {
   if (!drag) return;
   const [x, y] = at(event);
   if (!drag.begun) { remember(); drag.begun = true; }
+  put(drag.before);
   if (drag.turning) {
-    const [cx, cy] = centre(drag.thing);
-    things[chosen] = turned(drag.thing, Math.atan2(y - cy, x - cx) - Math.atan2(drag.from[1] - cy, drag.from[0] - cx));
-  } else things[chosen] = moved(drag.thing, x - drag.from[0], y - drag.from[1]);
+    const [cx, cy] = pivot(chosen);
+    change(chosen, 0, 0, Math.atan2(y - cy, x - cx) - Math.atan2(drag.from[1] - cy, drag.from[0] - cx));
+  } else change(chosen, x - drag.from[0], y - drag.from[1], 0);
   changed();
 });
 for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { drag = null; });
 
-const edit = (change) => { if (chosen < 0) return; remember(); things[chosen] = change(things[chosen]); changed(); };
-const remove = () => { if (chosen < 0) return; remember(); things.splice(chosen, 1); chosen = -1; changed(); };
-const undo = () => { if (!past.length) return; things = JSON.parse(past.pop()); chosen = -1; changed(); };
+const edit = (dx, dy, angle) => { if (chosen === NONE || (angle && !turns(chosen))) return; remember(); change(chosen, dx, dy, angle); changed(); };
+const remove = () => { if (chosen === NONE || chosen >= things.length) return; remember(); things.splice(chosen, 1); chosen = NONE; changed(); };
+const undo = () => { if (!past.length) return; put(past.pop()); chosen = NONE; changed(); };
+const arrive = () => { // at a pose instead of a place, or the other way round
+  remember();
+  const { goal_radius, goal_tolerance, goal_speed, goal_hitch, goal_hitch_tolerance, ...rest } = world;
+  const [x, y] = world.goal;
+  world = { ...rest, goal: isPose() ? [x, y] : [x, y, world.start[2]] };
+  chosen = goalItem();
+  changed();
+};
 svg.addEventListener("keydown", (event) => {
   const step = event.shiftKey ? 0.1 : 1;
   const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[event.key];
   if (event.key === "z" && (event.ctrlKey || event.metaKey)) undo();
-  else if (event.key === "Tab" && things.length) {
+  else if (event.key === "Tab") {
     const next = chosen + (event.shiftKey ? -1 : 1);
-    if (next < 0 || next >= things.length) { chosen = -1; draw(); return; } // on to the next element of the page
+    if (next < 0 || next > goalItem()) { chosen = NONE; draw(); return; } // on to the next element of the page
     chosen = next;
     draw();
-  } else if (event.key === "Escape") { chosen = -1; draw(); }
-  else if (chosen < 0) return;
-  else if (way) edit((thing) => moved(thing, ...way));
-  else if (event.key === "[" || event.key === "]") edit((thing) => turned(thing, (event.key === "[" ? 1 : -1) * Math.PI / 12));
+  } else if (event.key === "Escape") { chosen = NONE; draw(); }
+  else if (chosen === NONE) return;
+  else if (way) edit(...way, 0);
+  else if (event.key === "[" || event.key === "]") edit(0, 0, (event.key === "[" ? 1 : -1) * TURN);
   else if (event.key === "Delete" || event.key === "Backspace") remove();
   else return;
   event.preventDefault();
 });
 document.getElementById("remove").addEventListener("click", remove);
-document.getElementById("turn").addEventListener("click", () => edit((thing) => turned(thing, Math.PI / 12)));
+document.getElementById("turn").addEventListener("click", () => edit(0, 0, TURN));
+document.getElementById("arrive").addEventListener("click", arrive);
 document.getElementById("undo").addEventListener("click", undo);
-document.getElementById("clear").addEventListener("click", () => { remember(); things = []; chosen = -1; changed(); });
+document.getElementById("clear").addEventListener("click", () => { remember(); things = []; chosen = NONE; changed(); });
 for (const button of document.querySelectorAll("[data-add]")) {
   button.addEventListener("click", () => {
     if (things.length >= given.limits.obstacles) { say(`At most ${given.limits.obstacles} obstacles.`); return; }

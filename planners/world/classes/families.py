@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from planners.world.classes.parking import Aisle, Lot, draw_aisle, draw_lot
-from planners.world.classes.problem_classes import DIFFICULTIES
+from planners.world.classes.problem_classes import DIFFICULTIES, ProblemClass, problem_class
 from planners.world.classes.slots import Ground, Sizes, mirrored, sizes_of
 from planners.world.classes.trains import Dock, Yard, draw_dock, draw_yard
 from planners.world.problem import Arrival, Problem, obstacles_of
@@ -139,9 +139,21 @@ def family(name: str, difficulty: str = "standard", vehicle: Vehicle = CAR) -> F
         raise ValueError(f"Unknown difficulty {difficulty!r}; choose one of {', '.join(DIFFICULTIES)}.")
     if vehicle.min_speed >= 0.0:
         raise ValueError(f"{name_of(vehicle)} cannot drive backwards, which manoeuvres need.")
-    suited = WITH_TRAILERS if trailers_of(vehicle) else WITHOUT_TRAILERS
+    suited = families_of(vehicle)
     if name not in suited:
         other = f"or a vehicle {'without' if trailers_of(vehicle) else 'with'} trailers"
         raise ValueError(f"{name} is not for {name_of(vehicle)}; choose {', '.join(suited)}, {other}.")
     draw_ground, settings = _SETTINGS[name]
     return Family(name, difficulty, vehicle, settings[difficulty], draw_ground)
+
+
+def families_of(vehicle: Vehicle) -> tuple[str, ...]:
+    """Names of the families for a vehicle; there is none if it cannot drive backwards and stand."""
+    if vehicle.min_speed >= 0.0:
+        return ()
+    return WITH_TRAILERS if trailers_of(vehicle) else WITHOUT_TRAILERS
+
+
+def class_or_family(name: str, difficulty: str, vehicle: Vehicle) -> ProblemClass | Family:
+    """Return the class or the family of that name, as ``problem_class`` and ``family`` do."""
+    return (family if name in FAMILIES else problem_class)(name, difficulty, vehicle)

@@ -12,6 +12,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webdriver import WebDriver
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from planners.world.classes.families import families_of
+from planners.world.vehicles.vehicle import CAR
 from tests.dashboards.web.browser import CHROMIUM, DESKTOP, DRIVER, PHONE, complaints, findings, shown_at
 
 pytestmark = pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver")
@@ -192,6 +194,39 @@ def test_a_world_is_edited_with_the_mouse_and_planned_at_once(editor: WebDriver)
     *others, turned = obstacles(editor)
     assert others == before
     assert turned != moved
+
+
+def drawn_at(driver: WebDriver, item: str) -> str:
+    """The corners of the vehicle at the start or at the goal."""
+    return str(driver.find_element(By.CSS_SELECTOR, f".{item} polygon").get_attribute("points"))
+
+
+def test_the_vehicle_and_the_goal_are_moved_and_a_pose_is_asked_for(editor: WebDriver) -> None:
+    start = drawn_at(editor, "start")
+    vehicle = editor.find_element(By.CSS_SELECTOR, ".start polygon")
+    after(editor, ActionChains(editor).drag_and_drop_by_offset(vehicle, 15, -10).perform)
+    assert drawn_at(editor, "start") != start
+    after(editor, editor.find_element(By.ID, "undo").click)
+    assert drawn_at(editor, "start") == start
+    place = editor.find_element(By.CSS_SELECTOR, ".place .goal")
+    after(editor, ActionChains(editor).drag_and_drop_by_offset(place, -20, 5).perform)
+    after(editor, editor.find_element(By.ID, "arrive").click)
+    facing = drawn_at(editor, "pose")
+    handle = editor.find_element(By.CSS_SELECTOR, ".handle")
+    after(editor, ActionChains(editor).drag_and_drop_by_offset(handle, 30, 30).perform)
+    assert drawn_at(editor, "pose") != facing
+    last = editor.find_element(By.CSS_SELECTOR, ".alone-plan").get_attribute("points").split()[-1]
+    goal = editor.find_element(By.CSS_SELECTOR, ".pose .heading")
+    x, y = (float(goal.get_attribute(name)) for name in ("x1", "y1"))
+    assert [float(each) for each in last.split(",")] == pytest.approx([x, y], abs=0.11)
+
+
+@pytest.mark.parametrize("family", families_of(CAR))
+def test_manoeuvres_are_planned(opened: Callable[[str], WebDriver], family: str) -> None:
+    driver = opened(f"/runs/first/try?class={family}&seed=3")
+    wait(driver, planned)
+    assert driver.find_elements(By.CSS_SELECTOR, ".pose polygon")
+    assert driver.find_elements(By.CSS_SELECTOR, ".alone-plan")
 
 
 def test_the_address_of_an_edited_world_opens_it_again(editor: WebDriver) -> None:
