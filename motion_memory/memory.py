@@ -256,7 +256,7 @@ def load(
     check_known("assist", [assist], ASSISTS)
     check_known("recall", [] if recall is None else [recall], RECALLS)
     if top_k < 1:
-        raise UsageError(f"Top k is {top_k}: give 1 or more.")
+        raise UsageError(f"top_k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
         archive = load_memory_or_library(folder, said_vehicle(vehicle))  # mapped files outlive their names
     if isinstance(archive, PlanLibrary):

@@ -111,7 +111,7 @@ def scale_of(value: object) -> float:
 def text_of(value: object, name: str) -> str:
     """The printable text that the field ``name`` holds. Raises ValueError if it holds none."""
     if not isinstance(value, str) or not value.isprintable():
-        raise ValueError(f"{name} must be a printable text, got {short(value)}")
+        raise ValueError(f"{name} must be printable text, got {short(value)}")
     return value
 
 

@@ -35,7 +35,7 @@ def yaml_fields(file: Path, what: str, names: Sequence[str], most_brackets: int)
         raise ValueError(f"is larger than {LARGEST_YAML:,} bytes; is it the YAML of a {what}?")
     text = read_text(file)
     if text.count("[") + text.count("{") > most_brackets:
-        raise ValueError(f"has more lists in it than any {what}")
+        raise ValueError(f"has more brackets than any {what}")
     try:  # an alias stands for what was written before: a few lines of them could fill memory
         aliases = any(
             isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)

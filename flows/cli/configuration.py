@@ -17,7 +17,7 @@ def configuration_file(folder: Path) -> Path | None:
 
 
 def check_configuration(path: Path, commands: Iterable[str]) -> None:
-    """Refuse a configuration file that is no TOML, or has something else than tables named after commands.
+    """Refuse a configuration file that is not TOML, or has anything but tables named after commands.
 
     Args:
         path: the file.

@@ -33,7 +33,7 @@ GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and to end the 
 
 
 def package_version() -> str:
-    """What a report of a fault should name: the versions of Motion Memory, Python and the main libraries."""
+    """The versions to name in a bug report: Motion Memory, Python and the main libraries."""
     import platform
     from importlib.metadata import version
 
@@ -69,13 +69,13 @@ def with_output(
     quiet: Flag = False,
     verbose: Flag = False,
 ) -> Any:
-    """Run a command that tells things in the way that was asked for.
+    """Run a command with the requested kind of output.
 
     Args:
         tokens: The command and its own options.
         json: Write one JSON document with all tables, lines and files to the output, and nothing else.
         quiet: Write no progress and no notices; results, warnings and errors stay.
-        verbose: Also tell how many chunks each stage did and reused, and where in the code an error arose.
+        verbose: Also say how many chunks each stage did and reused, and where in the code an error arose.
     """
     told = telling()
     told.document, told.quiet, told.verbose = Document() if json else None, quiet, verbose
@@ -116,7 +116,9 @@ def _refuse_null_characters(arguments: Sequence[str]) -> None:
         if "\0" in argument:
             from tasks.settings.errors import UsageError
 
-            raise UsageError(f"{argument!r} holds a null character, which no path or name can; leave it out.")
+            raise UsageError(
+                f"{argument!r} contains a null character, which no path or name can; leave it out."
+            )
 
 
 def _is_wrong_use(error: Exception) -> bool:
@@ -148,8 +150,7 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit.daemon = True
     forced_exit.start()
     print(
-        "Interrupted. Give the same command again: it keeps what was finished and does the rest "
-        "(`plan` and `route` begin anew).",
+        "Interrupted. Repeat the command to continue where it stopped (`plan` and `route` start over).",
         file=sys.stderr,
     )
     raise KeyboardInterrupt

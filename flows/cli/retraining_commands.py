@@ -113,5 +113,7 @@ def _settings(options: Options) -> RunSettings:
     from tasks.settings.errors import UsageError
 
     if options.learned is not None:
-        raise UsageError("--learned is not for retraining, which itself freezes what was learned.")
+        raise UsageError(
+            "--learned cannot be used for retraining, which takes a snapshot of its own; leave it out."
+        )
     return replace(settings_of(options), continual="none")

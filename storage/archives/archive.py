@@ -111,7 +111,9 @@ def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     """The vehicle that an archive is made for; raises StorageError as ``read_archive`` does."""
     vehicle = vehicle_recorded(_header(folder, kind).get("vehicle"))
     if vehicle is None:
-        raise StorageError(f"{folder} was made for a vehicle that this program does not know; make it again.")
+        raise StorageError(
+            f"{folder} was made for a vehicle that this program does not know; build it again."
+        )
     return vehicle
 
 
@@ -119,7 +121,9 @@ def _header(folder: Path, kind: str) -> dict[str, Any]:
     """The header of an archive of this version, the same to the last byte as it was written."""
     path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
-        raise StorageError(f"{folder} holds no {kind} (no {kind}.json in it); check the path or build one.")
+        raise StorageError(
+            f"{folder} does not contain a {kind} (it has no {kind}.json); check the path or build one."
+        )
     if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
         raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
     text = local_text(path)

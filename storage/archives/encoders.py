@@ -42,7 +42,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
         settings = _settings(header["settings"])
         history, held_out = unpacked_epochs(tensors.pop("history")), tensors.pop("held_out")
         if held_out.dtype != np.int32 or held_out.ndim != 1 or (held_out < 0).any():
-            raise ValueError("held_out does not consist of numbers of problems")
+            raise ValueError("held_out does not consist of problem numbers")
         shapes = {_WEIGHT + name: shape for name, shape in weight_shapes(settings.architecture).items()}
         rows = (len(tensors["biases"]), settings.architecture.dimensions)
         readout = {"centroids": rows, "vectors": rows, "biases": rows[:1], "popularity": (rows[0] - 1,)}
@@ -57,7 +57,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
             held_out=held_out,
         )
     except (KeyError, TypeError, ValueError) as error:
-        raise StorageError(f"{folder} is no whole encoder ({error}); train it again.") from None
+        raise StorageError(f"{folder} is not a complete encoder ({error}); train it again.") from None
 
 
 def _settings(described: object) -> TrainingSettings:

@@ -32,6 +32,6 @@ def load_hallucinator(folder: Path, vehicle: Vehicle = CAR) -> Weights:
         check_floats(weights, weight_shapes())
     except (KeyError, ValueError) as error:
         raise StorageError(
-            f"{folder} is not a whole hallucinator ({error}); run hallucinate again."
+            f"{folder} is not a complete hallucinator ({error}); run hallucinate again."
         ) from None
     return weights

@@ -59,7 +59,7 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
         )
     except (KeyError, TypeError, ValueError, StorageError) as error:
         reason = str(error).rstrip(".")
-        raise StorageError(f"{folder} is no whole library ({reason}); gather it again.") from None
+        raise StorageError(f"{folder} is not a complete library ({reason}); gather it again.") from None
 
 
 def is_library(folder: Path) -> bool:

@@ -92,7 +92,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         weights, readout = unpacked(files[_WEIGHTS]), unpacked(files[_READOUT])
         architecture = architecture_of(weights)
         if described_architecture(header["architecture"]) != architecture:
-            raise ValueError("its encoder is of another architecture than it says")
+            raise ValueError("its encoder does not have the architecture that its header states")
         plans = plans_in(files, vehicle)
         rows = (len(plans) + 1, architecture.dimensions)
         check_floats(weights, weight_shapes(architecture))
@@ -117,7 +117,7 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         )
     except (KeyError, TypeError, ValueError, StorageError) as error:
         reason = str(error).rstrip(".")
-        raise StorageError(f"{folder} is no whole memory ({reason}); build it again.") from None
+        raise StorageError(f"{folder} is not a complete memory ({reason}); build it again.") from None
 
 
 def is_memory(folder: Path) -> bool:
@@ -141,7 +141,7 @@ def _swept(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> 
         if np.array_equal(stored[:, :4], again.boxes[:, :4]) and (stored != again.boxes)[:, 4:].all():
             anew.append((again.boxes, cells))
         elif anew or not (np.array_equal(stored, again.boxes) and np.array_equal(masks[some], cells)):
-            raise ValueError("its swept boxes or cells are not those of its plans")
+            raise ValueError("its swept boxes or cells do not match its plans")
     if not anew:
         return sweeps, masks
     boxes, masks = (np.concatenate(parts) for parts in zip(*anew, strict=True))

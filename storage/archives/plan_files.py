@@ -39,7 +39,7 @@ def plans_in(files: Mapping[str, Contents], vehicle: Vehicle) -> StoredPlans:
     most = LARGEST_COORDINATE_M
     for numbers in (plans.states, plans.controls):
         if not -most <= numbers.min(initial=0.0) <= numbers.max(initial=0.0) <= most:
-            raise ValueError(f"its plans have numbers that are not finite or beyond {most:.0f}")
+            raise ValueError(f"its plans have numbers that are not finite or exceed {most:.0f}")
     if (plans.dt != vehicle.dt).any():
-        raise ValueError(f"its plans have other steps than the vehicle's, {vehicle.dt} s")
+        raise ValueError(f"its plans do not have the vehicle's time step, {vehicle.dt} s")
     return plans

@@ -27,10 +27,12 @@ def export_plan(path: Path, out: Path) -> None:
     fields = read_json(path)
     vehicle = vehicle_recorded(fields.get("vehicle")) if isinstance(fields, dict) else None
     if vehicle is None:
-        raise StorageError(f"{path} is no plan of a known vehicle; give a file that `plan` or `solve` wrote.")
+        raise StorageError(
+            f"{path} is not a plan for a known vehicle; give a file that `plan` or `solve` wrote."
+        )
     if len(trailers_of(vehicle)) > MOST_TRAILERS:
         raise StorageError(
-            f"{path} is of a car with more than one trailer, for which dynobench has no model."
+            f"{path} is for a car with more than one trailer, for which dynobench has no model."
         )
     record = read_plan(path, vehicle)
     if record.plan is None:

@@ -82,7 +82,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         refuse_another(path, fields.get("vehicle", name_of(CAR)), vehicle)  # once files were of the car alone
         return _record(fields, vehicle)
     except KeyError as error:
-        raise StorageError(f"{path} has no field {error}; is it a plan?") from None
+        raise StorageError(f"{path} lacks the field {error}; is it a plan?") from None
     except ValueError as error:
         raise StorageError(f"{path}: {error}.") from None
 

@@ -42,9 +42,9 @@ class ProblemSlice:
 def format_of(path: Path) -> str:
     """The ending of ``path``, which says its format. Raises StorageError if problems have no such files."""
     if path.suffix not in FORMATS:
-        cut = ", or make problems of a map or of worlds by import-worlds" if path.exists() else ""
+        cut = ", or make problems from a map or worlds with import-worlds" if path.exists() else ""
         raise StorageError(
-            f"{path} ends in {path.suffix!r}, problems are {', '.join(FORMATS)}; rename it{cut}."
+            f"{path} ends in {path.suffix!r}; files of problems end in {', '.join(FORMATS)}. Rename it{cut}."
         )
     return path.suffix
 
@@ -188,6 +188,6 @@ def _opened(path: Path) -> Iterator[pq.ParquetFile]:
         raise StorageError(f"{path} does not exist; check the name.") from None
     except (pa.ArrowException, OSError) as error:
         reason = str(error).partition("\n")[0].rstrip(".")
-        raise StorageError(f"{path} is no whole Parquet file ({reason}); write it again.") from None
+        raise StorageError(f"{path} is not a complete Parquet file ({reason}); write it again.") from None
     except ValueError as error:
         raise StorageError(sentence(path, error)) from None

@@ -98,7 +98,9 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
     match format_of(path):
         case ".json":
             if len(rows) != 1:
-                raise StorageError(f"{path} can hold one problem, got {len(rows)}; use .jsonl or .parquet.")
+                raise StorageError(
+                    f"{path} can hold only one problem, got {len(rows)}; use .jsonl or .parquet."
+                )
             write_json(path, rows[0])
         case ".jsonl":
             with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
@@ -154,9 +156,11 @@ def _groups(groups: object, polygons: int) -> list[int] | None:
     if groups is None:
         return None
     if not isinstance(groups, list) or not all(type(size) is int and size > 0 for size in groups):
-        raise ValueError("groups must be counts of polygons above 0; correct or leave them out")
+        raise ValueError("groups must be numbers of polygons above 0; correct them or leave them out")
     if sum(groups) != polygons:
-        raise ValueError(f"groups are of {sum(groups)} polygons, obstacles are {polygons}; make them agree")
+        raise ValueError(
+            f"groups add up to {sum(groups)} polygons, but obstacles has {polygons}; make them agree"
+        )
     return groups
 
 

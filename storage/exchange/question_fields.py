@@ -61,8 +61,8 @@ def _refuse_other_hitches(fields: Mapping[str, Any], trailers: int, vehicle: Veh
         if isinstance(given, list) and len(given) != trailers and not asks_nothing:
             has = f"{trailers} trailers" if trailers else "no trailer"
             raise ValueError(
-                f"{name} lists {short(given)}, one angle a trailer, but {short(name_of(vehicle))} has {has}; "
-                f"{_NAME_IT}"
+                f"{name} lists {short(given)}, one angle per trailer, but {short(name_of(vehicle))} has "
+                f"{has}; {_NAME_IT}"
             )
 
 
@@ -78,7 +78,7 @@ def goal_of(fields: Mapping[str, Any]) -> Goal:
         pose: dict[str, Any] = {"heading": heading[0], "heading_tolerance": tolerance}
         speeds = numbers_of(fields, "goal_speed", 2, [0.0, 0.0])
     else:
-        _refuse(fields, "goal_tolerance", "a place has goal_radius; a pose is a goal of 3 numbers")
+        _refuse(fields, "goal_tolerance", "a place has goal_radius; a pose is a goal with 3 numbers")
         given = fields.get("goal_radius")
         radius = GOAL_RADIUS if given is None else number_of(given, "goal_radius")
         pose = {}

@@ -110,7 +110,7 @@ def open_run(path: Path) -> RunFolder:
     """The folder of a run that is there; a StorageError for any other place."""
     run = RunFolder(local_place(path))
     if not fetch(run.settings).is_file():
-        raise StorageError(f"{path} is no run: it has no {run.settings.name}; name a folder in DATA/runs.")
+        raise StorageError(f"{path} is not a run: it has no {run.settings.name}; name a folder in DATA/runs.")
     return run
 
 
@@ -154,7 +154,8 @@ def _open_remote(folder: Path) -> DataFolder:
         _check_layout(folder)
     elif not is_empty(folder):
         raise StorageError(
-            f"{shown(folder)} is not empty and has no {MARK}, so it is no data folder; give another folder."
+            f"{shown(folder)} is not empty and has no {MARK}, so it is not a data folder; "
+            "give another folder."
         )
     else:
         write_json(folder / MARK, {"layout": LAYOUT})

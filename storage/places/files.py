@@ -167,7 +167,7 @@ def _errors_in_one_line(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error).partition("\n")[0]
         raise StorageError(
-            f"{path} cannot be written: {reason}. Make room or give another place, and run it again."
+            f"{path} cannot be written: {reason}. Make room or name another place, then run it again."
         ) from error
 
 

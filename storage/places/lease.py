@@ -81,7 +81,7 @@ def _keep(address: Address, body: bytes, owner: str, tag: str, what: str, ended:
             _LOG.error("The lease of %s cannot be renewed: %s", what, error)
             return
         if held is None:
-            _LOG.error("Another command took %s over, because this one was silent too long.", what)
+            _LOG.error("Another command took over %s, because this one was silent for too long.", what)
             os.kill(os.getpid(), signal.SIGINT)
             return
 

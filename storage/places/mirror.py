@@ -50,7 +50,7 @@ def local_place(place: Path | str) -> Path:
         return Path(place)
     parts = [part for part in remote["key"].split("/") if part]
     if {".", ".."} & {remote["bucket"], *parts}:
-        raise StorageError(f"{place} is not a name in object storage; give s3://bucket/folder.")
+        raise StorageError(f"{place} is not an address in object storage; give s3://bucket/folder.")
     server = urlsplit(objects.endpoint()).netloc.rpartition("@")[2] or "s3.amazonaws.com"
     return cache_folder() / re.sub(r"[^A-Za-z0-9.-]", "-", server) / remote["bucket"] / Path(*parts)
 
@@ -176,7 +176,7 @@ def folders_here(place: str, name: str) -> Path:
     for packed in inside:
         fetch_folder(packed.with_suffix(""))
     if not inside and not fetch_folder(folder).exists():
-        raise StorageError(f"{place} holds nothing that could be fetched; check the name.")
+        raise StorageError(f"{place} holds nothing to fetch; check the name.")
     return folder
 
 

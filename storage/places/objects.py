@@ -192,9 +192,9 @@ def _one_line(verb: str, address: Address) -> Iterator[None]:
         text = " ".join(str(cause).split()).rstrip(".")
         if _may_pass(cause):
             raise UnreachableError(
-                f"{address} cannot be {verb} now: {text}. When storage is back, run the same command again."
+                f"{address} cannot be {verb} now: {text}. Repeat the command when storage is back."
             ) from error
-        question = " (is the bucket there?)" if _code(cause) == "NoSuchBucket" else ""
+        question = " (does the bucket exist?)" if _code(cause) == "NoSuchBucket" else ""
         raise StorageError(
             f"{address} cannot be {verb}: {text}. Check bucket, credentials and AWS_ENDPOINT_URL{question}."
         ) from error

@@ -105,7 +105,7 @@ def readable_attempts(folder: Path, names: Sequence[str]) -> tuple[pd.DataFrame,
         except StorageError as error:
             faults.append(str(error))
     if not tables:
-        raise StorageError(f"none of the files in {folder} can be read; the first: {faults[0]}")
+        raise StorageError(f"none of the files in {folder} can be read; the first fault: {faults[0]}")
     rows = pa.concat_tables(tables, promote_options="default")
     for number, field in enumerate(rows.schema):
         if pa.types.is_string(field.type):

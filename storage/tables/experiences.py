@@ -111,7 +111,7 @@ def _plan(problem: Problem, states: Array, controls: Array, dt: float, vehicle: 
     plan = Plan(states.reshape(-1, state_size(vehicle)).copy(), controls.reshape(-1, _CONTROL).copy(), dt)
     finite = np.isfinite(states).all() and np.isfinite(controls).all()
     if len(plan.states) != len(plan.controls) + 1 or not finite or dt != vehicle.dt:
-        raise ValueError(f"the plan of problem {short(problem.id)} is not one of the vehicle's")
+        raise ValueError(f"the plan of problem {short(problem.id)} does not belong to the vehicle")
     return plan
 
 
@@ -149,14 +149,14 @@ def merge_experiences(shards: Sequence[Path], path: Path, rows: Sequence[int], k
     """
     tables = [read_table(shard, EXPERIENCES) for shard in shards]
     if not tables:
-        raise StorageError(f"{path} has no shards to be made from; run collect.")
+        raise StorageError(f"{path} cannot be made, because it has no shards; run collect.")
     if any(_recorded(shard) != _recorded(shards[0]) for shard in shards):
         raise StorageError(
-            f"{path} would hold plans of several vehicles; run collect with a new data folder."
+            f"{path} would hold plans for several vehicles; run collect with a new data folder."
         )
     merged = pa.concat_tables(tables)
     if max(rows, default=-1) >= merged.num_rows:
-        raise StorageError(f"{path} would need more than the {merged.num_rows} rows there are; run collect.")
+        raise StorageError(f"{path} needs more than the {merged.num_rows} rows that exist; run collect.")
     write_table(path, merged.take(pa.array(rows, pa.int64())), key)
 
 
@@ -182,7 +182,7 @@ def vehicle_of_experiences(path: Path) -> Vehicle:
     """The vehicle of the experiences in the file at ``path``. Raises StorageError if it does not say one."""
     vehicle = vehicle_recorded(_recorded(path))
     if vehicle is None:
-        raise StorageError(f"{path} does not say which vehicle its plans are of; move it elsewhere.")
+        raise StorageError(f"{path} does not say which vehicle its plans are for; move it elsewhere.")
     return vehicle
 
 

@@ -88,7 +88,7 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     is learned yet.
     """
     if not gained_shards(folder):
-        raise StorageError(f"{folder} holds nothing that was learned; solve problems with --learn first.")
+        raise StorageError(f"{folder} holds no learned problems; solve problems with --learn first.")
     with locked(folder / ".lock", str(folder)):
         taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
         if taken:

@@ -91,7 +91,7 @@ def read_labelled(paths: Sequence[Path]) -> Labelled:
             made_for = table["plan_index"].to_numpy()
             ends = made_for.min(initial=-1), made_for.max(initial=-1)
             if made_for.dtype != np.int32 or ends[0] < -1 or ends[1] >= plans:
-                raise ValueError(f"plan_index has other values than -1 to {plans - 1}")
+                raise ValueError(f"plan_index has values outside -1 to {plans - 1}")
             parts.append((bits_of(table["grid"]), made_for, bits_of(table["labels"])))
     grids, indices, labels = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Labelled(grids, indices, labels, plans)

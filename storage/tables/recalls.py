@@ -51,7 +51,7 @@ def _read(path: Path) -> pd.DataFrame:
     with sound(path):
         orders = lists_of(table["order"])
         if any(order.min(initial=0) < 0 or order.max(initial=0) >= plans for order in orders):
-            raise ValueError(f"order has other plans than 0 to {plans - 1}")
+            raise ValueError(f"order has plans outside 0 to {plans - 1}")
         frame: pd.DataFrame = table.drop_columns(["order", "free"]).to_pandas()
         free = np.unpackbits(bits_of(table["free"]), axis=1, count=plans).astype(bool)
         return frame.assign(order=pd.Series(orders, dtype=object), free=list(free))

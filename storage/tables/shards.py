@@ -107,8 +107,8 @@ def sound(path: Path) -> Iterator[None]:
         yield
     except (pa.ArrowException, OSError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise StorageError(
-            f"{path} is no whole Parquet file of its kind ({_first_line(error)}); delete it and run its "
-            "stage again."
+            f"{path} is not a complete Parquet file of its kind ({_first_line(error)}); delete it and run "
+            "its stage again."
         ) from None
 
 
@@ -170,8 +170,8 @@ def table_of(rows: Sequence[dict[str, Any]], schema: pa.Schema, what: str) -> pa
         wrong = sorted(set(row) - names) + sorted(required - set(row))
         if wrong:
             raise StorageError(
-                f"{what} {number} has unknown fields or lacks some: {', '.join(wrong)}; "
-                f"wanted were {', '.join(schema.names)}."
+                f"{what} {number} has unknown or missing fields: {', '.join(wrong)}; "
+                f"expected {', '.join(schema.names)}."
             )
     try:
         return pa.Table.from_pylist(list(rows), schema=schema)

@@ -75,11 +75,11 @@ def _polygon(points: Any, where: str) -> Floats:
             raise ValueError(f"has the corner {short(point)} in {where}; expected [x, y] in metres")
     corners = np.array([[yaml_number(value, f"{where} corner") for value in point] for point in points])
     if not np.abs(corners).max() <= FARTHEST_M:
-        raise ValueError(f"has a corner in {where} farther than {FARTHEST_M:g} m away; are they metres?")
+        raise ValueError(f"has a corner in {where} farther than {FARTHEST_M:g} m away; is it in metres?")
     sides = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*sides.T)
     if lengths.min() < SMALLEST_M:
-        raise ValueError(f"has two corners of {where} at one place; leave one out")
+        raise ValueError(f"has two corners of {where} at the same place; leave one out")
     after = np.roll(sides, -1, axis=0)
     turns = sides[:, 0] * after[:, 1] - sides[:, 1] * after[:, 0]
     angles = np.arctan2(turns, (sides * after).sum(axis=1))

@@ -204,7 +204,7 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
     least, most = (yaml_number(speed, "limits.speed") for speed in speeds)
     if not (-_FASTEST <= least < most <= _FASTEST and most > 0.0):
         raise ValueError(
-            f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most], the most above 0 and above "
+            f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most] with most above 0 and above "
             f"the least, both within {_FASTEST:g}"
         )
     others = {name: _ranged(fields[name], name, "limits.") for name in _LIMITS[kind] if name != "speed"}

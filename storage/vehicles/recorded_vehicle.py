@@ -44,7 +44,7 @@ def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
     difference = first_difference(definition_of(recorded), definition_of(wanted))
     if difference:
         name = recorded.about.name.decode()
-        advice = f"ask for --vehicle {name if is_built_in(recorded) else 'with the file of that one'}"
+        advice = f"use --vehicle {name if is_built_in(recorded) else 'with the file of that vehicle'}"
         raise StorageError(
             f"{where} was made for vehicle {name}, expected {name_of(wanted)}: {difference}; {advice}, "
             "or make one for the expected vehicle."

@@ -33,8 +33,8 @@ def check_sizes(vehicle: Vehicle) -> None:
         narrow = min(half_length, half_width)
         if half_way > narrow:
             raise ValueError(
-                f"has step {vehicle.dt:g} s, in which a point of {body} moves up to {2.0 * half_way:.3g} m, "
-                f"more than the {2.0 * narrow:.3g} m that it is wide; give "
+                f"has a step of {vehicle.dt:g} s, in which a point of {body} moves up to "
+                f"{2.0 * half_way:.3g} m, more than the {2.0 * narrow:.3g} m that it is wide; give "
                 f"{vehicle.dt * narrow / half_way:.2g} s or less"
             )
     ahead: Vehicle | Trailer = vehicle
@@ -45,8 +45,8 @@ def check_sizes(vehicle: Vehicle) -> None:
         for angle in angles:
             if _shape(ahead).intersects(_turned(trailer, angle)):
                 raise ValueError(
-                    f"has trailer {number} touch the body in front at a hitch angle of {abs(angle):.2f} rad; "
-                    "give a smaller max_hitch, a longer hitch_length or shorter bodies"
+                    f"has a trailer {number} that touches the body in front at a hitch angle of "
+                    f"{abs(angle):.2f} rad; give a smaller max_hitch, a longer hitch_length or shorter bodies"
                 )
         ahead = trailer
 
@@ -67,7 +67,7 @@ def scale_for(vehicle: Vehicle) -> float:
     scale = 2.0 ** math.ceil(math.log2(max(needs)))
     if not SCALES[0] <= scale <= SCALES[1]:
         longest = 2.0 * max(length for _, length, _, _ in _paces(vehicle))
-        raise ValueError(f"has a body {longest:g} m long; expected some centimetres to 100 metres")
+        raise ValueError(f"has a body {longest:g} m long; expected a few centimetres to 100 metres")
     return scale
 
 

@@ -33,7 +33,7 @@ def read_vehicle(file: Path) -> Vehicle:
         vehicle = vehicle_of(yaml_fields(file, "vehicle", FIELDS, _MOST_BRACKETS))
         if vehicle.about.name.decode() in VEHICLES and not is_built_in(vehicle):
             raise ValueError(
-                f"has the name of another, {short(vehicle.about.name.decode())}; give it its own"
+                f"has the name of another vehicle, {short(vehicle.about.name.decode())}; choose another name"
             )
     except ValueError as error:
         raise StorageError(f"{file} {str(error).rstrip('.')}.") from None

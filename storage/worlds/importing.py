@@ -55,7 +55,7 @@ class Imported:
         """What was left out, in a few words."""
         if not self.skipped:
             return "it is empty"
-        return f"{len(self.skipped)} were skipped; the first {self.skipped[0][1]}"
+        return f"{len(self.skipped)} were skipped; the first one {self.skipped[0][1]}"
 
 
 def import_part(

@@ -67,7 +67,7 @@ def _case_of_line(file: Path) -> Fields:
     counts = [next_count("a number of corners") for _ in range(next_count("the number of obstacles"))]
     obstacles = [[[next_number("x"), next_number("y")] for _ in range(count)] for count in counts]
     if (extra := next(numbers, None)) is not None:
-        raise ValueError(f"goes on with {short(extra)} after its last obstacle; are its counts right?")
+        raise ValueError(f"continues with {short(extra)} after its last obstacle; are its counts right?")
     return {"id": file.stem, "start": start, "goal": goal, "obstacles": obstacles}
 
 
@@ -78,11 +78,11 @@ def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]
     ``environment``, ``start``, ``goal`` and ``bounds``. These hold the reference point and not the body, and
     so are widened by as far as the vehicle reaches. Raises ValueError or StorageError.
     """
-    check_file(file, LARGEST_FILE, "is it a file of Bench-MR's scenes?")
+    check_file(file, LARGEST_FILE, "is it a file with scenes of Bench-MR?")
     fields = _object(file)
     environments = fields.get("environments")
     if not isinstance(environments, Mapping):
-        raise ValueError("has no environments, polygons by the name of a scene; is it of Bench-MR?")
+        raise ValueError("has no environments (polygons by name of scene); is it from Bench-MR?")
     reach = vehicle.scale * math.hypot(max(vehicle.front, vehicle.rear), 0.5 * vehicle.width)
     for problem in _listed(fields, "problems"):
         name = text_of(problem.get("environment"), "environment")
@@ -106,7 +106,7 @@ def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fiel
         model = text_of(problem.get("model"), "model")
         wanted = f"dynobench-{model.replace('_', '-')}"
         if vehicle.about.name.decode() != wanted:
-            yield _id(problem), f"is for the model {model}; its --vehicle is one of the name {wanted}"
+            yield _id(problem), f"is for the model {model}; use it with a --vehicle named {wanted}"
             continue
         kind = model.startswith("car"), model.startswith("unicycle2")
         fields: Fields = {"bounds": _corners(problem.get("bounds"))}
@@ -123,7 +123,7 @@ def _in_yaml(file: Path) -> Fields:
         raise ValueError("has no environment with one robot; problems of several are not supported")
     robot = robots[0]
     if not isinstance(robot, Mapping):
-        raise ValueError("has a robot without type, start and goal; is it of dynobench?")
+        raise ValueError("has a robot without type, start and goal; is it from dynobench?")
     return {
         "id": file.stem,
         "model": robot.get("type"),
@@ -185,7 +185,7 @@ def _object(file: Path) -> Mapping[str, Any]:
 def _listed(fields: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
     values = fields.get(name)
     if not isinstance(values, list) or not all(isinstance(each, Mapping) for each in values):
-        raise ValueError(f"has no list of {name}; is it of this format?")
+        raise ValueError(f"has no list of {name}; is it in this format?")
     return values
 
 

@@ -36,7 +36,7 @@ def read_map(file: Path, name: str, resolution: float | None = None) -> Occupanc
     lines = read_text(file).splitlines()
     words = [line.split() for line in lines[:4]]
     if [word[0] if word else "" for word in words] != list(_HEADER):
-        raise ValueError(f"does not begin with the lines {', '.join(_HEADER)}; is it a map of Moving AI?")
+        raise ValueError(f"does not begin with the lines {', '.join(_HEADER)}; is it a Moving AI map?")
     rows, columns = _count(words[1], "height"), _count(words[2], "width")
     check_size(rows, columns)
     cells = lines[4:]
@@ -65,7 +65,7 @@ def map_of_scenarios(file: Path) -> Path:
     name = first[1].replace("\\", "/").rpartition("/")[2]
     path = file.parent / name
     if not name.endswith(".map") or not path.is_file():
-        raise ValueError(f"is of map {name[:60]!r}, which does not lie beside it; put it there")
+        raise ValueError(f"is for map {name[:60]!r}, which is not beside it; put it there")
     return path
 
 
@@ -88,7 +88,8 @@ def read_scenarios(file: Path, world: OccupancyMap) -> Floats:
             raise ValueError(f"scenario {number} does not consist of {' '.join(_SCENARIO)}") from None
         if (width, height) != (columns, rows):
             raise ValueError(
-                f"scenario {number} is of a map of {width} x {height} cells, the map has {columns} x {rows}"
+                f"scenario {number} is for a map of {width} x {height} cells, but the map has "
+                f"{columns} x {rows}"
             )
         if not all(0 <= cell < most for cell, most in zip(cells, (columns, rows) * 2, strict=True)):
             raise ValueError(f"scenario {number} begins or ends outside of the map")
@@ -102,7 +103,7 @@ def _rows(file: Path) -> list[list[str]]:
     check_file(file, LARGEST_FILE, _ADVICE)
     lines = read_text(file).splitlines()
     if not lines or not lines[0].startswith("version"):
-        raise ValueError("does not begin with a version; is it a file of scenarios?")
+        raise ValueError("does not begin with a version; is it a scenario file?")
     rows = [line.split() for line in lines[1:] if line.strip()]
     for number, words in enumerate(rows, start=1):
         if len(words) != len(_SCENARIO):
@@ -113,5 +114,5 @@ def _rows(file: Path) -> list[list[str]]:
 def _count(words: list[str], what: str) -> int:
     count = whole_number(words[1]) if len(words) == 2 else None
     if count is None:
-        raise ValueError(f"has no whole number as its {what}; is it a map of Moving AI?")
+        raise ValueError(f"has no whole number as its {what}; is it a Moving AI map?")
     return count

@@ -127,4 +127,4 @@ def _arrays(file: Path) -> list[tuple[str, Array]]:
 
 def _broken(error: Exception) -> ValueError:
     reason = (str(error) or type(error).__name__).partition("\n")[0][:100]
-    return ValueError(f"is no whole NumPy file ({reason})")
+    return ValueError(f"is not a complete NumPy file ({reason})")

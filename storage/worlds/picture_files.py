@@ -42,7 +42,7 @@ def read_picture(file: Path, kinds: tuple[str, ...], wanted: tuple[int, int] | N
         raise
     except Exception as error:  # Pillow raises anything for a file that only begins like a picture
         reason = str(error).partition("\n")[0]
-        raise ValueError(f"is no whole {' or '.join(kinds)} picture ({reason})") from None
+        raise ValueError(f"is not a complete {' or '.join(kinds)} picture ({reason})") from None
     paper = Image.new("RGBA", coloured.size, "white")
     paper.alpha_composite(coloured)
     return Picture(np.asarray(paper.convert("L")), np.asarray(coloured.getchannel("A")) > 0)

@@ -36,7 +36,7 @@ def polygon_world(file: Path, identity: str, class_name: str) -> Problem:
         except PolygonError as error:
             raise ValueError(f"polygon {number} {error}") from None
     if (extra := next(words, None)) is not None:
-        raise ValueError(f"goes on with {extra[:20]!r} after its last polygon; is its first number right?")
+        raise ValueError(f"continues with {extra[:20]!r} after its last polygon; is its first number right?")
     return Problem(
         identity, class_name, CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of(groups)
     )

@@ -36,7 +36,7 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
         raise ValueError("has no origin [x, y, yaw] in metres and radians")
     x, y, yaw = (yaml_number(value, "origin") for value in origin)
     if not all(math.isfinite(value) and abs(value) <= FARTHEST_ORIGIN_M for value in (x, y, yaw)):
-        raise ValueError("has an origin that is not finite or not on earth; expected [x, y, yaw]")
+        raise ValueError("has an origin that is not finite or impossibly far away; expected [x, y, yaw]")
     picture = read_picture(_picture_file(file, fields["image"]), ("PNG", "PPM"))
     occupied, free = _judged(picture, fields)
     return OccupancyMap(name, (occupied if not unknown_is_occupied else ~free)[::-1], resolution, (x, y, yaw))
@@ -55,9 +55,7 @@ def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
     if mode not in MODES:
         raise ValueError(f"has mode {str(mode)[:20]!r}; known are {', '.join(MODES)}")
     if free_to > occupied_from:
-        raise ValueError(
-            f"has free_thresh {free_to:g} above occupied_thresh {occupied_from:g}; exchange them"
-        )
+        raise ValueError(f"has free_thresh {free_to:g} above occupied_thresh {occupied_from:g}; swap them")
     levels = picture.levels.astype(float)
     if mode == "raw":
         is_known = picture.drawn & (levels <= 100.0)  # percent; 101 to 255 is unknown
@@ -83,15 +81,15 @@ def _fields(file: Path) -> Mapping[str, Any]:
 
 def _picture_file(file: Path, image: object) -> Path:
     if not isinstance(image, str) or not image.isprintable():
-        raise ValueError("has no picture's name as its image")
+        raise ValueError("does not name a picture as its image")
     folder = file.resolve().parent
     try:
         path = (folder / image).resolve()
         exists = path.is_file()
     except (OSError, RuntimeError):  # too long a name, links in a circle
-        raise ValueError(f"names the image {image[:60]!r}, which no file can be called") from None
+        raise ValueError(f"names the image {image[:60]!r}, which is not a possible file name") from None
     if not path.is_relative_to(folder):
-        raise ValueError(f"has its image {image[:60]!r} outside of its own folder; put it beside the YAML")
+        raise ValueError(f"has its image {image[:60]!r} outside its own folder; put it beside the YAML")
     if not exists:
         raise ValueError(f"names the image {image[:60]!r}, which is not there; put it beside the YAML")
     return path

@@ -124,7 +124,7 @@ def _refuse_picture_of_map(path: Path) -> None:
     beside = [path.with_suffix(ending) for ending in (".yaml", ".yml") if path.with_suffix(ending).is_file()]
     there = f"give {beside[0]}" if beside else "write one, as ROS's map_server does, and give that"
     raise StorageError(
-        f"{path} is a picture; as a map it needs a YAML file that says how large a pixel is: {there} "
+        f"{path} is a picture; to be a map, it needs a YAML file that says how large a pixel is: {there} "
         "(docs/worlds.md)."
     )
 
@@ -138,7 +138,7 @@ def _format_of_folder(folder: Path) -> str:
     inside = [entry for entry in _files(folder) if entry.is_dir() or entry.suffix in MAPS]
     if inside:
         names = ", ".join(entry.name for entry in inside[:6])
-        raise StorageError(f"{folder} holds no worlds itself; give one of {names}.")
+        raise StorageError(f"{folder} does not hold worlds itself; give one of {names}.")
     raise StorageError(f"{folder} holds no worlds ({', '.join(WORLDS)}); give another folder.")
 
 

@@ -106,13 +106,13 @@ def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data:
     any_drifted = any(drift.has_drifted for drift in comparisons)
     server = _server([data, default_data()]) if comparisons else None
     if server is None:
-        return lines + ["no Prefect server got the event: `motion-memory serve` runs one"] * any_drifted
+        return lines + ["no Prefect server received the event: `motion-memory serve` runs one"] * any_drifted
     url = server["PREFECT_API_URL"]
     try:
         _send(server, comparisons)
     except Exception as error:  # whatever fails in Prefect, the problems are solved
         reason = (str(error) or type(error).__name__).splitlines()[0]
-        return [*lines, f"Prefect at {url} did not get the events: {reason}"]
+        return [*lines, f"Prefect at {url} did not receive the events: {reason}"]
     return lines + [f"event {DRIFT} sent to {url}"] * any_drifted
 
 

@@ -37,21 +37,25 @@ def dry_run(data: Path, settings: RunSettings) -> list[str | CellTable]:
     """
     path = local_place(data).expanduser().absolute()
     if not fetch(path / MARK).is_file():
-        return [f"{data} is no data folder yet: the run {settings.run_name} would make the first champions."]
+        return [
+            f"{data} is not a data folder yet: the run {settings.run_name} would make the first champions."
+        ]
     folder = DataFolder(path)
     pending = pending_retraining(folder, settings, Registry(folder))
     said: list[str | CellTable] = []
     first_run = pending.first_run
     if first_run is not None:
         names = ", ".join([*first_run.class_names, *([COMBINED] if first_run.combined else [])])
-        said.append(f"No champion yet of {names}: the run {first_run.run_name} would make the first.")
+        said.append(
+            f"There is no champion of {names} yet: the run {first_run.run_name} would make the first."
+        )
     rows = [
         _row(folder, settings, pending, name) for name in settings.class_names if name in pending.champions
     ]
     if rows:
         said.append(CellTable("Retraining now", HEADINGS, [rows], "retraining", FIELDS))
     if first_run is None and not pending.fresh:
-        said.append("Nothing new was learned since champions were last judged: nothing would be done.")
+        said.append("Nothing new has been learned since champions were last judged: nothing would be done.")
     return said
 
 

@@ -68,7 +68,7 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
         if version is not None and version.tag("verdict") in (AWAITING, PROMOTED)
     ]
     if not awaiting:
-        raise RunError(f"{_subject(memory)} no challenger awaits approval; `retrain --approve` leaves one.")
+        raise RunError(f"No challenger{_of(memory)} awaits approval; `retrain --approve` leaves one.")
     changes = []
     for challenger in awaiting:
         promote(registry, challenger)
@@ -95,7 +95,7 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
     current = [registry.aliased(name) for name in _names(registry, memory)]
     champions = [version for version in current if version is not None and version.tag("previous")]
     if not champions:
-        raise RunError(f"{_subject(memory)} no champion has one before it: nothing to roll back to.")
+        raise RunError(f"No champion{_of(memory)} has a previous one to roll back to.")
     last = max(champion.retraining for champion in champions)
     changes = []
     for champion in champions:
@@ -111,8 +111,8 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
         )
         if before is None:
             raise RunError(
-                f"{champion.name}: version {champion.tag('previous')}, the champion before, is not in the "
-                f"registry any more; version {champion.number} stays."
+                f"{champion.name}: version {champion.tag('previous')}, the previous champion, is no longer "
+                f"in the registry; version {champion.number} stays."
             )
         registry.tagged(champion, {"verdict": ROLLED_BACK})
         registry.set_alias(
@@ -125,7 +125,7 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
 def _registry(data: Path) -> Registry:
     folder = local_place(data).expanduser().absolute()
     if not fetch(folder / MARK).is_file():
-        raise RunError(f"{data} is no data folder: it has no {MARK}.")
+        raise RunError(f"{data} is not a data folder: it has no {MARK}.")
     return Registry(DataFolder(folder))
 
 
@@ -140,5 +140,5 @@ def _names(registry: Registry, memory: str | None) -> Sequence[str]:
     return matching
 
 
-def _subject(memory: str | None) -> str:
-    return "In the registry" if memory is None else f"Of {memory}"
+def _of(memory: str | None) -> str:
+    return "" if memory is None else f" of {memory}"

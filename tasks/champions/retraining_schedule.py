@@ -80,7 +80,7 @@ def serve(
             server.wait()
             _LOG.info(str(server))
         when = f"by {cron!r}" if cron else f"every {every or DAY:g} seconds"
-        _LOG.info("retrains %s, and when hits have fallen; Ctrl-C ends it", when)
+        _LOG.info("retrains %s, and whenever hits have fallen; Ctrl-C ends it", when)
         try:
             _run(deployment)
         finally:
@@ -112,7 +112,7 @@ def _schedule(every: float | None, cron: str | None) -> dict[str, Any]:
 
 
 def _no_cron(text: str) -> UsageError:
-    return UsageError(f'{text!r} is no cron expression; give one like "0 3 * * *".')
+    return UsageError(f'{text!r} is not a cron expression; give one like "0 3 * * *".')
 
 
 def _deployment(

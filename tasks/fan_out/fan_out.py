@@ -133,8 +133,8 @@ def _local(workers: int) -> Iterator[Any]:
             )
         except RuntimeError as error:  # Dask starts a worker again only once it has run
             raise RunError(
-                "A worker process ended while it was starting. What is finished is kept; the same "
-                "command goes on from here."
+                "A worker process ended while it was starting. Finished chunks are kept; repeat the "
+                "command to continue."
             ) from error
         try:
             yield local
@@ -275,7 +275,7 @@ def _wait_for_scheduler(client: Any, losses: int) -> None:
     if client.status != "running" or losses > LOSSES_ALLOWED:
         raise RunError(
             f"The Dask scheduler went away {losses} times, or for more than {RECONNECT_SECONDS} s; finished "
-            "chunks are kept: when it is back, the same command goes on."
+            "chunks are kept: repeat the command when it is back."
         )
 
 

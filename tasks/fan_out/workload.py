@@ -107,5 +107,5 @@ def record_load(what: str, works: Sequence[Work | None]) -> None:
         loads.append(load)
     by = f", by {load.workers} workers in {load.busy_seconds:,.1f} s of work" if done else ""
     left = len(works) - len(done)
-    reused = f"; {left:,} reused, as nothing they depend on has changed" if left else ""
+    reused = f"; {left:,} reused, because nothing they depend on has changed" if left else ""
     _LOG.info("%s: %s of %s chunks done%s%s", what, f"{len(done):,}", f"{len(works):,}", by, reused)

@@ -26,10 +26,16 @@ class Shortfall(NamedTuple):
     wanted: int
     is_left_out: bool  # or the run goes on with those that are kept
 
+    @property
+    def found(self) -> str:
+        """How many experiences there are, and why."""
+        return (
+            f"Class {self.class_name} has only {self.kept} of {self.wanted} experiences, because too few of "
+            "its problems were solved"
+        )
+
     def __str__(self) -> str:
-        found = f"{self.kept} of {self.wanted} wanted experiences, as too few of its problems were solved"
-        does = "is left out of the run" if self.is_left_out else "goes on with fewer"
-        return f"Class {self.class_name} {does}: {found}."
+        return f"{self.found}; {'it is left out' if self.is_left_out else 'the run continues with these'}."
 
 
 def shortfalls(data: str, settings: RunSettings) -> list[Shortfall]:
@@ -76,8 +82,8 @@ def leave_out(data: str, settings: RunSettings) -> RunSettings:
     left_out = tuple(each.class_name for each in short if each.is_left_out)
     whole = settings.strict or settings.retraining is not None
     if short and (whole or len(left_out) == len(settings.class_names)):
-        told = " ".join(map(str, short))
-        raise RunError(f"{told} Ask for fewer experiences, or take easier problems.")
+        told = ". ".join(each.found for each in short)
+        raise RunError(f"{told}. Ask for fewer experiences or easier problems.")
     settings = replace(settings, left_out=left_out)
     if left_out:
         keep_settings(data, settings)

@@ -162,8 +162,8 @@ class Registry:
             reason = " ".join(str(error).split())[:300] or type(error).__name__
             raise RunError(
                 redacted(
-                    f"MLflow's registry at {self.uri} cannot be used, and the champions are as they were; "
-                    f"give the same command again later: {reason}"
+                    f"MLflow's registry at {self.uri} cannot be used, and the champions are unchanged; "
+                    f"repeat the command later: {reason}"
                 )
             ) from error
 

@@ -107,7 +107,7 @@ def download(uri: str, scratch: str, server: str) -> Path:
             folder = Path(download_artifacts(uri, dst_path=scratch))
     except Exception as error:  # each of MLflow's stores has errors of its own
         reason = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RunError(redacted(f"{uri} cannot be had from MLflow at {server}: {reason}")) from error
+        raise RunError(redacted(f"{uri} cannot be fetched from MLflow at {server}: {reason}")) from error
     memories = sorted(found.parent for header in HEADERS for found in folder.rglob(header))
     if len(memories) != 1:
         raise RunError(

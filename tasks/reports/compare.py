@@ -61,9 +61,9 @@ def compare(
             first run can be compared with.
     """
     if len(runs) < 2:
-        raise UsageError(f"{len(runs)} run to compare: give two or more, folders in DATA/runs.")
+        raise UsageError(f"{len(runs)} run to compare: give two or more folders in DATA/runs.")
     if out is not None and out.suffix not in ENDINGS:
-        raise UsageError(f"{out} ends in none of {', '.join(ENDINGS)}.")
+        raise UsageError(f"{out} does not end in one of {', '.join(ENDINGS)}.")
     names = _names(runs)
     settings = [recorded_settings(open_run(run)) for run in runs]
     different = _different(settings)

@@ -39,7 +39,7 @@ def export_run(folder: Path, form: str, out: Path) -> None:
     if ENDINGS[form] and out.suffix != ENDINGS[form]:
         raise UsageError(f"{out} does not end in {ENDINGS[form]}.")
     if form == "ompl" and out.exists():
-        raise UsageError(f"{out} is there already; give a new folder for the logs.")
+        raise UsageError(f"{out} already exists; give a new folder for the logs.")
     if form == "dynobench":
         check_outputs([folder], [out])
         export_plan(folder, out)

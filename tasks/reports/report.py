@@ -126,9 +126,9 @@ def check_verified(attempts: pd.DataFrame) -> None:
     if len(wrong):
         first = wrong.iloc[0]
         raise StorageError(
-            f"{len(wrong):,} of {len(attempts):,} attempts count as solved by plans that the authority did "
+            f"{len(wrong):,} of {len(attempts):,} attempts count as solved with plans that the authority did "
             f"not accept; the first: {first['problem_id']} by {first['planner']}, {first['assist']} "
-            f"{first['top_k']}. No report is made of them."
+            f"{first['top_k']}. No report is made from them."
         )
 
 

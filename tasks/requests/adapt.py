@@ -95,7 +95,7 @@ def adapt(
             told = _told(old, new, [Outcome[name] for result in results for name in result.outcomes])
             if not kept:
                 remove_folder(parts_folder(out))
-                raise RunError(f"{told.summary}. Gather plans of {name_of(new)} instead.")
+                raise RunError(f"{told.summary}. Gather plans for {name_of(new)} instead.")
             _save(out, stored, new, kept, seed)
             remove_folder(parts_folder(out))
     return told

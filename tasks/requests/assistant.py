@@ -85,12 +85,12 @@ class Assistant:
         vehicle = checked_vehicle(vehicle)
         check_known("recall", [] if recall is None else [recall], RECALLS)
         if top_k < 1:
-            raise UsageError(f"Top k is {top_k}: give 1 or more.")
+            raise UsageError(f"top-k is {top_k}: give 1 or more.")
         check_seed(seed)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:
-            raise UsageError(f"Improve for {improve_seconds} seconds: give 0 or more.")
+            raise UsageError(f"--improve-seconds is {improve_seconds}: give 0 or more.")
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
         self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
@@ -113,7 +113,7 @@ class Assistant:
         if isinstance(memory, PlanLibrary) and recall is not None:
             raise UsageError(
                 f"--recall {recall} is for memories of runs; {address} is a library, which recalls in one "
-                "way. Leave --recall out."
+                "way. Leave out --recall."
             )
         return memory
 
@@ -208,7 +208,9 @@ def plan_one(
     check_outputs([problem, *assistant.files], [out, drawing])
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
-        raise RunError(f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes many.")
+        raise RunError(
+            f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes any number."
+        )
     with no_garbage_collection():
         assistant.warm_up(problems[0])
         attempt, plan = assistant(problems[0])
@@ -274,7 +276,7 @@ def _folder_of(class_name: str, folder: Path) -> str:
     if len({archive.name for archive in archives}) > 1 and archives[0].name not in (class_name, COMBINED):
         names = ", ".join(sorted(archive.name for archive in archives))
         raise RunError(
-            f"{memories} holds several memories, none of class {class_name!r}: give the problem one of these "
-            f"classes, or name a folder, as in --memory {archives[0]}. There are: {names}."
+            f"{memories} holds several memories, but none for class {class_name!r}: give the problem one of "
+            f"these classes, or name a folder, as in --memory {archives[0]}. There are: {names}."
         )
     return str(archives[0] if archives else folder)

@@ -110,7 +110,7 @@ def drive_route(
     pose = _numbers_of(start, 3, "--from", "x,y,heading in metres and radians")
     goals_m = [(x, y) for x, y in (_numbers_of(goal, 2, "--to", "x,y in metres") for goal in goals)]
     if not goals_m:
-        raise UsageError("No goal. Give --to x,y, once or several times.")
+        raise UsageError("There is no goal: give --to x,y once or more often.")
     if assistant.vehicle.min_speed >= 0.0:
         raise UsageError(
             f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
@@ -124,7 +124,7 @@ def drive_route(
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
     if max(canonical.size) > WIDEST_M:
         raise UsageError(
-            f"{path} is {max(world.size):,.0f} m wide, at scale {scale:g} a route may cross "
+            f"{path} is {max(world.size):,.0f} m wide; at scale {scale:g} a route can cross at most "
             f"{scale * WIDEST_M:,.0f} m; cut the map, or correct --scale or --resolution."
         )
     solver = _Solver(assistant, scale)
@@ -179,9 +179,9 @@ def _drive_mirrored(
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    line = f"No route over {world.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
+    line = f"No route across {world.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
     if stuck.attempts == 0:
-        return UsageError(f"{line}; give another place.")
+        return UsageError(f"{line}; choose another place.")
     return RunError(
         f"{line} ({stuck.attempts} local problems tried); try another --seed, heading or planner."
     )
@@ -192,7 +192,7 @@ def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
     route_faults = faults(route.problem, plan, assistant.vehicle)
     if route_faults:
         raise PlanFaultError(
-            f"The route over {route.problem.id}, seed {assistant.settings.seed}: {route_faults[0]}"
+            f"The route across {route.problem.id}, seed {assistant.settings.seed}: {route_faults[0]}"
         )
 
 

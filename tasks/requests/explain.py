@@ -23,8 +23,8 @@ USES: Final = {
 _PARTS: Final = {  # by the source of the answer, where parts of plans are recalled and not whole ones
     "recalled": "parts {}, driven again",
     "repaired": "the search joined the end of one {}",
-    "searched": "no part {} leads to the goal more quickly than what was found without them",
-    None: "no part {} leads to the goal, and nothing else was found",
+    "searched": "no part {} leads to the goal more quickly than the plan found without them",
+    None: "no part {} leads to the goal, and no other plan was found",
 }
 HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
 FIELDS: Final = (

@@ -100,7 +100,7 @@ def gather(
     """
     check_count("plans", plans)
     if not 0.0 <= poses <= 1.0:
-        raise UsageError(f"A share of {poses:g} poses: give 0 to 1.")
+        raise UsageError(f"--poses is {poses:g}: give a share from 0 to 1.")
     check_known("difficulty", [difficulty], DIFFICULTIES)
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
     refuse_foreign(out, is_library, "library")
@@ -114,12 +114,12 @@ def gather(
         kept, tried = _kept(request, results)
         if not kept:
             raise RunError(
-                f"None of the {tried.total()} questions asked was answered; give easier or other sources."
+                f"None of the {tried.total()} questions was answered; give easier or other sources."
             )
         if len(kept) < plans:
             _LOG.warning(
-                "%d of the %d questions asked were answered, fewer than the %d plans wanted: the library "
-                "holds those; more sources give more.",
+                "Only %d of the %d questions were answered, fewer than the %d plans wanted: the library "
+                "holds these plans; give more sources to get more.",
                 *(len(kept), tried.total(), plans),
             )
         _save(request, kept)

@@ -120,7 +120,7 @@ def import_worlds(
     check_known("format", [] if source_format is None else [source_format], FORMATS)
     check_known("part", [part], (*PARTS, BOTH))
     if out.suffix not in ("", *PROBLEM_FORMATS):
-        raise UsageError(f"{out} is neither a folder's name nor ends in {', '.join(PROBLEM_FORMATS)}.")
+        raise UsageError(f"{out} is neither the name of a folder nor ends in {', '.join(PROBLEM_FORMATS)}.")
     check_picture(drawing)
     source = source_at(path, source_format)
     check_outputs([path] if path.is_dir() else source.contents(), [out, drawing])
@@ -154,7 +154,7 @@ def _write(out: Path, imported_parts: Mapping[Part, Imported], vehicle: Vehicle)
     for problem in (problem for imported in imported_parts.values() for problem in imported.problems):
         if problem.id in problems:
             raise RunError(
-                f'Both parts have a problem "{problem.id}"; ask for one --part, or --out a folder.'
+                f'Both parts have a problem "{problem.id}"; choose one --part, or give a folder as --out.'
             )
         problems[problem.id] = problem
     write_problems(out, list(problems.values()), vehicle)
@@ -164,7 +164,9 @@ def _refuse_unused(source: Source, settings: ImportSettings, drawing: Path | Non
     """Raise UsageError for an option that would change nothing."""
     if source.is_map:
         if source.format == "ros" and settings.resolution is not None:
-            raise UsageError(f"--resolution is not for {source.path}: its YAML file gives it.")
+            raise UsageError(
+                f"--resolution cannot be used for {source.path}: its YAML file gives the resolution."
+            )
         return
     given = [name for name, default in ONLY_OF_MAPS.items() if getattr(settings, name) != default]
     given += ["scale"] * (settings.scale != settings.vehicle.scale)
@@ -187,7 +189,7 @@ def _refuse_empty(source: Source, out: Path, imported_parts: Mapping[Part, Impor
     empty = [part for part, imported in imported_parts.items() if not imported.problems]
     if len(empty) == len(imported_parts) or (out.suffix == "" and empty):
         reason = imported_parts[empty[0]].explained()
-        raise RunError(f"{source.path} holds no usable problem of part {empty[0]} ({reason}).")
+        raise RunError(f"{source.path} holds no usable problem for part {empty[0]} ({reason}).")
 
 
 def _cells(source: Source, part: str, imported: Imported, seconds: float) -> list[str]:

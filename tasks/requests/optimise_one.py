@@ -51,7 +51,7 @@ class InitialGuess:
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
             if record.plan is None or len(record.plan.controls) == 0:
-                raise RunError(f"{self.plan} holds no plan to begin with: its status is {record.status!r}.")
+                raise RunError(f"{self.plan} holds no plan to start from: its status is {record.status!r}.")
             x, y = ((a - b) / problem.scale for a, b in zip(record.offset, problem.offset, strict=True))
             return shifted(record.plan, (x, y)), record.planner
         if self.planner is None:
@@ -60,7 +60,7 @@ class InitialGuess:
         outcome = plan(self.planner, problem, rng, vehicle=self.vehicle)
         if outcome.plan is None:
             raise RunError(
-                f"{self.planner} found no plan to begin with for {problem.id}: {outcome.status}; "
+                f"{self.planner} found no plan to start from for {problem.id}: {outcome.status}; "
                 "try --straight."
             )
         return outcome.plan, self.planner
@@ -72,7 +72,7 @@ class InitialGuess:
             made_for = f"problem {record.problem_id} (scale {record.scale:g})"
             wanted = f"{problem.id} (scale {problem.scale:g})"
             _LOG.warning(
-                "%s was made for %s; it is taken as a first guess for %s", self.plan, made_for, wanted
+                "%s was made for %s; it is used as a first guess for %s", self.plan, made_for, wanted
             )
 
 
@@ -105,7 +105,7 @@ def initial_guess(
     options = {"--plan": plan_file, "--planner": planner, "--straight": straight}
     given = [option for option, value in options.items() if value]
     if len(given) > 1:
-        raise UsageError(f"{' and '.join(given)} are given; give one of them.")
+        raise UsageError(f"{' and '.join(given)} cannot be combined; give one of them.")
     check_known("planner", [planner] if planner else [], tuple(PLANNERS))
     vehicle = checked_vehicle(vehicle)
     check_seed(seed)

@@ -117,7 +117,7 @@ def is_readable(shard: Path, key: str) -> bool:
 def refuse_foreign(out: Path, is_own: Callable[[Path], bool], called: str) -> None:
     """Raise UsageError if there is anything at ``out`` but an empty folder or what ``is_own``."""
     if out.exists() and not (is_own(out) or (out.is_dir() and not any(out.iterdir()))):
-        raise UsageError(f"{out} exists and is no {called}; give --out the name of a new folder.")
+        raise UsageError(f"{out} exists and is not a {called}; give --out the name of a new folder.")
 
 
 @contextmanager

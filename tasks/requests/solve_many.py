@@ -145,7 +145,7 @@ def _malformed(faults: Sequence[str]) -> StorageError:
     others = f" {more} more {'part has' if more == 1 else 'parts have'} a malformed problem." if more else ""
     return StorageError(
         f"{faults[0].rstrip('.')}.{others} All other parts are solved and kept: correct the problem and "
-        "give the same command again."
+        "repeat the command."
     )
 
 
@@ -197,7 +197,7 @@ def _repeated_id(parts: Sequence[FilePart], id_hashes: Floats) -> str | None:
         first_location, first_id = _location_and_id(parts, ends, int(order[i]))
         location, identity = _location_and_id(parts, ends, int(order[i + 1]))
         if identity == first_id:
-            return f'{location}: id "{identity}" is that of {first_location} too; give each problem its own.'
+            return f'{location}: id "{identity}" is also that of {first_location}; give each problem its own.'
     return None
 
 

@@ -27,9 +27,9 @@ def verify(folder: Path, sample: float, workers: int) -> Counter[str]:
         RunError: the folder is no data folder, or something in it is wrong.
     """
     if not 0.0 <= sample <= 1.0:
-        raise UsageError(f"Sample is {sample}: give a share from 0 to 1.")
+        raise UsageError(f"--sample is {sample}: give a share from 0 to 1.")
     if not fetch(local_place(folder) / MARK).is_file():
-        raise RunError(f"{folder} is no data folder: it has no {MARK}.")
+        raise RunError(f"{folder} is not a data folder: it has no {MARK}.")
     set_environment(open_data_folder(folder).path)
     from tasks.requests.verify_folder import verify_folder
 

@@ -77,7 +77,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
     for gained in data.gained_folders():
         checks += [partial(_experiences, path, VEHICLES.get(gained.name)) for path in gained_shards(gained)]
     if not checks:
-        raise RunError(f"{folder} holds no run; make one with `motion-memory run`.")
+        raise RunError(f"{folder} does not hold a run; make one with `motion-memory run`.")
     checked: Counter[str] = Counter()
     faults_found: list[str] = []
     context = multiprocessing.get_context("spawn")
@@ -223,7 +223,7 @@ def _attempts(
             continue
         problem = source.problem("test", int(path.stem) * CHUNK_PROBLEMS + position)
         if problem.id != identity:
-            wrong.append(f"{path}: {identity} is in the place of {problem.id}")
+            wrong.append(f"{path}: {identity} takes the place of {problem.id}")
             continue
         for row in attempts:
             memory = memories[row["memory"], row["run_id"]] if row["memory"] else None
@@ -242,7 +242,7 @@ def _attempts(
             attempts_repeated += 1
             plans_checked += attempt.solved
             if not same_outcome(attempt, row, vehicle):
-                wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} ends otherwise now")
+                wrong.append(f"{path}: {identity} by {row['planner']}, {row['assist']} now ends differently")
     return Counter(
         {
             "attempts read": len(rows),

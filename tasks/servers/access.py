@@ -31,7 +31,7 @@ def auth() -> str | None:
         return None
     user, _, password = value.partition(":")
     if not (user and password and value.isascii() and value.isprintable()):
-        raise UsageError(f"{AUTH} is set, but not to user:password in plain letters, digits and signs.")
+        raise UsageError(f"{AUTH} must be user:password in plain letters, digits and signs.")
     return value
 
 

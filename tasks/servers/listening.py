@@ -42,7 +42,7 @@ def bound(host: str, port: int) -> socket.socket:
         listener.bind(address)
     except OSError as error:
         raise RunError(
-            f"Port {port} of {host} cannot be used ({error.strerror}); give another one."
+            f"Port {port} on {host} cannot be used ({error.strerror}); give another one."
         ) from None
     return listener
 
@@ -141,4 +141,4 @@ def serve_with(
     supervisor = Workers(config_of(app, workers), [listener])
     supervisor.run()
     if supervisor.failed:
-        raise RunError("The server did not get ready; the lines above, from its workers, say why.")
+        raise RunError("The server did not start; the lines above, from its workers, say why.")

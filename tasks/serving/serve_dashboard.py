@@ -124,5 +124,5 @@ def _existing_folder(data: Path) -> DataFolder:
     if not folder.is_dir():
         raise UsageError(f"{folder} does not exist; give --data the folder that holds your runs.")
     if not (folder / MARK).is_file() and any(folder.iterdir()):
-        raise UsageError(f"{folder} has no {MARK}, so it is no data folder; give one that `run` made.")
+        raise UsageError(f"{folder} has no {MARK}, so it is not a data folder; give one that `run` made.")
     return open_data_folder(folder) if (folder / MARK).is_file() else DataFolder(folder)

@@ -84,7 +84,7 @@ def only_servers(folder: DataFolder) -> Iterator[None]:
             stack.enter_context(locked(folder.path / "servers.lock", str(folder.path)))
         except InUseError:
             raise RunError(
-                f"Servers run already for {folder.path}; stop them first, or give another --data."
+                f"Servers are already running for {folder.path}; stop them first, or give another --data."
             ) from None
         yield
 
@@ -151,9 +151,11 @@ def _running(
         while not (stop.is_set() or until()):
             ended = [name for name, process in processes.items() if not process.is_alive()]
             if ended:
-                raise RunError(f"{ended[0]}'s server ended; see what it printed.")
+                raise RunError(f"{ended[0]}'s server ended; its output above says why.")
             if time.monotonic() > deadline:
-                raise RunError(f"The servers did not start within {seconds:.0f} s; see what they printed.")
+                raise RunError(
+                    f"The servers did not start within {seconds:.0f} s; their output above may say why."
+                )
             stop.wait(POLL_SECONDS)
 
     for process in processes.values():

@@ -62,7 +62,7 @@ def check_seed(seed: int) -> None:
 def check_picture(path: Path | None) -> None:
     """Refuse a path that does not end like a picture."""
     if path is not None and path.suffix not in PICTURES:
-        raise UsageError(f"{path} is not the name of a picture. Known: {', '.join(PICTURES)}.")
+        raise UsageError(f"{path} is not the name of a picture; it must end in {', '.join(PICTURES)}.")
 
 
 def check_plan_file(path: Path | None) -> None:

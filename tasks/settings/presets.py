@@ -113,14 +113,14 @@ def for_preset(
     check_known("continual improvement", [continual or base.continual], CONTINUAL)
     check_seed(seed)
     if not generated and not worlds:
-        raise UsageError(f"No class to work on. Name some of: {', '.join(CLASSES)}.")
+        raise UsageError(f"There is no class to work on: name some of {', '.join(CLASSES)}.")
     if not measured:
-        raise UsageError(f"No planner to measure. Name some of: {', '.join(PLANNERS)}.")
+        raise UsageError(f"There is no planner to measure: name some of {', '.join(PLANNERS)}.")
     for folder in worlds:
         _check_worlds(Path(folder))
     kept = _count("experiences", experiences, base.experiences)
     if candidates is not None and candidates < kept:
-        raise UsageError(f"{candidates} candidates for {kept} experiences: give as many or more.")
+        raise UsageError(f"{candidates} candidates are fewer than {kept} experiences: give as many or more.")
     settings = RunSettings(
         preset=preset,
         classes=generated,
@@ -178,7 +178,7 @@ def mixture_of(weighted: Sequence[str]) -> Mixture:
             raise UsageError(f"Hallucination method {name} is given twice. Give each once.")
         weights[name] = value
     if not weights:
-        raise UsageError(f"No hallucination method. Name some of: {', '.join(METHODS)}.")
+        raise UsageError(f"There is no hallucination method: name some of {', '.join(METHODS)}.")
     total = math.fsum(weights.values())
     return tuple((name, weights[name] / total) for name in METHODS if name in weights)
 

@@ -22,8 +22,8 @@ def recorded_settings(run: RunFolder) -> RunSettings:
         raise StorageError(f"{run.settings}: {error}") from None
     if settings.run_name != run.path.name and settings.run_name not in _runs_of_rows(run):
         raise StorageError(
-            f"{run.settings} was edited: these are the settings of {settings.run_name}. The command that "
-            f"made {run.path.name}, given again, writes them anew."
+            f"{run.settings} was edited: these are the settings of {settings.run_name}. Repeat the command "
+            f"that made {run.path.name} to write them again."
         )
     return settings
 

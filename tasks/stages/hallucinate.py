@@ -219,5 +219,7 @@ def log_copied(results: Iterable[Hallucinated]) -> None:
     plans = sum(result.plans for result in results)
     if copied:
         _LOG.info(
-            "hallucinated anew for %d of %d plans; the champion's run had the others'", plans - copied, plans
+            "made new problems for %d of %d plans; those of the others were copied from the champion's run",
+            plans - copied,
+            plans,
         )

@@ -50,7 +50,7 @@ def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
             source, part, ImportSettings(*whole, count, settings.seed, chunk.vehicle.scale)
         )
         if not imported.problems:
-            unusable = f"{source.path} holds no usable problem of part {part} ({imported.explained()})."
+            unusable = f"{source.path} holds no usable problem for part {part} ({imported.explained()})."
             if settings.strict:
                 raise RunError(unusable)
         problems[part] = [replace(to_canonical(p)[0], class_name=chunk.class_name) for p in imported.problems]

@@ -36,7 +36,7 @@ def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -
     try:
         if "Report" not in pages:  # browsers open no file from a page of a server
             told = f"`{uri_of(run.report)}` on {platform.node()}; `motion-memory dashboard` shows its figures"
-            create_markdown_artifact(told, key=_key(run, "report"), description="Where the report lies")
+            create_markdown_artifact(told, key=_key(run, "report"), description="Where the report is")
         create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
         create_table_artifact(table, key=_key(run, "claims"), description="Claims of the paper")
         for figure in files_in(run.figures, "*.png"):
@@ -73,7 +73,7 @@ def publish_judgements(run_name: str, verdicts: Sequence[tuple[str, str, str]]) 
 
 def _warn(what: str, error: Exception) -> None:
     reason = (str(error) or type(error).__name__).splitlines()[0]
-    _LOG.warning("Prefect did not take all artifacts of %s: %s", what, reason)
+    _LOG.warning("Prefect did not accept all artifacts of %s: %s", what, reason)
 
 
 def _key(run: RunFolder, name: str) -> str:

@@ -76,7 +76,7 @@ def _upgrade(path: Path, schemas: ScriptDirectory) -> None:
         engine.dispose()
         if not kept.exists():
             os.link(path, kept)
-    _LOG.warning("%s now has this MLflow's schema; the old one is kept as %s", path, kept.name)
+    _LOG.warning("%s now has this MLflow's schema; the old database is kept as %s", path, kept.name)
 
 
 @functools.cache

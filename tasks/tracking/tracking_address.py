@@ -16,7 +16,7 @@ def tracking_uri(data: DataFolder) -> str:
     uri = os.environ.get("MLFLOW_TRACKING_URI")
     if not uri and data.is_remote:
         raise UsageError(
-            f"{data.place} can hold no MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
-            "keeps its own (docs/runbook.md)."
+            f"{data.place} cannot hold an MLflow database: set MLFLOW_TRACKING_URI to an MLflow server that "
+            "has its own (docs/runbook.md)."
         )
     return uri or f"sqlite:///{data.mlflow_database}"

@@ -134,7 +134,7 @@ def _automated(data: Path) -> int:
     [
         (60.0, "0 3 * * *", "--every and --cron are both given"),
         (0.5, None, "Every 0.5 seconds: give 1 or more"),
-        (None, "at night", "'at night' is no cron expression"),
+        (None, "at night", "'at night' is not a cron expression"),
     ],
 )
 def test_a_schedule_that_cannot_be_is_refused_before_anything_starts(

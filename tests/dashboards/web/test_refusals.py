@@ -215,7 +215,7 @@ def test_a_damaged_file_is_named_and_the_others_are_shown(data: DataFolder, tmp_
     run.shard("results", "trap", 0).write_bytes(whole)
     run.shard("results", "trap", 1).write_bytes(whole[: len(whole) // 2])
     text = LocalClient(other).get("/runs/broken/problems").text
-    assert "0001.parquet is no whole Parquet file" in text
+    assert "0001.parquet is not a complete Parquet file" in text
     assert "attempts" in text
     run.shard("results", "trap", 0).unlink()
     answer = LocalClient(other).get("/runs/broken/problems")

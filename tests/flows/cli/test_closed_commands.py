@@ -133,7 +133,7 @@ def test_planning_opens_no_port_and_a_traceback_tells_no_secret(place: Path) -> 
     unreached = {"MLFLOW_TRACKING_URI": ELSEWHERE, "MOTION_MEMORY_DEBUG": "1"}
     watched = watch(arguments, place / "plan.log", PLANTED | IMPATIENT | unreached)
     assert watched.code == 1
-    assert "cannot be had from MLflow at http://***@127.0.0.1:9" in watched.output
+    assert "cannot be fetched from MLflow at http://***@127.0.0.1:9" in watched.output
     assert "Traceback" in watched.output
     assert watched.ports == set()
     assert SECRET not in watched.output

@@ -21,7 +21,7 @@ def _called(folder: Path, text: str, arguments: list[str], monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[verify]\nsample = 2.0", "Sample is 2.0"),
+        ("[verify]\nsample = 2.0", "--sample is 2.0"),
         ("[verify]\nsampel = 0.5", "--sample"),
         ("[verify]\nsample = 'x'", "sample"),
         ("[veryfi]\nsample = 0.5", "[verify]"),
@@ -48,11 +48,11 @@ def test_the_command_line_comes_before_the_file(
 ) -> None:
     arguments = ["verify", "nowhere", "--sample", "0.5"]
     assert _called(tmp_path, "[verify]\nsample = 2.0", arguments, monkeypatch) == 1
-    assert "nowhere is no data folder" in capsys.readouterr().err
+    assert "nowhere is not a data folder" in capsys.readouterr().err
 
 
 def test_a_command_without_a_table_is_as_ever(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert _called(tmp_path, "[run]\nseed = 3", ["verify", "nowhere"], monkeypatch) == 1
-    assert "nowhere is no data folder" in capsys.readouterr().err
+    assert "nowhere is not a data folder" in capsys.readouterr().err

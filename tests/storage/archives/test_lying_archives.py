@@ -60,7 +60,7 @@ def test_sweeps_and_masks_that_are_not_those_of_the_plans_are_refused(
     archives: Path, name: str, change: Callable[[np.ndarray], object]
 ) -> None:
     change_array(archives / "memory", name, change)
-    assert "are not those of its plans" in refusal(archives / "memory")
+    assert "do not match its plans" in refusal(archives / "memory")
 
 
 def test_the_sweeps_of_another_memory_are_refused(archives: Path, tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_the_sweeps_of_another_memory_are_refused(archives: Path, tmp_path: Path
         for name in names:
             shutil.copy(tmp_path / "other" / name, folder / name)
         sign(folder)
-        assert "are not those of its plans" in refusal(folder)
+        assert "do not match its plans" in refusal(folder)
 
 
 @pytest.mark.parametrize("name", sorted(WEIGHTS))

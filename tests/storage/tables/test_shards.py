@@ -77,7 +77,7 @@ def test_a_truncated_file_is_said_so_and_not_done(tmp_path: Path, share: float) 
     write_table(path, table(5000), "k")
     data = path.read_bytes()
     path.write_bytes(data[: int(share * len(data))])
-    with pytest.raises(StorageError, match=r"t\.parquet is no whole Parquet file") as error:
+    with pytest.raises(StorageError, match=r"t\.parquet is not a complete Parquet file") as error:
         read_table(path, SCHEMA)
     assert "\n" not in str(error.value)
     assert not shard_is_done(path, "k")
@@ -90,7 +90,7 @@ def test_a_flipped_bit_among_the_rows_is_noticed(tmp_path: Path, share: float) -
     data = bytearray(path.read_bytes())
     data[int(share * len(data))] ^= 4
     path.write_bytes(data)
-    with pytest.raises(StorageError, match=r"t\.parquet is no whole Parquet file") as error:
+    with pytest.raises(StorageError, match=r"t\.parquet is not a complete Parquet file") as error:
         read_table(path, SCHEMA)
     assert "\n" not in str(error.value)
 
@@ -104,7 +104,7 @@ def test_a_folder_or_a_table_of_another_kind_is_refused(tmp_path: Path) -> None:
     pq.write_table(pa.table({"n": [1]}), path)
     with pytest.raises(StorageError, match="holds table an unknown one"):
         read_table(path, SCHEMA)
-    with pytest.raises(StorageError, match="no whole Parquet file"):
+    with pytest.raises(StorageError, match="not a complete Parquet file"):
         metadata_of(tmp_path)
 
 

@@ -57,7 +57,7 @@ def test_merged_shards_hold_the_chosen_rows_in_their_order(tmp_path: Path) -> No
     store(shards[1], found[3:], "b")
     merge_experiences(shards, tmp_path / "all.parquet", [4, 0, 2], "all")
     assert same(read_experiences(tmp_path / "all.parquet"), [found[i] for i in (4, 0, 2)])
-    with pytest.raises(StorageError, match="more than the 5 rows there are; run collect"):
+    with pytest.raises(StorageError, match="more than the 5 rows that exist; run collect"):
         merge_experiences(shards, tmp_path / "all.parquet", [0, 5])
     with pytest.raises(StorageError, match="run collect"):
         merge_experiences([], tmp_path / "none.parquet", [])
@@ -230,7 +230,7 @@ def test_an_attempt_of_another_shape_is_refused_and_nothing_written(
 ) -> None:
     with pytest.raises(StorageError, match=r"^attempt"):
         write_attempts(tmp_path / "a.parquet", [{**ATTEMPT, **change}])
-    with pytest.raises(StorageError, match="lacks some: host"):
+    with pytest.raises(StorageError, match="missing fields: host"):
         write_attempts(tmp_path / "a.parquet", [{name: ATTEMPT[name] for name in ATTEMPT if name != "host"}])
     assert list(tmp_path.iterdir()) == []
 

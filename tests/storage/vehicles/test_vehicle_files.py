@@ -95,7 +95,7 @@ def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
         ("wheelbase", "long", "'long' as its wheelbase, expected a number"),
         ("wheelbase", True, "'True' as its wheelbase"),
         ("weelbase", 1.6, "unknown field 'weelbase' (nearest is 'wheelbase')"),
-        ("step", 0.5, "step 0.5 s, in which a point of the vehicle moves up to 2 m"),
+        ("step", 0.5, "step of 0.5 s, in which a point of the vehicle moves up to 2 m"),
         ("step", float("nan"), "step nan s"),
         ("limits", 3, "limits 3"),
         ("limits.speed", 4, "[least, most] in m/s"),
@@ -110,8 +110,8 @@ def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
         ("body", [[[0, 0], [1, 0], [1, "a"]]], "'a' as its body polygon 1 corner"),
         ("body", [[[-1, -1], [1, -1], [0, 0], [1, 1], [-1, 1]]], "body polygon 1, which is not convex"),
         ("body", [[[1, -1], [2, -1], [2, 1], [1, 1]]], "does not surround the reference point"),
-        ("body", [[[-1, -1], [-1, -1], [2, 1], [1, 1]]], "two corners of body polygon 1 at one place"),
-        ("body", [[[-900, -1], [900, -1], [2, 1]]], "are they metres?"),
+        ("body", [[[-1, -1], [-1, -1], [2, 1], [1, 1]]], "two corners of body polygon 1 at the same place"),
+        ("body", [[[-900, -1], [900, -1], [2, 1]]], "in metres?"),
         ("trailers", [], "list of 1 to 3"),
         ("trailers", [{"hitch_length": 1.9, "max_hitch": 1}], "lacks the field trailer 1 body"),
     ],
@@ -133,7 +133,7 @@ def test_what_is_wrong_is_told_with_its_field(tmp_path: Path, path: str, value: 
         ("limits: {speed: [0, 1], speed: [0, 2]}\n", "more than once"),
         ("a: &a [1, 1]\nb: *a\n", "is not the YAML of a vehicle"),
         ("!!python/object/apply:os.getcwd []\n", "is not YAML"),
-        ("[" * 3_000, "more lists in it than any vehicle"),
+        ("[" * 3_000, "more brackets than any vehicle"),
         ("- car\n", "is not the YAML of a vehicle"),
         ("name: car\n", "kind"),
     ],
@@ -146,14 +146,14 @@ def test_what_is_no_plain_yaml_is_refused(tmp_path: Path, text: str, told: str) 
 
 
 def test_trailers_that_would_meet_the_body_in_front_are_refused() -> None:
-    with pytest.raises(ValueError, match="trailer 2 touch the body in front at a hitch angle of"):
+    with pytest.raises(ValueError, match=r"trailer 2 .* hitch angle"):
         vehicle_of(changed(TRAILER_FILE, "trailers.1.hitch_length", 1.75))
 
 
 def test_another_vehicle_cannot_have_the_name_of_a_built_in_one(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(changed(CAR_FILE, "limits.acceleration", 3)))
-    with pytest.raises(StorageError, match="name of another, 'car'"):
+    with pytest.raises(StorageError, match="name of another vehicle, 'car'"):
         read_vehicle(file)
 
 
@@ -193,7 +193,7 @@ def test_what_was_made_for_another_vehicle_is_refused_with_the_first_difference(
     refuse_another("archive", fields_of(small), renamed)
     with pytest.raises(StorageError, match=r"for vehicle small, expected car: limits\.speed is \[-1"):
         refuse_another("archive", fields_of(small), CAR)
-    with pytest.raises(StorageError, match="ask for --vehicle car"):
+    with pytest.raises(StorageError, match="--vehicle car"):
         refuse_another("archive", fields_of(CAR), small)
     for nothing in (None, "tram", {"front": 3.0}, [1]):
         with pytest.raises(StorageError, match="no such vehicle"):

@@ -153,7 +153,7 @@ def test_a_line_that_is_cut_off_or_too_long_is_refused(line: str, tmp_path: Path
     (tmp_path / "case.csv").write_text(line)
     settings = ImportSettings(vehicle=read_vehicle(VEHICLES / "tpcap-car.yaml"))
     told = import_part(source_at(tmp_path / "case.csv"), "train", settings).skipped[0][1]
-    assert "cut off" in told or "goes on with" in told
+    assert "cut off" in told or "continues with" in told
 
 
 def test_an_imported_case_is_a_problem_file_in_its_own_frame(tmp_path: Path) -> None:

@@ -131,4 +131,4 @@ def test_scenarios_find_their_map_beside_them(tmp_path: Path) -> None:
     assert all(len(part.problems) + len(part.skipped) == 40 for part in parts)
     assert len(parts[0].problems) + len(parts[1].problems) > 0
     (tmp_path / "m.map").unlink()
-    assert "which does not lie beside it" in told(tmp_path / "m.scen")
+    assert "which is not beside it" in told(tmp_path / "m.scen")

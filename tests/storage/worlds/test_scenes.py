@@ -50,7 +50,7 @@ def test_scenes_of_polygons_are_covered_exactly(
         ("1\n3\n1 1 2 1 2 nan", "polygon 1 has a coordinate that is not a finite number"),
         ("1\n2\n1 1 2 1", "polygon 1 has 2 points"),
         ("1\n4\n20 20 30 30 30 20 20 30", "crosses or touches itself"),
-        ("1\n3\n20 20 30 20 30 30 7", "goes on with '7'"),
+        ("1\n3\n20 20 30 20 30 30 7", "continues with '7'"),
         ("1\n3\n-5 -5 5 -5 0 5", "start footprint"),
     ],
 )

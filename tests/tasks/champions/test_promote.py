@@ -87,7 +87,7 @@ def test_champions_change_by_promotion_and_back_and_no_other_way(registered: Reg
     late = registered.version("three", against=1, retraining=2)
     with pytest.raises(RunError, match="judged against version 1, but the champion is version 2 now"):
         promote(registry, late)
-    with pytest.raises(RunError, match="no challenger awaits approval"):
+    with pytest.raises(RunError, match="awaits approval"):
         promote_awaiting(data, None)
     waiting = registered.version("four", against=2, retraining=3, verdict=AWAITING)
     registry.set_alias(waiting, CHALLENGER)
@@ -102,7 +102,7 @@ def test_champions_change_by_promotion_and_back_and_no_other_way(registered: Reg
     assert roll_back(data, NAME) == [ChampionChange(NAME, before=2, now=1)]
     assert registered.champion == 1
     for memory in (None, "trap"):
-        with pytest.raises(RunError, match="nothing to roll back to"):
+        with pytest.raises(RunError, match="to roll back to"):
             roll_back(data, memory)
     with pytest.raises(RunError, match=r"No memory 'curves' in the registry. Known: motion-memory-trap"):
         roll_back(data, "curves")
@@ -164,6 +164,6 @@ def test_a_champion_whose_promotion_was_killed_gets_its_verdict_by_the_next_retr
 
 def test_where_there_is_no_data_nothing_is_made(tmp_path: Path) -> None:
     for change in (roll_back, promote_awaiting):
-        with pytest.raises(RunError, match="is no data folder"):
+        with pytest.raises(RunError, match="is not a data folder"):
             change(tmp_path / "nowhere", None)
     assert not (tmp_path / "nowhere").exists()

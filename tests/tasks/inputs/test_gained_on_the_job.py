@@ -101,5 +101,5 @@ def test_problems_that_a_run_tests_with_are_not_learned_from(tmp_path: Path, sol
 def test_recalled_plans_are_nothing_new(tmp_path: Path, solved: list[Solved]) -> None:
     again = [Solved(problem, replace(attempt, source="recalled")) for problem, attempt in solved]
     assert remember(tmp_path, again, CAR) == 0
-    with pytest.raises(StorageError, match="holds nothing that was learned"):
+    with pytest.raises(StorageError, match="holds no learned problems"):
         with_gained(SETTINGS, tmp_path, "now")

@@ -84,9 +84,9 @@ def test_what_cannot_be_compared_is_told_and_nothing_written(runs: list[Path], t
     out = tmp_path / "c.md"
     with pytest.raises(UsageError, match="1 run to compare"):
         compare(runs[:1], out)
-    with pytest.raises(UsageError, match=r"ends in none of \.md, \.json, \.csv"):
+    with pytest.raises(UsageError, match=r"does not end in"):
         compare(runs, tmp_path / "c.txt")
-    with pytest.raises(StorageError, match="is no run"):
+    with pytest.raises(StorageError, match="is not a run"):
         compare([runs[0], tmp_path], out)
     with pytest.raises(StorageError, match="three and one have no attempt at the same problem in common"):
         compare([runs[0], strange], out)

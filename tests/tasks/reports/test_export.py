@@ -69,16 +69,16 @@ def test_a_log_for_each_class(run: RunFolder, tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["ompl", "planner-arena", "csv"])
 def test_what_is_no_run_is_told_and_nothing_written(form: str, run: RunFolder, tmp_path: Path) -> None:
     out = tmp_path / {"ompl": "logs", "planner-arena": "a.db", "csv": "a.csv"}[form]
-    with pytest.raises(StorageError, match="is no run"):
+    with pytest.raises(StorageError, match="is not a run"):
         export_run(tmp_path, form, out)
     for path in run.results.rglob("*.parquet"):
         path.write_bytes(path.read_bytes()[:-9])  # cut off
-    with pytest.raises(StorageError, match="no whole Parquet file"):
+    with pytest.raises(StorageError, match="not a complete Parquet file"):
         export_run(run.path, form, out)
     assert [path.name for path in tmp_path.iterdir()] == [run.path.name]
 
 
 def test_a_folder_that_is_there_is_not_replaced(run: RunFolder, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="is there already"):
+    with pytest.raises(UsageError, match="already exists"):
         export_run(run.path, "ompl", run.path)
     assert run.settings.exists()

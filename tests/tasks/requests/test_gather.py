@@ -134,7 +134,7 @@ def test_the_difficulty_of_drawn_questions_can_be_chosen(tmp_path: Path) -> None
     [
         (["--difficulty", "odd"], "odd"),
         (["--plans", "0"], "0 plans: give 1 or more."),
-        (["--poses", "1.5"], "A share of 1.5 poses: give 0 to 1."),
+        (["--poses", "1.5"], "--poses is 1.5"),
     ],
 )
 def test_wrong_use_is_told_in_a_line(

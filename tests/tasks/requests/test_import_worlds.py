@@ -76,7 +76,7 @@ def test_a_folder_is_written_for_runs_and_written_again_but_never_over_something
 @pytest.mark.parametrize(
     ("options", "code", "told"),
     [
-        (["--out", "p.csv"], 2, "p.csv is neither a folder's name nor ends in"),
+        (["--out", "p.csv"], 2, "p.csv is neither"),
         (["--out", "p.parquet", "--part", "most"], 2, "Unknown part 'most'"),
         (["--out", "p.parquet", "--format", "pdf"], 2, "Unknown format 'pdf'"),
         (["--out", "p.parquet", "--problems", "0"], 2, "0 problems"),
@@ -90,7 +90,7 @@ def test_a_folder_is_written_for_runs_and_written_again_but_never_over_something
         (["--out", "p.parquet", "--resolution", "-1"], 1, "has resolution -1"),
         (["--out", "p.parquet", "--scale", "9"], 1, "too small to keep places to test on apart"),
         (["--out", "p.parquet", "--format", "ros"], 1, "is it the YAML of a map?"),
-        (["--out", "p.json", "--problems", "2"], 1, "p.json can hold one problem, got 4"),
+        (["--out", "p.json", "--problems", "2"], 1, "p.json can hold only one problem, got 4"),
     ],
 )
 def test_wrong_use_is_one_line_and_nothing_written(

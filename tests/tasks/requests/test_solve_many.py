@@ -174,7 +174,7 @@ def test_an_id_that_occurs_twice_is_named_with_both_lines(problems: Path, tmp_pa
     path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join(["\n", *lines[:9], lines[1]]))
-    with pytest.raises(StorageError, match=r'line 11: id ".*-1" is that of .*problems.jsonl line 3 too'):
+    with pytest.raises(StorageError, match=r'line 11: id ".*-1" is also that of .*problems.jsonl line 3'):
         solve_many(ASSISTANT, path, out)
     assert not out.exists()
 

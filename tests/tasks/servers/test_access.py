@@ -52,7 +52,7 @@ def test_a_malformed_password_is_refused_without_being_shown(
     value: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(AUTH, value)
-    with pytest.raises(UsageError, match="not to user:password") as error:
+    with pytest.raises(UsageError, match="must be user:password") as error:
         auth_environment()
     assert "s3" not in str(error.value)
 

@@ -95,7 +95,7 @@ def test_a_second_command_on_the_folder_is_refused_and_changes_nothing(running: 
             second.kill()
     assert second.returncode == 1
     assert told.count("\n") == 1
-    assert f"Servers run already for {running.data}" in told
+    assert f"Servers are already running for {running.data}" in told
     assert running.password == password
     user, _, word = password.partition(":")
     assert httpx.post(f"{running.prefect}/api/flows/filter", json={}, auth=(user, word)).status_code == 200

@@ -47,7 +47,7 @@ def test_edited_settings_are_refused_in_one_line_until_the_same_command_writes_t
     assert recorded_settings(edited(run)) == SETTINGS
     edited(run, **change)
     for use in (lambda: verify_folder(data, 0.0, 1), lambda: compare([run.path, run.path], None)):
-        with pytest.raises(StorageError, match=f"edited.*{SETTINGS.run_name}, given again") as refusal:
+        with pytest.raises(StorageError, match=f"edited.*{run.path.name} to write them again") as refusal:
             use()
         assert "\n" not in str(refusal.value)
     assert champion_run(str(data), run.path.name) is None

@@ -175,9 +175,9 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
             "Unknown preset 'huge'. Known: smoke, laptop, paper, paper-method, paper-method-laptop.",
         ),
         ({"classes": ["maze"]}, "Unknown class 'maze'. Known: curves, random, trap."),
-        ({"classes": []}, "No class to work on. Name some of: curves, random, trap."),
+        ({"classes": []}, "There is no class to work on: name some of curves, random, trap."),
         ({"planners": ["prm"]}, "Unknown planner 'prm'. Known: rrt, gust, follow, lattice."),
-        ({"planners": []}, "No planner to measure. Name some of: rrt, gust, follow, lattice."),
+        ({"planners": []}, "There is no planner to measure: name some of rrt, gust, follow, lattice."),
         ({"difficulty": "odd"}, "Unknown difficulty 'odd'. Known: easy, standard, hard."),
         ({"objective": "luck"}, "Unknown objective 'luck'. Known: labels, triplet."),
         ({"experiences": 0}, "0 experiences: give 1 or more."),
@@ -193,7 +193,7 @@ def test_a_folder_of_worlds_alone_leaves_the_generated_classes_out(tmp_path: Pat
         ),
         (
             {"hallucination": []},
-            "No hallucination method. Name some of: rearrange, maximal, minimal, learned.",
+            "There is no hallucination method: name some of rearrange, maximal, minimal, learned.",
         ),
         (
             {"hallucination": ["minimal=0.3", "minimal"]},

@@ -122,7 +122,7 @@ def test_a_run_goes_on_with_fewer_experiences_and_without_a_class_of_too_few(
     assert [len(read_experiences(run.experiences(name))) for name in settings.memory_names] == [5, 6, 11]
     told = [each.getMessage() for each in caplog.records]
     assert told == [str(each) for each in shortfalls(data, uneven)]
-    assert ["few goes on with fewer: 5 of 6" in told[0], "one is left out" in told[1]] == [True, True]
+    assert ["few has only 5 of 6" in told[0], "left out" in told[1]] == [True, True]
     assert recorded_settings(run) == settings == as_collected(data, uneven)
     for stage in (HALLUCINATE, RELABEL):  # which raises if a plan does not solve what was made for it
         run_stage(stage, data, settings)
@@ -132,7 +132,7 @@ def test_a_run_goes_on_with_fewer_experiences_and_without_a_class_of_too_few(
 
 def test_strict_settings_stop_at_a_class_with_too_few(uneven: RunSettings, tmp_path: Path) -> None:
     strict = replace(uneven, strict=True)
-    with pytest.raises(RunError, match=r"Class few goes on with fewer: 5 of 6 wanted .* Ask for fewer"):
+    with pytest.raises(RunError, match=r"Class few has only 5 of 6 .* Ask for fewer"):
         collect(str(tmp_path / "data"), strict)
 
 
@@ -142,5 +142,5 @@ def test_without_any_class_there_is_no_run(tmp_path: Path) -> None:
     settings = replace(PLAIN, classes=(), worlds=(str(tmp_path / "none"),))
     results = run_stage(READ_WORLDS, str(tmp_path / "data"), settings)
     assert [each.unusable is None for each in results.values()] == [False]
-    with pytest.raises(RunError, match="none is left out of the run: 0 of 4"):
+    with pytest.raises(RunError, match="none has only 0 of 4"):
         collect(str(tmp_path / "data"), settings)

@@ -30,4 +30,4 @@ def test_without_a_server_a_report_is_whole_and_says_so_in_one_line(tmp_path: Pa
         capture_output=True, text=True, timeout=120, cwd=tmp_path, env=os.environ | nobody,
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (0, "done\n")
-    assert done.stderr.splitlines()[-1].startswith("Prefect did not take all artifacts of the report: ")
+    assert done.stderr.splitlines()[-1].startswith("Prefect did not accept all artifacts of the report: ")

@@ -129,7 +129,7 @@ def test_a_library_is_registered_once_and_loaded_by_its_address(
     "uri", ["models:/mine/7", "models:/mine@nobody", "models:/none/1", "models:/", "runs:/x/memory"]
 )
 def test_a_name_that_mlflow_does_not_know_is_told_in_one_line(at_home: dict[str, str], uri: str) -> None:
-    with pytest.raises(RunError, match="cannot be had from MLflow at sqlite") as error:
+    with pytest.raises(RunError, match="cannot be fetched from MLflow at sqlite") as error:
         load_from(uri, CAR)
     assert "\n" not in str(error.value)
 
@@ -144,7 +144,7 @@ def test_without_an_mlflow_the_line_says_how_to_name_one(
         load_from("models:/mine/1", CAR)
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setenv("MLFLOW_TRACKING_URI", "http://127.0.0.1:9")  # where nobody answers
-    with pytest.raises(RunError, match=r"cannot be had from MLflow at http://127.0.0.1:9") as error:
+    with pytest.raises(RunError, match=r"cannot be fetched from MLflow at http://127.0.0.1:9") as error:
         load_from("models:/mine/1", CAR)
     assert "\n" not in str(error.value)
 
