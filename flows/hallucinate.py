@@ -5,7 +5,7 @@ from __future__ import annotations
 from tasks.fan_out.fan_out import run_stage
 from tasks.session.stage_flow import stage_flow
 from tasks.settings.run_settings import RunSettings
-from tasks.stages.hallucinate import HALLUCINATE, log_copied
+from tasks.stages.hallucinate import HALLUCINATE, log_copied, warn_of_easy_classes
 from tasks.stages.learn_hallucination import LEARN_HALLUCINATION
 from tasks.stages.relabel import RELABEL
 
@@ -16,4 +16,5 @@ def hallucinate(settings: RunSettings, data: str) -> None:
     run_stage(LEARN_HALLUCINATION, data, settings)
     hallucinated = run_stage(HALLUCINATE, data, settings)
     log_copied(hallucinated.values())
+    warn_of_easy_classes(hallucinated)
     run_stage(RELABEL, data, settings)

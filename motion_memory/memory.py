@@ -29,7 +29,7 @@ from planners.world.checked_problem import checked_problem
 from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
-from storage.archives.libraries import load_memory_or_library
+from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
@@ -221,7 +221,7 @@ def _parsed(text: str) -> Any:
 def load(
     memory: str | Path,
     *,
-    vehicle: str = "car",
+    vehicle: str | None = None,
     planner: str = "lattice",
     assist: str = "repair",
     top_k: int = 5,
@@ -235,7 +235,7 @@ def load(
     Args:
         memory: the folder of a memory or a library, the folder of a run with one memory, or the address of a
             model in MLflow, such as ``models:/motion-memory-trap@champion``.
-        vehicle: its name, or the path of its .yaml file.
+        vehicle: its name, or the path of its .yaml file; by default the one that the memory is for.
         planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
         assist: how the memory helps: closed, open or repair.
         top_k: how many plans to recall, at least 1.
@@ -251,14 +251,16 @@ def load(
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
     """
-    vehicle = checked_vehicle(vehicle)
+    named = None if vehicle is None else said_vehicle(checked_vehicle(vehicle))
     check_known("planner", [planner], PLANNERS)
     check_known("assist", [assist], ASSISTS)
     check_known("recall", [] if recall is None else [recall], RECALLS)
     if top_k < 1:
         raise UsageError(f"top_k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
-        archive = load_memory_or_library(folder, said_vehicle(vehicle))  # mapped files outlive their names
+        archive = load_memory_or_library(
+            folder, named or vehicle_of(folder)
+        )  # mapped files outlive their names
     if isinstance(archive, PlanLibrary):
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready

@@ -1,7 +1,9 @@
 """The few figures that tell runs apart at a glance: means over all planners and classes of a run.
 
 They have the same names in every run, so that a table of runs, such as MLflow's, can put them side by side.
-There are some thirty; all others are in the rows of each class, planner and configuration. Times of planning
+Such a table sorts by name and cuts what is longer than 17 letters, so names are short, and what a run gains
+has the number that comes first. There are some thirty; all others are in the rows of each class, planner and
+configuration. Times of planning
 are relative, because the seconds of two machines cannot be compared.
 """
 
@@ -37,11 +39,12 @@ def times_faster(own: pd.DataFrame) -> float:
 def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]:
     """The headline figures of a run, each class with its own memory.
 
-    Returns, with a memory used as by default: ``times_faster`` (geometric mean), ``sooner_s``, ``solved``,
-    ``recalled``, ``repaired``, ``slower``, ``driving_s`` and ``collision_checks``; without a memory
-    ``alone/solved``, ``alone/driving_s`` and ``alone/collision_checks``; of all configurations
-    ``reduction/<configuration>``, shares of the mean planning time, and ``reduction``, the mean of those with
-    a memory; and the figures of ``headline_retrieval``. Figures that were not measured are left out.
+    Returns, of a memory used as by default against none: ``1-gain/sooner_s``, seconds, and ``1-gain/faster``,
+    times (geometric mean). With it, under ``2-with/``: ``solved``, ``recalled``, ``repaired``, ``slower``,
+    ``driving_s`` and ``checks`` (of collisions); without it, under ``3-alone/``: ``solved``, ``driving_s``
+    and ``checks``. Then the figures of ``headline_retrieval``. Of all configurations, shares of the mean
+    planning time: ``5-saved/<configuration>``, and ``5-saved/all``, the mean of those with a memory. Figures
+    that were not measured are left out.
 
     Args:
         summary: table of ``panels.summarise``.
@@ -50,29 +53,29 @@ def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]
     own = summary[summary["panel"] != COMBINED]
     helped = used_by_default(own).set_index(["panel", "planner"])
     alone = own[own["assist"] == "none"].set_index(["panel", "planner"]).loc[helped.index]
-    figures = {name: helped[name].mean() for name in ("sooner_s", "solved", "recalled", "repaired", "slower")}
-    figures["times_faster"] = times_faster(own)
-    for prefix, rows in (("", helped), ("alone/", alone)):
-        for name in ("driving_s", "collision_checks"):
-            figures[prefix + name] = rows[name].mean()
-    figures["alone/solved"] = alone["solved"].mean()
+    figures = {"1-gain/sooner_s": helped["sooner_s"].mean(), "1-gain/faster": times_faster(own)}
+    figures |= {f"2-with/{name}": helped[name].mean() for name in ("recalled", "repaired", "slower")}
+    for prefix, rows in (("2-with", helped), ("3-alone", alone)):
+        figures |= {f"{prefix}/{name}": rows[name].mean() for name in ("solved", "driving_s")}
+        figures[f"{prefix}/checks"] = rows["collision_checks"].mean()
     for configuration, rows in own[own["assist"] != "none"].groupby("configuration", sort=False):
-        figures[f"reduction/{str(configuration).replace(' ', '-')}"] = rows["reduction"].mean()
+        figures[f"5-saved/{str(configuration).replace(' ', '-')}"] = rows["reduction"].mean()
     with_memory = own[(own["recall"] != "") & (own["recall"] != "random")]
-    figures["reduction"] = with_memory["reduction"].mean()
+    figures["5-saved/all"] = with_memory["reduction"].mean()
     return _measured(figures) | headline_retrieval(retrieval)
 
 
 def headline_retrieval(retrieval: pd.DataFrame) -> dict[str, float]:
     """The figures of ``retrieval`` alone, which need no benchmark.
 
-    They are ``fresh_hit_1``, ``fresh_hit_5``, ``fresh_oracle``, ``held_out_origin_1``, ``held_out_origin_5``.
+    They are, under ``4-recall/``: ``hit_1``, ``hit_5`` and ``oracle`` on problems never seen, ``origin_1``
+    and ``origin_5`` on problems held out of the training.
     """
     own = retrieval[(retrieval["memory"] == retrieval["panel"]) & (retrieval["recall"] == "encoder")]
     fresh, held_out = (own[own["protocol"] == protocol] for protocol in ("fresh", "held-out"))
-    figures = {f"fresh_hit_{k}": fresh[f"hit@{k}"].mean() for k in (1, 5)}
-    figures |= {"fresh_oracle": fresh["oracle"].mean()}
-    figures |= {f"held_out_origin_{k}": held_out[f"origin@{k}"].mean() for k in (1, 5)}
+    figures = {f"4-recall/hit_{k}": fresh[f"hit@{k}"].mean() for k in (1, 5)}
+    figures |= {"4-recall/oracle": fresh["oracle"].mean()}
+    figures |= {f"4-recall/origin_{k}": held_out[f"origin@{k}"].mean() for k in (1, 5)}
     return _measured(figures)
 
 

@@ -69,7 +69,7 @@ def gather(
     plans: int = 1000,
     poses: float = 0.25,
     difficulty: Difficulty = "standard",
-    vehicle: str = "car",
+    vehicle: str | None = None,
     seed: int = 1,
     model: str | None = None,
     workers: int | None = None,
@@ -88,15 +88,19 @@ def gather(
         poses: Share of the drawn questions that ask for a pose, not for a place.
         difficulty: Difficulty of classes and families.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+            Default: that of the first file of problems, else car.
         seed: Everything random follows from it.
         model: Log the library in MLflow, and register it as a version of the model of this name.
         workers: Worker processes; default one for each core.
         reading: How maps are read.
     """
+    from tasks.registry.settled_vehicle import settled_vehicle
     from tasks.requests import gather as task
     from tasks.requests.import_worlds import import_settings
 
-    settings = import_settings(vehicle, seed, **asdict(reading))
+    file = next((Path(each) for each in sources if Path(each).is_file()), None)
+    driver = settled_vehicle(vehicle, file)
+    settings = import_settings(driver, seed, **asdict(reading))
     counts = task.gather(
         sources, out, plans, poses, difficulty, settings, worker_count(workers), _gather_pieces
     )
@@ -189,7 +193,7 @@ def route(
     from tasks.requests.import_worlds import import_settings
 
     assistant = Assistant(options.settings(assist, without_memory="fresh"))
-    settings = import_settings(options.vehicle, options.seed, **asdict(reading))
+    settings = import_settings(assistant.settings.vehicle, options.seed, **asdict(reading))
     driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
     write(driven.legs)
     write_answer(*driven.summary, **driven.answer)

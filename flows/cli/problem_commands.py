@@ -74,7 +74,7 @@ def plan(
     from tasks.requests.assistant import Assistant, plan_one
     from tasks.settings.errors import RunError
 
-    assistant = Assistant(options.settings(assist, improve_seconds))
+    assistant = Assistant(options.settings(assist, improve_seconds, problem))
     attempt, found, answer, failure, written = plan_one(assistant, problem, out, picture, explain, learn)
     lines = []
     if found is not None:
@@ -95,7 +95,7 @@ def optimise(
     planner: PlannerName | None = None,
     straight: Annotated[bool, Parameter(negative=())] = False,
     clearance_weight: float = 0.0,
-    vehicle: str = "car",
+    vehicle: str | None = None,
     seed: int = 1,
     out: Path | None = None,
     picture: Path | None = None,
@@ -109,13 +109,15 @@ def optimise(
         straight: Begin with a straight line from start to goal.
         clearance_weight: Weight of the distance to obstacles against the duration of the plan.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+            Default: that of the problem, else car.
         seed: Everything random follows from it.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw the guess and the plan, .png, .svg or .pdf.
     """
+    from tasks.registry.settled_vehicle import settled_vehicle
     from tasks.requests.optimise_one import initial_guess, optimise_one
 
-    initial = initial_guess(plan, planner, straight, vehicle, seed)
+    initial = initial_guess(plan, planner, straight, settled_vehicle(vehicle, problem), seed)
     found = optimise_one(initial, problem, clearance_weight, out, picture)
     write_answer(
         f"{found.summary}, {found.length_m:.1f} m, {found.duration_s:.1f} s"
@@ -151,7 +153,7 @@ def solve(
     """
     from tasks.requests.solve_many import solve_many
 
-    settings = options.settings(assist, improve_seconds)
+    settings = options.settings(assist, improve_seconds, problems)
     solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
     _write_summary(solved)
     write_files(rows=out, plans=plans, learned=learn)

@@ -12,7 +12,7 @@ def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) ->
     """Check every shard, archive and stored plan of a data folder, and make some attempts again.
 
     Args:
-        folder: The data folder.
+        folder: The data folder; or the folder of one memory or library, whose plans are judged.
         sample: Share of the benchmark's problems that are attempted again, 0 to 1.
         workers: Worker processes; default one for each core.
     """

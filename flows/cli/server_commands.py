@@ -14,7 +14,7 @@ LOOPBACK: Final = "127.0.0.1"
 def serve_memory(
     memory: str,
     *,
-    vehicle: str = "car",
+    vehicle: str | None = None,
     host: str = LOOPBACK,
     port: int = 5001,
     workers: int = 1,
@@ -25,14 +25,17 @@ def serve_memory(
         memory: Folder of a memory, or of a run with one, or its name in $MOTION_MEMORY_DATA or ./data; or a
             model in MLflow: models:/name/1, models:/name@alias, …
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+            Default: that of the memory.
         host: Address to listen on; one that other machines reach needs MOTION_MEMORY_AUTH=user:password.
         port: Port to listen on; 0 takes any free one.
         workers: Worker processes.
     """
+    from tasks.registry.settled_vehicle import settled_vehicle
     from tasks.serving.serve_memory import serve_memory as task
     from tasks.settings.environment import memory_named
 
-    task(memory_named(memory), vehicle, host, port, worker_count(workers))
+    address = memory_named(memory)
+    task(address, settled_vehicle(vehicle, memory=address), host, port, worker_count(workers))
 
 
 def servers(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cyclopts import Parameter
@@ -25,6 +26,7 @@ class SolveOptions:
         memory: Folder of a run or of one memory, the name of a run in $MOTION_MEMORY_DATA or ./data, or a
             model in MLflow: models:/name/1, models:/name@alias, runs:/…
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
+            Default: that of the problems, else that of the memory, else car.
         seed: Everything random follows from it.
     """
 
@@ -32,28 +34,34 @@ class SolveOptions:
     top_k: int = 5
     recall: RecallName | None = None
     memory: str | None = None
-    vehicle: str = "car"
+    vehicle: str | None = None
     seed: int = 1
 
     def settings(
-        self, assist: str | None, improve_seconds: float = 0.0, without_memory: str = "none"
+        self,
+        assist: str | None,
+        improve_seconds: float = 0.0,
+        problems: Path | None = None,
+        without_memory: str = "none",
     ) -> AssistantSettings:
         """These options as the settings of an assistant.
 
         ``assist``: its name, or None for repair with a memory and ``without_memory`` without one.
-        ``improve_seconds``: how long to improve each plan.
+        ``improve_seconds``: how long to improve each plan. ``problems``: the file, which may state a vehicle.
         """
+        from tasks.registry.settled_vehicle import settled_vehicle
         from tasks.requests.assistant import AssistantSettings
-        from tasks.settings.checks import checked_vehicle
         from tasks.settings.environment import memory_named
+
+        memory = None if self.memory is None else memory_named(self.memory)
 
         return AssistantSettings(
             self.planner,
-            assist or (without_memory if self.memory is None else "repair"),
+            assist or (without_memory if memory is None else "repair"),
             self.top_k,
-            None if self.memory is None else memory_named(self.memory),
+            memory,
             self.seed,
-            checked_vehicle(self.vehicle),
+            settled_vehicle(self.vehicle, problems, memory),
             improve_seconds,
             self.recall,
         )

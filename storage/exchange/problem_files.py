@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 FORMATS: Final = (".json", ".jsonl", ".parquet")
 FIELDS: Final = (
-    "id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale", *QUESTION_FIELDS,
+    "id", "class", "start", "goal", "goal_radius", "bounds", "obstacles", "groups", "scale", "vehicle",
+    *QUESTION_FIELDS,
 )  # fmt: skip
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
 SLICES_A_GROUP: Final = 16  # to read the last rows of a row group, those before are decoded too

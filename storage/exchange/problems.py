@@ -25,6 +25,7 @@ from storage.exchange.problem_files import (
 from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
 from storage.fields import number_of, short, text_of
 from storage.places.files import whole_file, write_json
+from storage.vehicles.stated_vehicle import as_text, refuse_another_driver, stated_vehicle, statement_of
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
 UNKNOWN_CLASS: Final = "unknown"
@@ -87,6 +88,19 @@ def _checked(
         yield where, problem
 
 
+def vehicle_of_problems(path: Path) -> Vehicle | None:
+    """The vehicle that the first problem in the file at ``path`` states, or None.
+
+    Raises StorageError if the file is missing or unreadable, or states no vehicle that this program knows.
+    """
+    for _, fields in raw_problems(path):
+        try:
+            return stated_vehicle(fields)
+        except ValueError as error:
+            raise StorageError(f"{path}: {error}.") from None
+    return None
+
+
 def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = CAR) -> None:
     """Write ``problems`` for a ``vehicle`` to ``path``, whole or not at all, in the format of its ending.
 
@@ -94,7 +108,7 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
     of the world outside, a problem's own times its scale. Reading gives the same problems back, exactly, or
     to the last digit if the scale is not 1.
     """
-    rows = [fields_of(problem, vehicle) for problem in problems]
+    rows = [fields_of(problem, vehicle) | statement_of(vehicle) for problem in problems]
     match format_of(path):
         case ".json":
             if len(rows) != 1:
@@ -109,7 +123,7 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
             from storage.tables.schemas import PROBLEMS  # late: a robot has no pyarrow
             from storage.tables.shards import table_of, write_table
 
-            write_table(path, table_of(rows, PROBLEMS, "problem"))
+            write_table(path, table_of([as_text(row) for row in rows], PROBLEMS, "problem"))
 
 
 def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
@@ -129,6 +143,7 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")
+    refuse_another_driver(fields, vehicle)
     start, bounds = numbers_of(fields, "start", 3), numbers_of(fields, "bounds", 4)
     goal = goal_of(fields)
     scale = scale_for_vehicle(fields.get("scale"), vehicle)

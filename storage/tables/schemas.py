@@ -53,6 +53,7 @@ PROBLEMS: Final = _schema(
         ("goal_speed", pa.list_(pa.float64())),  # least and most, m/s
         ("goal_hitch", pa.list_(pa.float64())),  # rad
         ("goal_hitch_tolerance", pa.list_(pa.float64())),  # rad
+        ("vehicle", pa.string()),  # its name, or all of it as JSON
     ],
     optional=(
         *(
@@ -64,7 +65,7 @@ PROBLEMS: Final = _schema(
             "start_turn_rate",
             "start_hitch",
         ),
-        *("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance"),
+        *("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance", "vehicle"),
     ),  # lengths are those of the world outside here
 )
 

@@ -30,8 +30,8 @@ class Shortfall(NamedTuple):
     def found(self) -> str:
         """How many experiences there are, and why."""
         return (
-            f"Class {self.class_name} has only {self.kept} of {self.wanted} experiences, because too few of "
-            "its problems were solved"
+            f"Class {self.class_name} has only {self.kept} of {self.wanted} experiences, because no more "
+            "of its problems were solved"
         )
 
     def __str__(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from planners.memory.hallucination.mixture import LEARNED, hallucinate
-from planners.memory.hallucination.no_plan import no_plan
+from planners.memory.hallucination.no_plan import NeverBlockedError, no_plan
 from planners.memory.labelling import label_problems
 from planners.memory.plans.experience import Experience
 from planners.memory.plans.sweeps import PlanSweeps, sweep_plans
@@ -53,6 +53,7 @@ class Hallucinated(NamedTuple):
     problems: int
     copied_plans: int  # plans whose problems were copied from the champion's run
     plans: int
+    unsolved: int  # problems that no plan solves: none if the class never blocks some plan
 
 
 def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
@@ -85,7 +86,8 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
         problems += problems_for_none(chunk, source, sweeps, experiences[0].problem.bounds)
     for_none = np.full(len(problems) - len(made_for), -1)
     write_labelled(chunk, problems, np.concatenate([made_for, for_none]).astype(np.int32), sweeps)
-    return Hallucinated(len(problems), len(copied), len(chunk_experiences))
+    unsolved = sum(method == NO_PLAN for _, method in problems)
+    return Hallucinated(len(problems), len(copied), len(chunk_experiences), unsolved)
 
 
 def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: Bounds) -> list[MadeProblem]:
@@ -103,7 +105,10 @@ def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: 
     first, last = round(share * chunk.first), round(share * chunk.last)
     for index in range(first, max(last, first + 1)):
         rng = generator(settings.seed, NO_PLAN, name, index)
-        problems.append((no_plan(sweeps, source.draw, rng, name, index, bounds), NO_PLAN))
+        try:
+            problems.append((no_plan(sweeps, source.draw, rng, name, index, bounds), NO_PLAN))
+        except NeverBlockedError:  # then there is no such problem to learn from
+            break
     wanted = round(DRAWN_SHARE * settings.taught * settings.problems_per_experience)
     drawn = source.count("collect", wanted)  # a folder of worlds has no more than these
     first, last = (drawn * i // settings.taught for i in (chunk.first, chunk.last))
@@ -223,3 +228,15 @@ def log_copied(results: Iterable[Hallucinated]) -> None:
             plans - copied,
             plans,
         )
+
+
+def warn_of_easy_classes(results: Mapping[Chunk, Hallucinated]) -> None:
+    """Warn of classes whose obstacles never block some plan, so that their memory always recalls one."""
+    for name in dict.fromkeys(chunk.class_name for chunk in results):
+        own = [(chunk, made) for chunk, made in results.items() if chunk.class_name == name]
+        if not any(made.unsolved or chunk.settings.as_published for chunk, made in own):
+            _LOG.warning(
+                "Class %s is easy: its obstacles never block some of its plans. Its memory learns from no "
+                "problem without a plan, and always recalls one.",
+                name,
+            )

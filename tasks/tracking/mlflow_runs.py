@@ -19,6 +19,7 @@ from storage.places.data_folder import DataFolder, open_data_folder
 from storage.places.mirror import fetch, fetch_folder, files_in, uri_of
 from storage.places.scratch import scratch_folder
 from tasks.settings.redaction import redacted
+from tasks.tracking import runs_view
 from tasks.tracking.mlflow_database import ready_database
 from tasks.tracking.provenance import provenance
 from tasks.tracking.table_shape import table_shape
@@ -61,6 +62,9 @@ class Tracker:
             self._experiment = (
                 experiment.experiment_id if experiment else client.create_experiment(EXPERIMENT, artifacts)
             )
+            if experiment is None or runs_view.TAG not in experiment.tags:  # it may have been changed there
+                shown = runs_view.runs_view(f"tags.`{STAGE_TAG}` = 'run'")
+                client.set_experiment_tag(self._experiment, runs_view.TAG, shown)
             self._connected = client
         except Exception as error:  # raised again, in one line, where the client is used
             self._failure = error

@@ -143,10 +143,10 @@ def test_mlflow_compares_runs_by_one_name_a_setting_and_the_same_figures(
         "learning.seeds": "2",
     }
     assert settings.items() <= parameters.items()
-    wanted = {"reduction", "reduction/open-5-exhaustive", "alone/solved", "times_faster", "fresh_oracle"}
+    wanted = {"1-gain/faster", "3-alone/solved", "4-recall/oracle", "5-saved/open-5-exhaustive"}
     assert len([name for name in figures if not name.startswith("system/")]) <= 32
     assert wanted <= set(figures)
-    assert 0.0 <= figures["fresh_hit_1"] <= figures["fresh_oracle"] <= 1.0
+    assert 0.0 <= figures["4-recall/hit_1"] <= figures["4-recall/oracle"] <= 1.0
 
 
 FIGURES = {

@@ -20,6 +20,10 @@ from planners.world.problem import BOUNDS, CANONICAL_GOAL, CANONICAL_START, GOAL
 DRAWS: Final = 1000  # a class whose obstacles miss a plan so often can never block it
 
 
+class NeverBlockedError(RuntimeError):
+    """The obstacles of a class never block some plan, so each problem of the class has a plan."""
+
+
 def no_plan(
     sweeps: PlanSweeps,
     draw: DrawObstacles,
@@ -39,7 +43,7 @@ def no_plan(
         bounds: x_min, y_min, x_max, y_max in metres.
 
     Raises:
-        RuntimeError: The obstacles of the class never block some plan.
+        NeverBlockedError: The obstacles of the class never block some plan.
     """
     obstacles = draw(rng)
     everywhere = np.array(bounds)
@@ -56,9 +60,8 @@ def no_plan(
                 obstacles=obstacles,
             )
         obstacles = _with_blocking(obstacles, draw(rng), sweeps, free, everywhere)
-    raise RuntimeError(
-        f"{DRAWS} draws of class {class_name} never blocked plans {np.flatnonzero(free).tolist()}: "
-        "leave these plans out, or make the class harder"
+    raise NeverBlockedError(
+        f"{DRAWS} draws of class {class_name} never blocked plans {np.flatnonzero(free).tolist()}"
     )
 
 

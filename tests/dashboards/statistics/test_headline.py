@@ -25,15 +25,17 @@ def test_headlines_are_means_of_the_tables(
 ) -> None:
     summary, retrieval, figures = found
     closed = summary[summary["configuration"] == "closed 5 encoder"]
-    assert figures["reduction/closed-5-encoder"] == pytest.approx(closed["reduction"].mean())
-    assert figures["alone/solved"] == pytest.approx(
+    assert figures["5-saved/closed-5-encoder"] == pytest.approx(closed["reduction"].mean())
+    assert figures["3-alone/solved"] == pytest.approx(
         summary.loc[summary["configuration"] == "none", "solved"].mean()
     )
-    assert 3.0 < figures["times_faster"] < 5.0
+    assert 3.0 < figures["1-gain/faster"] < 5.0
     assert len(figures) <= 32  # or a table of runs cannot be read
+    assert sorted(figures)[:2] == ["1-gain/faster", "1-gain/sooner_s"]  # what a table shows first
+    assert all(len(name) <= 17 for name in figures if not name.startswith("5-"))  # which it does not cut
     fresh = retrieval[(retrieval["protocol"] == "fresh") & (retrieval["recall"] == "encoder")]
-    assert figures["fresh_hit_1"] == pytest.approx(fresh["hit@1"].mean())
-    assert 0.6 < figures["reduction"] < 0.9  # memory was made four times as fast
+    assert figures["4-recall/hit_1"] == pytest.approx(fresh["hit@1"].mean())
+    assert 0.6 < figures["5-saved/all"] < 0.9  # memory was made four times as fast
 
 
 def test_names_do_not_depend_on_what_was_measured_and_no_figure_is_no_number(

@@ -20,7 +20,7 @@ from storage.fields import check_fields, parse_json
 from tests.storage.samples import box, plan, problem_with, quick
 
 GOOD: dict[str, Any] = fields_of(problem_with([box(20, 20)]))
-LATER = ("goal_heading", "start_velocity", "vehicle")
+LATER = ("goal_heading", "start_velocity", "driver")
 
 
 def write(path: Path, fields: dict[str, Any]) -> Path:

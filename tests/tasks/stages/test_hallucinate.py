@@ -15,7 +15,9 @@ import pytest
 
 from planners.memory.hallucination import learned_obstacles_training as training
 from planners.memory.hallucination.mixture import METHODS
+from planners.memory.hallucination.no_plan import NeverBlockedError
 from planners.solve import solve
+from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.tables.experiences import read_experiences
 from storage.tables.hallucinated import read_hallucinated_problems, read_labelled, read_methods
@@ -116,6 +118,29 @@ def test_every_problem_has_its_origin_and_no_two_are_the_same(data: Path) -> Non
     no_plan = [i for i, identity in enumerate(ids) if "no-plan" in identity]
     assert len(no_plan) == methods["no-plan"] == round(0.05 * 6 * 12)
     assert not free[no_plan].any()
+
+
+def test_a_class_that_cannot_block_a_plan_has_problems_all_the_same(
+    data: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def never_blocked(*_: object) -> Problem:
+        raise NeverBlockedError
+
+    settings = replace(SETTINGS, problems_per_experience=6)
+    collect(str(data), settings)
+    run_stage(LEARN_HALLUCINATION, str(data), settings)
+    monkeypatch.setattr(hallucinate, "no_plan", never_blocked)
+    chunks = HALLUCINATE.chunks(str(data), settings)
+    made = {chunk: hallucinate_chunk(chunk) for chunk in chunks}
+    methods = Counter(
+        each
+        for path in run_folder(str(data), settings).shards("hallucinated", "trap")
+        for each in read_methods(path)
+    )
+    assert methods["no-plan"] == 0
+    assert methods["origin"] == 6
+    hallucinate.warn_of_easy_classes(made)
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
 
 
 def test_a_network_is_trained_only_for_who_asks(data: Path) -> None:

@@ -1,0 +1,57 @@
+"""The vehicle that a problem's fields state, which need not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
+from storage.errors import StorageError
+from storage.fields import parse_json, short
+from storage.vehicles.definitions import definition_of, first_difference
+from storage.vehicles.recorded_vehicle import record_of, vehicle_recorded
+from storage.vehicles.vehicle_files import text_of
+
+FIELD = "vehicle"  # a name, or all of a vehicle as an object or, in a table, as its text
+
+
+def statement_of(vehicle: Vehicle) -> dict[str, Any]:
+    """The field that a file of problems has for a ``vehicle``; none for the car."""
+    record = record_of(vehicle)
+    return {} if record == name_of(CAR) else {FIELD: record}
+
+
+def as_text(fields: dict[str, Any]) -> dict[str, Any]:
+    """These ``fields`` with the vehicle as a text, for a table."""
+    vehicle = stated_vehicle(fields)
+    return fields if vehicle is None else fields | {FIELD: text_of(vehicle)}
+
+
+def stated_vehicle(fields: Any) -> Vehicle | None:
+    """The vehicle that the ``fields`` of a problem state, or None.
+
+    Raises ValueError if they state one that this program does not know.
+    """
+    said = fields.get(FIELD) if isinstance(fields, dict) else None
+    if said is None:
+        return None
+    try:
+        recorded = parse_json(said, FIELD) if isinstance(said, str) and said.startswith("{") else said
+    except StorageError:
+        recorded = None
+    vehicle = vehicle_recorded(recorded)
+    if vehicle is None:
+        raise ValueError(f"vehicle is {short(said)}, which is no vehicle; give a name or leave it out")
+    return vehicle
+
+
+def refuse_another_driver(fields: Any, driver: Vehicle) -> None:
+    """Raise ValueError if the ``fields`` of a problem state another vehicle than the one that drives."""
+    stated = stated_vehicle(fields)
+    if stated is None:
+        return
+    difference = first_difference(definition_of(stated), definition_of(driver))
+    if difference:
+        raise ValueError(
+            f"is for vehicle {name_of(stated)}, but {name_of(driver)} is to drive: {difference}; name the "
+            "problem's with --vehicle, take a memory of it, or leave the field vehicle out"
+        )

@@ -1,0 +1,39 @@
+"""Which vehicle a command means: the one that is named, else that of the problems, else of the memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from storage.archives.libraries import HEADERS, vehicle_of
+from storage.exchange.problem_files import FORMATS
+from storage.exchange.problems import vehicle_of_problems
+from storage.vehicles.vehicle_files import text_of
+from tasks.registry.model_uris import memory_folder
+from tasks.settings.checks import checked_vehicle
+from tasks.settings.run_settings import DEFAULT_VEHICLE
+
+
+def settled_vehicle(given: str | None, problems: Path | None = None, memory: str | None = None) -> str:
+    """What says all of the vehicle that drives (``storage.vehicles.vehicle_files.said_vehicle``).
+
+    Args:
+        given: the name or file that the user gave, or None.
+        problems: a file of problems, whose first may state its vehicle; None or another file states none.
+        memory: the address of a memory, which is for one vehicle, or None.
+
+    Raises:
+        UsageError: there is no vehicle of the given name, or its file is wrong.
+        StorageError: the problems or the memory are missing or damaged.
+        RunError: MLflow does not have the memory.
+    """
+    if given is not None:
+        return checked_vehicle(given)
+    if problems is not None and problems.suffix in FORMATS:
+        stated = vehicle_of_problems(problems)
+        if stated is not None:
+            return text_of(stated)
+    with memory_folder(memory) as folder:
+        for place in () if folder is None else (folder, *sorted(folder.glob("memories/[!.]*"))):
+            if any((place / header).is_file() for header in HEADERS):
+                return text_of(vehicle_of(place))
+    return DEFAULT_VEHICLE
