@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import yaml
 
-from storage.fields import check_fields
+from storage.fields import check_fields, short
 from storage.places.files import read_text
 
 LARGEST_YAML: Final = 16_384  # bytes
@@ -37,14 +37,14 @@ def yaml_fields(file: Path, what: str, names: Sequence[str], most_brackets: int)
     if text.count("[") + text.count("{") > most_brackets:
         raise ValueError(f"has more brackets than any {what}")
     try:  # an alias stands for what was written before: a few lines of them could fill memory
-        aliases = any(
-            isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)
-        )
-        node = None if aliases else yaml.compose(text, Loader=yaml.SafeLoader)
-        fields = None if aliases else yaml.safe_load(text)
+        events = yaml.parse(text, Loader=yaml.SafeLoader)
+        alias = next((event.anchor for event in events if isinstance(event, yaml.AliasEvent)), None)
+        node, fields = (None, None) if alias else (yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text))
     except _BROKEN as error:
         reason = str(error).partition("\n")[0][:100]
         raise ValueError(f"is not YAML ({reason})") from None
+    if alias:
+        raise ValueError(f"uses the alias {short('*' + alias)}; write out what it stands for")
     if not isinstance(fields, Mapping) or not isinstance(node, yaml.MappingNode):
         raise ValueError(f"is not the YAML of a {what}; expected {', '.join(names)}")
     check_fields([key.value for key, _ in node.value], names)

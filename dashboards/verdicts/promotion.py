@@ -50,13 +50,13 @@ OPEN: Final = "open"  # the interval reaches over 0
 class Judgement(NamedTuple):
     """What became of a challenger, and by what figures."""
 
-    promoted: bool
+    passes: bool  # whether the rule lets it take the champion's place
     why: str  # in one line
     problems: int
     sooner_s: float  # planning and driving time that it saves, mean over columns, seconds
     low_s: float  # ends of its 95 % interval
     high_s: float
-    columns: pd.DataFrame  # a row a class, planner and configuration: ``HEADINGS`` and ``problems``
+    columns: pd.DataFrame  # a row a class, planner and configuration: the verdict and its figures
 
 
 def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Judgement:
@@ -92,7 +92,7 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
     ends = float(whole[0][0]), float(whole[1][0])
     against = _against(columns, ends)
     return Judgement(
-        promoted=not against,
+        passes=not against,
         why="; ".join(against) or _interval_line("sooner there", columns, ends),
         problems=int(challenger["problem_id"].nunique()),
         sooner_s=float(columns["sooner_s"].mean()),
@@ -120,9 +120,8 @@ def judgement_tables(judged: Judgement) -> list[CellTable]:
     return titled_tables(HEADINGS, _titled(judged), "judgement", FIELDS, panels)
 
 
-def judgement_markdown(judged: Judgement) -> str:
-    """What was ``judged`` as Markdown: verdict, figures and columns."""
-    verdict = "promoted" if judged.promoted else "refused"
+def judgement_markdown(judged: Judgement, verdict: str) -> str:
+    """What was ``judged`` as Markdown: what became of the challenger (``verdict``), figures and columns."""
     head = f"**{verdict}**: {judged.why}.\n\n{judgement_line(judged)}.\n\n"
     return head + as_markdown(judgement_tables(judged))
 

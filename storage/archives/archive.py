@@ -23,7 +23,8 @@ from storage.errors import StorageError
 from storage.fields import parse_json
 from storage.places.files import local_text, whole_folder
 from storage.places.mirror import fetch_folder
-from storage.vehicles.recorded_vehicle import fields_of, refuse_another, vehicle_recorded
+from storage.vehicles.definitions import definition_of
+from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
 VERSION: Final = 2  # one more whenever an older program could no longer read an archive
 LARGEST_HEADER_BYTES: Final = 1 << 24
@@ -56,7 +57,7 @@ def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str
         content = {
             "kind": kind,
             "version": VERSION,
-            "vehicle": fields_of(vehicle),
+            "vehicle": definition_of(vehicle),
             "grid": GRID,
             **header,
             "files": {

@@ -19,7 +19,8 @@ from storage.fields import parse_json, short
 from storage.tables.columns import list_column, lists_of, problem_columns, problems_of
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import metadata_of, read_table, sound, write_table
-from storage.vehicles.recorded_vehicle import fields_of, refuse_another, vehicle_recorded
+from storage.vehicles.definitions import definition_of
+from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
 _CONTROL = 2
 _VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
@@ -187,7 +188,7 @@ def vehicle_of_experiences(path: Path) -> Vehicle:
 
 
 def _metadata(vehicle: Vehicle) -> dict[bytes, bytes]:
-    return {**EXPERIENCES.metadata, _VEHICLE: json.dumps(fields_of(vehicle)).encode()}
+    return {**EXPERIENCES.metadata, _VEHICLE: json.dumps(definition_of(vehicle)).encode()}
 
 
 def _recorded(path: Path) -> Any:

@@ -16,11 +16,6 @@ from storage.fields import short
 from storage.vehicles.definitions import definition_of, first_difference, is_built_in, vehicle_of
 
 
-def fields_of(vehicle: Vehicle) -> dict[str, Any]:
-    """The definition of a ``vehicle`` as JSON values: all of its numbers."""
-    return definition_of(vehicle)
-
-
 def record_of(vehicle: Vehicle) -> str | dict[str, Any]:
     """What a plan's file says of a ``vehicle``: the name of a built-in one, else its definition."""
     return name_of(vehicle) if is_built_in(vehicle) else definition_of(vehicle)

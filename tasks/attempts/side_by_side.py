@@ -16,13 +16,12 @@ from planners.solve import solve
 from planners.world.problem import Problem
 from planners.world.randomness import generator
 from planners.world.workspace import Workspace
+from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.attempt_rows import attempt_row
 from tasks.attempts.compile_assists import compile_assists
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
-from tasks.fan_out.chunk import Chunk
-from tasks.inputs.problem_sources import Source
-from tasks.settings.run_settings import Assist
+from tasks.settings.run_settings import Assist, RunSettings
 
 MemoryOfRun = tuple[str, str]  # name of a memory, and the run that made it
 Made = TypeVar("Made")
@@ -68,16 +67,16 @@ def in_turn(
 
 
 def side_by_side(
-    chunk: Chunk,
-    source: Source,
+    problems: Sequence[Problem],
+    settings: RunSettings,
     contestants: Sequence[Contestant],
     memories: Mapping[MemoryOfRun, Memory],
 ) -> list[dict[str, Any]]:
-    """Have every contestant attempt each problem of a chunk, in turn.
+    """Have every contestant attempt each problem, in turn.
 
     Args:
-        chunk: the range of test problems.
-        source: where the problems come from.
+        problems: what is attempted.
+        settings: the settings that say the vehicle and the seed.
         contestants: who attempts them.
         memories: what the contestants recall from.
 
@@ -87,7 +86,7 @@ def side_by_side(
     Raises:
         PlanFaultError: the authority finds fault with a plan.
     """
-    vehicle, seed, workspace = chunk.vehicle, chunk.settings.seed, Workspace()
+    vehicle, seed, workspace = said_vehicle(settings.vehicle), settings.seed, Workspace()
 
     def attempt(problem: Problem, number: int) -> Attempt:
         by = contestants[number]
@@ -100,7 +99,6 @@ def side_by_side(
             workspace=workspace,
         )
 
-    problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
     compile_assists(vehicle)
     for number in range(len(contestants)):  # what is made when first needed is there before time counts
         attempt(problems[-1], number)

@@ -96,7 +96,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
     load_memory(folder.memory(memory), said_vehicle(settings.vehicle))  # raises StorageError if damaged
     (key,) = BUILD_MEMORY.keys(data, settings, memory)
     run_id, model_id = tracker(data).logged_memory(settings.run_name, memory, key)
-    markdown = _markdown(run, memory, judgement)
+    markdown = _markdown(run, memory, verdict, judgement)
     benchmark = usefulness(attempts.challenger)
     tags = {
         "memory": memory,
@@ -121,7 +121,7 @@ def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, ap
 def _verdict(judgement: Judgement | None, approve: bool) -> str:
     if judgement is None:
         return FIRST
-    if not judgement.promoted:
+    if not judgement.passes:
         return REFUSED
     return AWAITING if approve else PROMOTED
 
@@ -134,12 +134,12 @@ def _summary(version: Version, champion: Version | None, verdict: str, judgement
     return f"{subject} {state}, against version {champion.number}: {judgement.why}"
 
 
-def _markdown(run: RetrainingRun, memory: str, judgement: Judgement | None) -> str:
+def _markdown(run: RetrainingRun, memory: str, verdict: str, judgement: Judgement | None) -> str:
     learned = run.settings.learned or "nothing"
     heading = f"Memory *{memory}* of run `{run.settings.run_name}`, learned: `{learned}`.\n\n"
     if judgement is None:
         return heading + "There was no champion. This memory is the first; all its plans were checked.\n"
-    return heading + judgement_markdown(judgement)
+    return heading + judgement_markdown(judgement, verdict)
 
 
 def _log(judged_versions: Sequence[JudgedVersion]) -> None:

@@ -15,7 +15,6 @@ from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.side_by_side import Contestant, MemoryOfRun, side_by_side
-from tasks.fan_out.chunk import Chunk
 from tasks.fan_out.progress import progress
 from tasks.inputs.problem_sources import Source, Worlds, source_of
 from tasks.settings.checks import check_count
@@ -72,11 +71,12 @@ def measure_in_turn(
         with progress(f"measure {name}", count) as show:
             for start in range(0, count, AT_ONCE):
                 end = min(start + AT_ONCE, count)
-                chunk = Chunk(str(first.folder.path), first.settings, name, 0, start, end, "")
-                tables.append(pd.DataFrame(side_by_side(chunk, source, everyone * ROUNDS, memories)))
+                asked = [source.problem("test", index) for index in range(start, end)]
+                rows = side_by_side(asked, first.settings, everyone * ROUNDS, memories)
+                tables.append(pd.DataFrame(rows))
                 show(end)
-    rows = _medians(pd.concat(tables, ignore_index=True))
-    return rows[rows["run_id"] == FIRST], rows[rows["run_id"] == OTHER]
+    medians = _medians(pd.concat(tables, ignore_index=True))
+    return medians[medians["run_id"] == FIRST], medians[medians["run_id"] == OTHER]
 
 
 def _in_common(first: RunSettings, other: RunSettings) -> tuple[list[str], list[str]]:

@@ -39,7 +39,8 @@ def benchmark_chunk(chunk: Chunk) -> None:
         for memory in settings.memories_of(name)
     }
     source = source_of(chunk.data, settings, name)
-    rows = side_by_side(chunk, source, contestants(settings, name), memories)
+    problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
+    rows = side_by_side(problems, settings, contestants(settings, name), memories)
     write_attempts(chunk.shard("results"), rows, key=chunk.key)
 
 

@@ -80,7 +80,9 @@ def judge_chunk(chunk: Chunk) -> None:
         each._replace(assist=each.assist._replace(recall=each.assist.recall or recalls[each.memory]))
         for each in contestants(settings, name)
     ]
-    rows = side_by_side(chunk, held_back(chunk.data, settings, name), everyone, memories)
+    source = held_back(chunk.data, settings, name)
+    problems = [source.problem("test", index) for index in range(chunk.first, chunk.last)]
+    rows = side_by_side(problems, settings, everyone, memories)
     write_attempts(chunk.shard("judged"), rows, key=chunk.key)
 
 

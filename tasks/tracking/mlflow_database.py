@@ -31,17 +31,16 @@ def ready_database(data: DataFolder) -> None:
 
     Raises:
         RunError: a newer MLflow made the database.
-        InUseError: another command is upgrading it.
+        InUseError: another command is making or upgrading it.
     """
     path = data.mlflow_database
-    if not path.exists():
-        _make(path, data.mlflow_artifacts.as_uri())
+    if path.exists() and _schema_of(path) == _schemas().get_current_head():
         return
-    schemas = _schemas()
-    if _schema_of(path) != schemas.get_current_head():
-        with locked(path.with_name(f".{path.name}.lock"), str(path)):
-            if _schema_of(path) != schemas.get_current_head():
-                _upgrade(path, schemas)
+    with locked(path.with_name(f".{path.name}.lock"), str(path)):
+        if not path.exists():
+            _make(path, data.mlflow_artifacts.as_uri())
+        elif _schema_of(path) != _schemas().get_current_head():
+            _upgrade(path, _schemas())
 
 
 def _make(path: Path, artifacts: str) -> None:
@@ -95,6 +94,6 @@ def _schema_of(path: Path) -> str:
 
 
 def _remove_leftovers(path: Path) -> None:
-    """Delete unfinished copies of a killed command; only one command at a time makes one."""
+    """Delete unfinished copies of a killed command; the lock keeps others from making one meanwhile."""
     for left in path.parent.glob(f".{path.name}.*.partial*"):
         left.unlink()

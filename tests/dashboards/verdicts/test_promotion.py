@@ -40,7 +40,7 @@ def _times(rows: pd.DataFrame, factor: float | np.ndarray, which: pd.Series | bo
 
 def test_nobody_is_promoted_over_an_equal(champion: pd.DataFrame) -> None:
     found = judge(champion, champion.sample(frac=1.0, random_state=1))
-    assert not found.promoted
+    assert not found.passes
     assert found.why.startswith("not shown to be sooner")
     assert (found.sooner_s, found.low_s, found.high_s) == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
     assert set(found.columns["verdict"]) == {OPEN}
@@ -54,26 +54,26 @@ def _drives(rows: pd.DataFrame, longer: float | np.ndarray, which: pd.Series | b
 
 def test_whoever_plans_faster_everywhere_and_drives_the_same_is_promoted(champion: pd.DataFrame) -> None:
     found = judge(champion, _times(champion, 0.5))
-    assert found.promoted
+    assert found.passes
     assert found.sooner_s == pytest.approx(0.5 * champion["planning_seconds"].mean())
     assert set(found.columns["verdict"]) == {SOONER}
 
 
 def test_whoever_plans_the_same_and_drives_shorter_is_promoted(champion: pd.DataFrame) -> None:
     found = judge(champion, _drives(champion, -0.5))
-    assert found.promoted
+    assert found.passes
     assert found.sooner_s == pytest.approx(0.5 * champion["solved"].mean(), abs=0.02)
 
 
 def test_whoever_plans_faster_and_drives_longer_is_refused(champion: pd.DataFrame) -> None:
     found = judge(champion, _drives(_times(champion, 0.1), 0.5))
-    assert not found.promoted
+    assert not found.passes
     assert found.high_s < 0.0
     assert set(found.columns["verdict"]) == {LATER}
 
 
 def test_whoever_plans_slower_and_drives_shorter_by_more_is_promoted(champion: pd.DataFrame) -> None:
-    assert judge(champion, _drives(_times(champion, 2.0), -0.5)).promoted
+    assert judge(champion, _drives(_times(champion, 2.0), -0.5)).passes
 
 
 def test_who_drives_longer_somewhere_is_refused_however_much_shorter_elsewhere(
@@ -83,14 +83,14 @@ def test_who_drives_longer_somewhere_is_refused_however_much_shorter_elsewhere(
     worse = _drives(_drives(champion, -2.0), 3.0, somewhere & (champion["problem_class"] == "curves"))
     found = judge(champion, worse)
     assert found.low_s > 0.0
-    assert not found.promoted
+    assert not found.passes
     assert "later there with gust open 5 exhaustive on curves" in found.why
 
 
 def test_microseconds_that_nobody_notices_refuse_nobody(champion: pd.DataFrame) -> None:
     somewhere = (champion["planner"] == "gust") & (champion["problem_class"] == "curves")
     seconds = champion["planning_seconds"] + np.where(somewhere, 5e-4, 0.0)
-    assert judge(champion, _drives(champion.assign(planning_seconds=seconds), -0.5, ~somewhere)).promoted
+    assert judge(champion, _drives(champion.assign(planning_seconds=seconds), -0.5, ~somewhere)).passes
 
 
 def test_not_solving_a_problem_is_never_sooner(champion: pd.DataFrame) -> None:
@@ -98,7 +98,7 @@ def test_not_solving_a_problem_is_never_sooner(champion: pd.DataFrame) -> None:
     longest = rows["duration_s"] > rows.groupby("problem_class")["duration_s"].transform("quantile", 0.7)
     given_up = rows.assign(solved=rows["solved"] & ~longest)
     assert judge(rows, given_up).sooner_s < 0.0
-    assert not judge(rows, given_up).promoted
+    assert not judge(rows, given_up).passes
 
 
 def test_of_two_never_both_are_promoted(champion: pd.DataFrame) -> None:
@@ -106,7 +106,7 @@ def test_of_two_never_both_are_promoted(champion: pd.DataFrame) -> None:
     for spread in (0.02, 0.2, 1.0):
         other = _times(champion, rng.lognormal(-0.1, spread, len(champion)))
         other = _drives(other, rng.normal(-0.01, spread, len(champion)))
-        assert not (judge(champion, other).promoted and judge(other, champion).promoted)
+        assert not (judge(champion, other).passes and judge(other, champion).passes)
 
 
 def test_who_is_slower_somewhere_is_refused_however_much_faster_elsewhere(champion: pd.DataFrame) -> None:
@@ -115,7 +115,7 @@ def test_who_is_slower_somewhere_is_refused_however_much_faster_elsewhere(champi
     worse = _times(_times(slow, 0.3), 10.0, somewhere & (champion["problem_class"] == "trap"))
     found = judge(slow, worse)
     assert found.low_s > 0.0
-    assert not found.promoted
+    assert not found.passes
     assert "later there with follow closed 5 encoder on trap" in found.why
     assert (found.columns["verdict"] == LATER).sum() == 1
 
@@ -124,7 +124,7 @@ def test_who_solves_fewer_is_refused_however_fast(champion: pd.DataFrame) -> Non
     solved = champion["solved"].copy()
     solved[np.flatnonzero(solved)[0]] = False
     found = judge(champion, _times(champion, 0.1).assign(solved=solved))
-    assert not found.promoted
+    assert not found.passes
     assert "solves fewer in all" in found.why
     gone = champion["solved"] & ~((champion["planner"] == "gust") & (champion["assist"] == "open"))
     found = judge(champion, _times(champion, 0.1).assign(solved=gone))
@@ -137,7 +137,7 @@ def test_chance_seldom_promotes(champion: pd.DataFrame) -> None:
     for _ in range(40):
         noise = [rng.lognormal(0.0, 0.3, len(champion)) for _ in range(2)]
         first, other = (_drives(_times(champion, each), np.log(each)) for each in noise)
-        promoted += judge(first, other).promoted
+        promoted += judge(first, other).passes
     assert promoted <= 4  # one in 40 is expected; five or more come of that rate in one case of 300
 
 
@@ -151,7 +151,7 @@ def test_what_is_not_paired_is_not_judged(champion: pd.DataFrame) -> None:
 
 def test_both_forms_show_every_column_and_the_verdict(champion: pd.DataFrame) -> None:
     found = judge(champion, _times(champion, 0.5))
-    text = judgement_markdown(found)
+    text = judgement_markdown(found, "promoted")
     assert text.startswith("**promoted**: sooner there: ")
     assert "50.0 % less time" in text
     assert text.count("\n|") == COLUMNS + 2 * 2

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, VEHICLES
 from storage.errors import StorageError
 from storage.vehicles.definitions import definition_of, first_difference, vehicle_of
-from storage.vehicles.recorded_vehicle import fields_of, refuse_another
+from storage.vehicles.recorded_vehicle import refuse_another
 from storage.vehicles.vehicle_files import (
     BUILT_IN,
     label_of,
@@ -131,7 +131,7 @@ def test_what_is_wrong_is_told_with_its_field(tmp_path: Path, path: str, value: 
     [
         ("name: a\nname: b\n", "more than once"),
         ("limits: {speed: [0, 1], speed: [0, 2]}\n", "more than once"),
-        ("a: &a [1, 1]\nb: *a\n", "is not the YAML of a vehicle"),
+        ("a: &a [1, 1]\nb: *a\n", "alias"),
         ("!!python/object/apply:os.getcwd []\n", "is not YAML"),
         ("[" * 3_000, "more brackets than any vehicle"),
         ("- car\n", "is not the YAML of a vehicle"),
@@ -190,11 +190,11 @@ def test_a_difference_is_told_by_its_field_and_the_name_is_none() -> None:
 
 def test_what_was_made_for_another_vehicle_is_refused_with_the_first_difference() -> None:
     small, renamed = vehicle_of(SMALL), vehicle_of(SMALL | {"name": "renamed"})
-    refuse_another("archive", fields_of(small), renamed)
+    refuse_another("archive", definition_of(small), renamed)
     with pytest.raises(StorageError, match=r"for vehicle small, expected car: limits\.speed is \[-1"):
-        refuse_another("archive", fields_of(small), CAR)
+        refuse_another("archive", definition_of(small), CAR)
     with pytest.raises(StorageError, match="--vehicle car"):
-        refuse_another("archive", fields_of(CAR), small)
+        refuse_another("archive", definition_of(CAR), small)
     for nothing in (None, "tram", {"front": 3.0}, [1]):
         with pytest.raises(StorageError, match="no such vehicle"):
             refuse_another("archive", nothing, CAR)

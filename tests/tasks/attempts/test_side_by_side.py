@@ -12,14 +12,13 @@ from planners.attempt import Attempt
 from planners.solve import solve
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import CAR
 from tasks.attempts import side_by_side as module
 from tasks.attempts.side_by_side import Contestant, side_by_side
 from tasks.attempts.timing import DISPLACED_BYTES, OtherWork
 from tasks.settings.run_settings import UNASSISTED
 
 CONTESTANTS = [Contestant(planner, UNASSISTED, None, "run") for planner in ("rrt", "gust", "follow")]
-SOURCE = SimpleNamespace(problem=lambda _, index: problem_class("random").draw(7, index))
+DRAWN = problem_class("random")
 
 
 class Seen:
@@ -41,8 +40,9 @@ class Seen:
 
 
 def rows_of(first: int, last: int) -> list[dict[str, Any]]:
-    chunk = SimpleNamespace(vehicle=CAR, settings=SimpleNamespace(seed=1), first=first, last=last)
-    return side_by_side(cast(Any, chunk), cast(Any, SOURCE), CONTESTANTS, {})
+    settings = SimpleNamespace(vehicle="car", seed=1)
+    problems = [DRAWN.draw(7, index) for index in range(first, last)]
+    return side_by_side(problems, cast(Any, settings), CONTESTANTS, {})
 
 
 def test_no_problem_is_attempted_twice_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,7 +66,7 @@ def test_every_contestant_attempts_each_problem_once(monkeypatch: pytest.MonkeyP
     seen = Seen(monkeypatch)
     rows = rows_of(0, 4)
     asked = [(row["problem_id"], row["planner"]) for row in rows]
-    ids = [SOURCE.problem("test", index).id for index in range(4)]
+    ids = [DRAWN.draw(7, index).id for index in range(4)]
     assert asked == [(identity, each.planner) for identity in ids for each in CONTESTANTS]
     assert sorted(asked) == sorted(seen.timed)
 
