@@ -1,1 +1,1 @@
-"""When things happen: one flow in a file, as short as a paragraph."""
+"""The Prefect flows, which decide when things happen: one per file, as short as a paragraph."""

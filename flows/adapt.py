@@ -1,4 +1,4 @@
-"""Drive the plans of a memory as another vehicle."""
+"""Drive the plans of a memory with another vehicle."""
 
 from __future__ import annotations
 

@@ -10,5 +10,5 @@ from tasks.stages.benchmark import BENCHMARK
 
 @stage_flow
 def benchmark(settings: RunSettings, data: str) -> None:
-    """Solve unseen problems of each class in every configuration, and keep a row of every attempt."""
+    """Solve unseen problems of each class in every configuration, and write a row for every attempt."""
     run_stage(BENCHMARK, data, settings)

@@ -1,4 +1,4 @@
-"""Build memories from encoders and experiences, and see what they recall."""
+"""Build memories from encoders and experiences, and measure what they recall."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tasks.stages.read_worlds import READ_WORLDS, log_skipped
 
 @stage_flow
 def collect(settings: RunSettings, data: str) -> None:
-    """Draw problems of each class, solve them, polish and check the plans, and keep the N best of each."""
+    """Draw problems of each class, solve them, polish and check the plans, and keep each class's N best."""
     settings = begin_collecting(data, settings)
     worlds = run_stage(READ_WORLDS, data, settings)
     log_skipped(worlds.values())

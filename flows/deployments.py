@@ -1,7 +1,7 @@
 """The flows as Prefect deploys them: each takes the options of its command, checked by the same rules.
 
 ``prefect deployment run run/laptop -p experiences=10`` does what ``motion-memory run --experiences 10`` does,
-and Prefect's form shows the options with their choices. Workers and servers are those of the deployment.
+and Prefect's form shows the options with their choices. The deployment decides about workers and servers.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from tasks.servers.access import auth_environment
 from tasks.session.folder_lock import locked_folder
 
 _KEYWORD: Final = inspect.Parameter.KEYWORD_ONLY
-_ELSEWHERE: Final = ("workers", "scheduler")  # options of a command that a deployment has otherwise
+_ELSEWHERE: Final = ("workers", "scheduler")  # options of a command that a deployment sets in its own way
 _ABOUT: Final = (
     "preset",
     "classes",
@@ -59,7 +59,7 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 
 def _at_least(least: int, annotation: Any) -> Any:
-    """A type whose whole numbers have a lower bound; on the command line the settings refuse less."""
+    """A type whose integers have a lower bound; for the command line, the settings check this."""
     if annotation is int:
         return Annotated[int, Ge(least)]
     if get_origin(annotation) is list:
@@ -93,7 +93,7 @@ def _flow_of(
 
 
 def _in_form(parameter: inspect.Parameter) -> inspect.Parameter:
-    """A parameter as the form shows it: a field to leave empty, and not a choice between a value and None."""
+    """A parameter for the form: an optional field instead of a choice between a value and None."""
     if parameter.default is not None:
         return parameter
     kinds = [each for each in get_args(parameter.annotation) if each is not NoneType]
@@ -101,7 +101,7 @@ def _in_form(parameter: inspect.Parameter) -> inspect.Parameter:
 
 
 def _run_name() -> str:
-    """What Prefect calls a run: its flow, what it is about, and its seed."""
+    """The name of a run in Prefect: its flow, its main parameters and its seed."""
     from prefect.runtime import flow_run
 
     given = flow_run.parameters
@@ -135,10 +135,10 @@ def _stage(flow: Flow[..., None]) -> Flow[..., None]:
 
 
 def _command(command: Callable[..., int | None]) -> Flow[..., None]:
-    """A command for one's own problems or maps as a flow; its options are parameters one by one."""
+    """A command for the user's own problems or maps as a flow; each option becomes a parameter."""
     types = get_type_hints(command)
     own: list[inspect.Parameter] = []
-    groups: dict[str, list[inspect.Parameter]] = {}  # options that the command takes as one value
+    groups: dict[str, list[inspect.Parameter]] = {}  # options that the command takes as one object
     for each in inspect.signature(command).parameters.values():
         if hasattr(types[each.name], "__dataclass_fields__"):
             groups[each.name] = _options_of(types[each.name])
@@ -159,7 +159,7 @@ def _command(command: Callable[..., int | None]) -> Flow[..., None]:
 
 
 def _prepare() -> None:
-    """Do what a command does before its flow: let MLflow's client find the password, and log what is told.
+    """Do what a command does before its flow: let MLflow's client find the password, and log notices.
 
     Prefect sends the lines of its extra loggers to the run's log, but leaves their level to the root logger.
     """

@@ -18,7 +18,7 @@ from tasks.tracking.logbook import run_logged
 @flow(name="experience-curve", flow_run_name="experience-curve {settings.title}")
 @locks_data_folder
 def experience_curve(settings: RunSettings, data: str) -> None:
-    """Make memories of more and more experiences, each from the first stage on, and compare their recall."""
+    """Make memories of more and more experiences, each from the first stage on; compare their recall."""
     runs = runs_of_curve(settings)
     with cluster():
         for run in runs:

@@ -12,7 +12,7 @@ from tasks.stages.relabel import RELABEL
 
 @stage_flow
 def hallucinate(settings: RunSettings, data: str) -> None:
-    """Make many problems for each plan, label them, and label them once more for the combined memory."""
+    """Make many problems for each plan, label them, and label them again for the combined memory."""
     run_stage(LEARN_HALLUCINATION, data, settings)
     hallucinated = run_stage(HALLUCINATE, data, settings)
     log_copied(hallucinated.values())

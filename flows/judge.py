@@ -1,4 +1,4 @@
-"""Judge what a run made against the champions."""
+"""Judge the memories of a run against the champions."""
 
 from __future__ import annotations
 

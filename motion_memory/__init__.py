@@ -3,7 +3,7 @@
     memory = motion_memory.load("data/runs/…/memories/random")
     answer = memory.plan({"start": [0.0, 0.0, 0.785], "goal": [50.0, 50.0], …})
 
-What is named here stays as it is within a major version; modules of other packages may change.
+These names stay the same within a major version; modules of other packages may change.
 """
 
 from __future__ import annotations

@@ -33,21 +33,21 @@ def read_worlds(
     resolution: float | None = None,
     seed: int = 1,
 ) -> list[Problem]:
-    """Make problems of worlds, or cut them from a map (docs/worlds.md).
+    """Make problems from worlds, or cut them from a map (docs/worlds.md).
 
     Args:
         path: a folder of worlds, or a map: .map, .yaml (ROS), .npy or .npz.
-        part: of a map, some blocks are for training and the others for testing; of worlds, every second.
+        part: "train" or "test": some blocks of a map, or every second world.
         count: how many problems to make at most; by default 1,000 of a map and all of worlds.
         vehicle: what must have room at each start: a name, or the path of a vehicle's .yaml file.
-        scale: metres of the map in a metre of the memory's problems; by default as many as the vehicle has.
-        resolution: metres of a cell, for a map that does not say.
+        scale: metres of the map in one metre of the memory's problems; by default the vehicle's scale.
+        resolution: metres per cell, for a map that does not state it.
         seed: decides where problems are cut from a map.
 
     Raises:
         StorageError: Nothing can be read.
     """
-    from storage.worlds.importing import ImportSettings, import_part  # late: a robot need not have SciPy
+    from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
     from storage.worlds.sources import source_at
 
     driven = said_vehicle(vehicle)
@@ -75,13 +75,13 @@ def solve_many(
 ) -> None:
     """Solve each problem of a file in this process, and write one row each (docs/problem-files.md).
 
-    A call that was interrupted goes on where it stopped when it is made again.
+    If a call is interrupted, the same call later continues where it stopped.
 
     Args:
         problems: a .json, .jsonl or .parquet file.
         out: where to write the rows, .parquet.
         memory: the folder of a memory or a run, or the address of a model in MLflow.
-        planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
+        planner: the planner that searches if no recalled plan can be used: rrt, gust, follow or lattice.
         assist: how the memory helps; by default repair with a memory, none without.
         top_k: how many plans to recall, at least 1.
         vehicle: its name, or the path of its .yaml file.
@@ -92,7 +92,7 @@ def solve_many(
         UsageError: A name is unknown, or a file would be written over another one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
-    from tasks.requests.assistant import AssistantSettings  # late: a robot need not have pyarrow
+    from tasks.requests.assistant import AssistantSettings  # late: a robot may not have pyarrow
     from tasks.requests.solve_many import solve_many as solve_file
 
     settings = AssistantSettings(

@@ -1,6 +1,6 @@
-"""A memory to plan with, for a robot's own process too: it needs no Prefect, MLflow, pandas or torch.
+"""A memory to plan with, also in a robot's own process: it needs no Prefect, MLflow, pandas or torch.
 
-Everything is loaded and checked before ``load`` returns, and compiled unless it is asked not to.
+Everything is loaded, checked and, by default, compiled before ``load`` returns.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Memory:
-    """Stored plans, and a planner that they help. Several threads may use it at the same time."""
+    """Stored plans and a planner that uses them. Several threads may use it at the same time."""
 
     stored: StoredMemory | PlanLibrary
     planner: str
@@ -107,7 +107,7 @@ class Memory:
         start_motion: tuple[float, ...] = (),
         arrival: Arrival | None = None,
     ) -> Answer:
-        """Plan for a problem that is in arrays already; otherwise like ``plan``.
+        """Plan for a problem that is already in arrays; otherwise like ``plan``.
 
         Args:
             start: x, y in metres, heading in radians.
@@ -118,15 +118,15 @@ class Memory:
                 1]]``.
             goal_radius: metres: how far from the goal the plan may end.
             bounds: x_min, y_min, x_max, y_max in metres.
-            scale: Metres of these lengths in one metre of the memory's problems; None: as many as of its
+            scale: metres of these lengths in one metre of the memory's problems; None: the scale of its
                 vehicle.
-            start_motion: the vehicle's state at the start behind the pose: speed (m/s), then steering angle
-                (rad) or turn rate (rad/s), then hitch angles (rad). What is missing is 0.
-            arrival: what is asked at the goal besides the place: heading, speeds, hitch angles, with
+            start_motion: the entries of the start state after the pose: speed (m/s), steering angle (rad)
+                or turn rate (rad/s), hitch angles (rad). Missing entries are 0.
+            arrival: what the goal asks for besides the place: heading, speeds, hitch angles, with
                 tolerances.
 
         Raises:
-            ValueError: a polygon is none, or the problem is impossible.
+            ValueError: the obstacles are malformed, or the problem is impossible.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
@@ -144,8 +144,8 @@ class Memory:
     def recall(self, problem: Problem | Mapping[str, Any] | str, k: int = 5) -> list[RankedPlan]:
         """Look up what is stored for a problem, without any search.
 
-        These are the plans that the encoder ranks best. A library, and a memory that is asked anything but a
-        canonical problem, has at most one: a free plan made of parts of stored plans.
+        These are the plans that the encoder ranks best. From a library, and for a problem that is not
+        canonical, there is at most one: a free plan made of parts of stored plans.
 
         Args:
             problem: as for ``plan``.
@@ -160,14 +160,14 @@ class Memory:
             return ranked_plans(self.stored, self._read(problem), k, workspace)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
-        """Judge a plan by code that shares nothing with the planners: simulate it again, sweep it with FCL.
+        """Judge a plan with code that shares nothing with the planners: simulate it again, check it with FCL.
 
         Args:
             problem: as for ``plan``.
-            plan: in the frame and the lengths of the problem.
+            plan: in the frame and the units of length of the problem.
 
         Returns:
-            One line for each fault; none if the plan answers the problem.
+            One line for each fault; an empty list if the plan solves the problem.
 
         Raises:
             ValueError: The problem is malformed or impossible.
@@ -236,14 +236,14 @@ def load(
         memory: the folder of a memory or a library, the folder of a run with one memory, or the address of a
             model in MLflow, such as ``models:/motion-memory-trap@champion``.
         vehicle: its name, or the path of its .yaml file; by default the one that the memory is for.
-        planner: what searches where no recalled plan will do: rrt, gust, follow or lattice.
+        planner: the planner that searches if no recalled plan can be used: rrt, gust, follow or lattice.
         assist: how the memory helps: closed, open or repair.
         top_k: how many plans to recall, at least 1.
-        recall: how they are recalled; by default what suits the size of the memory.
+        recall: how they are recalled; the default depends on the size of the memory.
         seed: everything random follows from it.
-        judged: whether each plan is judged before it is returned, which takes some milliseconds.
-        warm: False leaves out that plan. Then each call compiles what it needs and no call needed before,
-            which is quicker where only a few problems are planned for after an installation.
+        judged: whether each plan is judged before it is returned, which takes a few milliseconds.
+        warm: False skips planning once. Each call then compiles only what it needs and what no call needed
+            before, which is quicker if only a few problems follow after an installation.
 
     Raises:
         UsageError: A name is unknown, or ``top_k`` is below 1.
@@ -260,7 +260,7 @@ def load(
     with memory_at(str(memory)) as folder:
         archive = load_memory_or_library(
             folder, named or vehicle_of(folder)
-        )  # mapped files outlive their names
+        )  # mapped files stay readable after they are deleted
     if isinstance(archive, PlanLibrary):
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready
@@ -279,11 +279,11 @@ def load(
 
 
 def _warmed(ready: Memory) -> Memory:
-    """Plan to a place and to a pose, so that everything is compiled and indexed; returns what was given."""
+    """Plan to a place and to a pose to compile and index everything; return ``ready``."""
     scale = ready.stored.scales[0]
     away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
     bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
-    for asked in (ready, replace(ready, assist="none")):  # what is recalled, and what is searched
+    for asked in (ready, replace(ready, assist="none")):  # recall, then search
         for arrival in (None, Arrival(0.5 * math.pi, 0.1)):  # a place, then a pose
             asked.plan_arrays(
                 *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),

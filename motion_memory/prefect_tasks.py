@@ -1,4 +1,4 @@
-"""Planning as a Prefect task, for flows of one's own (docs/python.md); needs Prefect."""
+"""Planning as a Prefect task, for your own flows (docs/python.md); needs Prefect."""
 
 from __future__ import annotations
 

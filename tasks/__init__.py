@@ -1,1 +1,1 @@
-"""How each stage is done: one chunk of it, cached, tracked and sent to workers."""
+"""How the stages work: chunks that are cached, tracked and sent to workers."""

@@ -1,4 +1,4 @@
-"""What may be chosen, as types: for the help of commands and the menus of Prefect's forms."""
+"""The choices of options as types, for the help of commands and the menus of Prefect's forms."""
 
 from __future__ import annotations
 

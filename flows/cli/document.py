@@ -1,4 +1,4 @@
-"""What a command tells as one JSON document, for ``--json``: tables, lines, files, warnings."""
+"""Everything that a command reports, as one JSON document for ``--json``: tables, lines, files, warnings."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _NUMBERS: Final = re.compile(r"\[\n[-+.,eE\d\s]+\]")
 
 @dataclass
 class Document:
-    """What a command has told so far."""
+    """What a command has reported so far."""
 
-    answer: dict[str, Any] | None = None  # what was asked for, where it is neither a table nor a file
+    answer: dict[str, Any] | None = None  # the result, if it is neither a table nor a file
     tables: list[dict[str, Any]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)  # results in words, and notices
-    files: dict[str, str] = field(default_factory=dict)  # paths and addresses of what was written, by name
+    files: dict[str, str] = field(default_factory=dict)  # paths and addresses of written files, by name
     warnings: list[str] = field(default_factory=list)
     error: str | None = None  # why the command failed
 
@@ -45,6 +45,6 @@ class Document:
         self.tables.append({"name": item.name, "title": item.title, "rows": rows})
 
     def text(self, exit_code: int) -> str:
-        """The whole document, with the command's exit code; rows of numbers stand on one line each."""
+        """The whole document, with the command's exit code; each row of numbers is on one line."""
         text = json.dumps({"exit_code": exit_code} | vars(self), indent=2, ensure_ascii=False)
         return _NUMBERS.sub(lambda found: " ".join(found[0].split()), text)

@@ -1,4 +1,4 @@
-"""Where the console script begins: it says what to install where only what a robot needs is there."""
+"""The entry point of the console script; it says what to install if packages are missing."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from tasks.settings.redaction import redacted
 FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
-GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and to end the workers
+GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and stop the workers
 
 
 def package_version() -> str:
@@ -111,7 +111,7 @@ def _call(arguments: Sequence[str]) -> int:
 
 
 def _refuse_null_characters(arguments: Sequence[str]) -> None:
-    """Raise UsageError if an argument holds a null character, at which the system's paths end."""
+    """Raise UsageError if an argument contains a null character, which would end a path for the system."""
     for argument in arguments:
         if "\0" in argument:
             from tasks.settings.errors import UsageError
@@ -139,13 +139,13 @@ def main() -> None:
         code = call()
         sys.stdout.flush()
         sys.stderr.flush()
-    except BrokenPipeError:  # whoever read the output, such as `head`, has read enough
+    except BrokenPipeError:  # the reader of the output, such as `head`, has closed it
         code = FAILURE
-    os._exit(code)  # threads of Prefect and Dask would wait for servers that have ended
+    os._exit(code)  # threads of Prefect and Dask would wait for servers that have already ended
 
 
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    """End in an orderly way, but exit after ``GRACE_SECONDS`` if something hangs."""
+    """Stop cleanly, but force an exit after ``GRACE_SECONDS`` if something hangs."""
     forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
     forced_exit.daemon = True
     forced_exit.start()

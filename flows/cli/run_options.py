@@ -32,7 +32,7 @@ class Options:
         preset: Size of the run: smoke (a minute), laptop (minutes) or paper (an hour). paper-method is the
             paper's method as published (hours), paper-method-laptop the same with fewer problems.
         classes: Generated problem classes; default all of them, or none if --worlds is given.
-        worlds: A folder of worlds, or a map to cut problems from, which becomes a class. Can be repeated.
+        worlds: A folder of worlds, or a map to cut problems from; it becomes a class. Can be repeated.
         difficulty: Difficulty of the generated classes.
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
         seed: Everything random follows from it.

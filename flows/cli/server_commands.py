@@ -19,7 +19,7 @@ def serve_memory(
     port: int = 5001,
     workers: int = 1,
 ) -> None:
-    """Answer problems over HTTP, in MLflow's protocol, with ranked and checked plans of a memory.
+    """Serve the ranked and checked plans of a memory over HTTP, in MLflow's protocol.
 
     Args:
         memory: Folder of a memory, or of a run with one, or its name in $MOTION_MEMORY_DATA or ./data; or a

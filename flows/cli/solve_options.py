@@ -20,9 +20,9 @@ class SolveOptions:
     """How ``plan``, ``solve`` and ``route`` solve problems, except for the assist.
 
     Args:
-        planner: What searches where no recalled plan will do.
+        planner: Planner that searches if no recalled plan can be used.
         top_k: How many plans to recall.
-        recall: How to recall them; default: by the size of the memory.
+        recall: How to recall them; the default depends on the size of the memory.
         memory: Folder of a run or of one memory, the name of a run in $MOTION_MEMORY_DATA or ./data, or a
             model in MLflow: models:/name/1, models:/name@alias, runs:/…
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.

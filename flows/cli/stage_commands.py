@@ -119,7 +119,7 @@ def settings_of(options: Options) -> RunSettings:
 
 
 def _exit_code(settings: RunSettings, data: str) -> int:
-    """``SHORT`` if a class has fewer experiences than wanted, which is said once more; else 0."""
+    """Return ``SHORT`` and warn again if a class has too few experiences; otherwise return 0."""
     from tasks.inputs.shortfalls import log_shortfalls, shortfalls
 
     short = shortfalls(data, settings)

@@ -1,8 +1,8 @@
 """What the command line writes: results and notices to the output, warnings and progress to the error stream.
 
-Nothing else writes to a terminal. Below ``flows.cli`` results are returned, and what has to be told meanwhile
-is logged: as text, as a ``CellTable``, as a dict of paths by name, or as the ``Progress`` of work. With
-``--json`` all of it is collected, and written to the output at the end as one document.
+Nothing else writes to a terminal. Functions below ``flows.cli`` return their results, and log whatever has to
+be reported before that: text, a ``CellTable``, a dict of paths by name, or the ``Progress`` of work. With
+``--json`` all of it is collected and written to the output at the end as one document.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 LOGGERS: Final = ("tasks", "storage")
 PROGRESS: Final = "tasks.fan_out.progress"
-COMPILING: Final = "planners.world.jit"  # which tells that kernels are being compiled
-DETAILS: Final = ("tasks.fan_out.workload",)  # whose notices are for operators, and here for ``--verbose``
-RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # what a run found, and where it lies
+COMPILING: Final = "planners.world.jit"  # logs that kernels are being compiled
+DETAILS: Final = ("tasks.fan_out.workload",)  # these notices are for operators and for ``--verbose``
+RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # a run's findings, and where they are
 SHORT: Final = 3  # exit code: done, but with less than was asked for
 COLUMNS: Final = 110  # width of tables that are not written to a terminal
 WIDEST: Final = 10_000  # columns of any table
@@ -37,7 +37,7 @@ LINE_SECONDS: Final = 5.0  # between two lines of progress, if the error stream 
 
 @dataclass
 class Telling:
-    """How a command tells what it does and finds; its options ``--json``, ``--quiet`` and ``--verbose``."""
+    """How a command reports what it does and finds: its options ``--json``, ``--quiet`` and ``--verbose``."""
 
     document: Document | None = None  # collects everything for ``--json``
     quiet: bool = False  # only results, warnings and errors
@@ -48,12 +48,12 @@ _telling = Telling()
 
 
 def telling() -> Telling:
-    """How the command that runs tells things."""
+    """The settings by which the current command reports."""
     return _telling
 
 
 def write(*items: str | CellTable) -> None:
-    """Write lines and tables, which are what a command was asked for, to the output."""
+    """Write lines and tables, the results of a command, to the output."""
     for item in items:
         if _telling.document is not None:
             _telling.document.add(item)
@@ -65,7 +65,7 @@ def write(*items: str | CellTable) -> None:
 
 
 def write_answer(*lines: str, **answer: object) -> None:
-    """Write what was asked for: as lines for people, as the fields of ``answer`` for programs."""
+    """Write a result: as lines for people, and as the fields of ``answer`` for programs."""
     if _telling.document is not None:
         _telling.document.answer = answer
     write(*lines)
@@ -88,7 +88,7 @@ def write_error(line: str) -> None:
 
 
 def write_document(exit_code: int) -> None:
-    """Write the document to the output if there is one: all that was told."""
+    """Write the document with everything that was reported to the output, if there is one."""
     if _telling.document is not None:
         print(_telling.document.text(exit_code), flush=True)
 
@@ -124,7 +124,7 @@ def show_notices() -> None:
 def _listen(name: str, level: int, handler: logging.Handler) -> None:
     logger = logging.getLogger(name)
     logger.setLevel(level)
-    logger.propagate = False  # Prefect's handler of the root logger would write the same once more
+    logger.propagate = False  # Prefect's handler on the root logger would write the same line again
     if not any(isinstance(each, type(handler)) for each in logger.handlers):
         logger.addHandler(handler)
 
@@ -169,9 +169,9 @@ class ProgressShown(logging.Handler):
     def __init__(self) -> None:
         super().__init__()
         self._bars: Bars | None = None
-        self._began = 0.0  # when the work began whose progress was shown last
+        self._began = 0.0  # when the work whose progress was shown last began
         self._last_line = 0.0
-        self._complete = False  # whether a line said that all is done, or none has to
+        self._complete = False  # whether a line said that all is done, or no line has to
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a record whose message is a ``Progress``."""
@@ -200,7 +200,7 @@ class ProgressShown(logging.Handler):
             self._bars.start()
         self._bars.update(self._bars.task_ids[0], completed=progress.done, total=progress.total)
         if progress.over:
-            self._bars.update(self._bars.task_ids[0], visible=progress.total > 0)  # nothing was to be done
+            self._bars.update(self._bars.task_ids[0], visible=progress.total > 0)  # there was nothing to do
             self._bars.stop()
             self._bars = None
 
@@ -218,7 +218,7 @@ class ProgressShown(logging.Handler):
 
 
 def _draw(table: CellTable) -> None:
-    """Draw a table on the output, as wide as the terminal if it is one, and no column is ever cut off."""
+    """Draw a table as wide as the terminal, or as wide as it needs to be; no column is ever cut off."""
     from rich.console import Console
     from rich.measure import Measurement
 
@@ -230,7 +230,7 @@ def _draw(table: CellTable) -> None:
 
 
 def rich_table(table: CellTable) -> Table:
-    """A table as Rich draws it. In a group, the first cell is shown only where it changes; a gap follows."""
+    """A table for Rich. A group shows its first cell only when it changes, and a gap follows the group."""
     from rich import box
     from rich.table import Table
 

@@ -1,1 +1,1 @@
-"""Attempts at problems: timed alike, judged, written as rows."""
+"""Attempts at problems: all timed the same way, judged, written as rows."""

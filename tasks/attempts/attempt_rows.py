@@ -19,13 +19,13 @@ _UNKNOWN_WHEN_UNSOLVED: Final = ("source", "length_m", "duration_s")
 
 
 def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicle: Vehicle) -> dict[str, Any]:
-    """The row of an attempt (``storage.tables.schemas.ATTEMPTS``), with what the authority said of its plan.
+    """The row of an attempt (``storage.tables.schemas.ATTEMPTS``), with the authority's verdict on its plan.
 
     Args:
         attempt: the attempt, as ``judged_attempts.check_attempt`` returned it.
         memory: name of the memory that it used, if any.
         run_id: the run that made the memory, if any.
-        vehicle: who drives.
+        vehicle: the vehicle that drives.
     """
     row = {name: getattr(attempt, name) for name in _FIELDS}
     if not attempt.solved:
@@ -35,7 +35,7 @@ def attempt_row(attempt: Attempt, memory: str | None, run_id: str | None, vehicl
 
 
 def same_outcome(attempt: Attempt, row: dict[str, Any], vehicle: Vehicle) -> bool:
-    """Whether an attempt that was made and judged again agrees with its row, but for times."""
+    """Whether an attempt that was repeated and judged again agrees with its row, apart from times."""
     again = attempt_row(attempt, row["memory"], row["run_id"], vehicle)
     counted = ("status", "solved", "verified", "collision_checks", "expansions", "nodes")
     lengths = (again["length_m"] or math.nan, row["length_m"])

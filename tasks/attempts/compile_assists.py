@@ -35,7 +35,7 @@ EMPTY: Final = Problem(
 def compile_assists(
     vehicle: Vehicle, planner: str = ABLATION_PLANNER, strategies: Sequence[str] = RECALLS
 ) -> None:
-    """Plan with a small memory by each strategy of recall: copies of one plan, with a box put in its way.
+    """Plan with a small memory and each strategy of recall: copies of one plan, with a box in its way.
 
     Args:
         vehicle: whose kernels are compiled.

@@ -12,17 +12,17 @@ from tasks.settings.errors import RunError
 
 
 class PlanFaultError(RunError):
-    """A plan of a solved problem is faulty: a bug, never data."""
+    """A plan of a solved problem is faulty, which is a bug and never data."""
 
 
 def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehicle: Vehicle) -> Attempt:
-    """Have the authority judge the plan of an attempt, which has to be right.
+    """Have the authority judge the plan of an attempt, and raise an error if it is faulty.
 
     Args:
         problem: what was attempted.
         attempt: the attempt.
         accepted: plans for this problem that the authority has accepted; this one is added.
-        vehicle: who drives.
+        vehicle: the vehicle that drives.
 
     Returns:
         the attempt with the authority's answer in ``verified``.
@@ -38,13 +38,13 @@ def check_attempt(problem: Problem, attempt: Attempt, accepted: set[bytes], vehi
 
 
 def check_plan(problem: Problem, plan: Plan, planner: str, vehicle: Vehicle) -> None:
-    """Have the authority judge a plan, which has to be right.
+    """Have the authority judge a plan, and raise an error if it is faulty.
 
     Args:
         problem: what the plan is for.
         plan: the plan.
-        planner: who made it, for the error.
-        vehicle: who drives.
+        planner: the planner that made it, for the error.
+        vehicle: the vehicle that drives.
 
     Raises:
         PlanFaultError: the plan does not solve the problem.

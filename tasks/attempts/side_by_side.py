@@ -1,7 +1,7 @@
-"""Side by side: every contestant attempts every problem, at a time when neither is in the caches.
+"""Every contestant attempts every problem, with cold caches.
 
-A robot plans for each problem once, with other work in between. So two attempts at a problem are never made
-in a row, and before each attempt other data fill the caches.
+A robot plans for each problem once, with other work in between. Therefore a problem is never attempted twice
+in a row, and other data fill the caches before each attempt.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Made = TypeVar("Made")
 
 
 class Contestant(NamedTuple):
-    """A planner with what it may use."""
+    """A planner and the memory that it may use."""
 
     planner: str
     assist: Assist
@@ -39,13 +39,13 @@ class Contestant(NamedTuple):
 def in_turn(
     problems: Sequence[Problem], ways: int, seed: int, attempt: Callable[[Problem, int], Made]
 ) -> dict[tuple[int, int], Made]:
-    """Have each of some ways attempt each problem, by the cold clock.
+    """Attempt each problem in each of several ways, on the cold clock.
 
-    All problems are attempted once before any is attempted again. In which order the ways attempt a problem
-    is drawn by its id, so that none of them always comes first.
+    All problems are attempted once before any is attempted again. The order of the ways at a problem is drawn
+    from its id, so that none of them always comes first.
 
     Args:
-        problems: what to attempt; with one problem alone it is attempted several times in a row.
+        problems: the problems to attempt; a single problem is attempted several times in a row.
         ways: how many ways there are.
         seed: of the orders.
         attempt: attempts a problem in one of the ways, which are counted from 0.
@@ -75,9 +75,9 @@ def side_by_side(
     """Have every contestant attempt each problem, in turn.
 
     Args:
-        problems: what is attempted.
-        settings: the settings that say the vehicle and the seed.
-        contestants: who attempts them.
+        problems: the problems to attempt.
+        settings: the settings that name the vehicle and the seed.
+        contestants: the contestants that attempt them.
         memories: what the contestants recall from.
 
     Returns:
@@ -100,7 +100,7 @@ def side_by_side(
         )
 
     compile_assists(vehicle)
-    for number in range(len(contestants)):  # what is made when first needed is there before time counts
+    for number in range(len(contestants)):  # anything made on first use exists before time counts
         attempt(problems[-1], number)
     attempts = in_turn(problems, len(contestants), seed, attempt)
     rows: list[dict[str, Any]] = []

@@ -1,4 +1,4 @@
-"""Times that can be compared, whatever makes the attempt."""
+"""Times that can be compared whatever makes the attempt."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DISPLACED_BYTES: Final = 4 << 20  # several times what a core's own caches hold
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Only ``gc.collect`` collects garbage inside, and only of what was made inside."""
+    """Inside, only ``gc.collect`` collects garbage, and only objects that were made inside."""
     gc.freeze()  # garbage too: looking for it first takes longer than a small batch of attempts
     gc.disable()
     try:
@@ -25,7 +25,7 @@ def no_garbage_collection() -> Iterator[None]:
 
 
 class OtherWork:
-    """What a robot does between two problems, as far as it changes planning times: its data fill the caches.
+    """Do what a robot does between two problems, as far as it affects planning times: fill the caches.
 
     An attempt that is repeated at once finds its problem and its memory in the caches and takes a fraction of
     the time, but a robot never plans for the same problem again.

@@ -1,1 +1,1 @@
-"""Retraining: what is new, who is champion, when to retrain."""
+"""Retraining: what is new, which memory is champion, when to retrain."""

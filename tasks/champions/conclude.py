@@ -1,4 +1,4 @@
-"""The last step of a retraining: judge its memories, register them, and decide who is champion."""
+"""The last step of a retraining: judge its memories, register them, and decide which is champion."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ class JudgedVersion(NamedTuple):
 def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -> None:
     """Judge the memories of a run, register them, and point the aliases at the champions.
 
-    The verdict of a version is noted last, after the alias is moved, which is one step. So a version without
-    a verdict was interrupted, and the same command finishes it.
+    The alias is moved in one step, and the verdict of a version is noted after that. So a version without a
+    verdict was interrupted, and the same command finishes it.
 
     Args:
         data: the data folder.

@@ -1,4 +1,4 @@
-"""Compare what a memory answers at work with its benchmark, and send Prefect events about it.
+"""Compare how useful a memory is at work with its benchmark, and send Prefect events about it.
 
 ``motion-memory.solved`` is sent after every file of problems; ``motion-memory.drift`` too, if hits fell or
 total times rose. They go to the server at PREFECT_API_URL, or to the one that ``motion-memory serve`` runs
@@ -37,17 +37,17 @@ class BenchmarkedMemory(NamedTuple):
 
     name: str  # as events name it: ``name/version``, or ``run/memory``
     benchmark: Mapping[str, Usefulness]  # by planner and configuration
-    data_folder: Path  # that the memory belongs to
+    data_folder: Path  # the folder that the memory belongs to
 
 
 def benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
     """Look up the benchmark of a memory: of a registered version, or of the run whose folder holds it.
 
     Args:
-        memory: what ``--memory`` was given: a folder or a model's address. None means that no memory is used.
+        memory: the value of ``--memory``: a folder or a model's address. None means that no memory is used.
 
     Returns:
-        the memory, or None if it has no benchmark or the registry does not answer: solving goes on without.
+        the memory, or None if it has no benchmark or the registry does not answer.
     """
     model = _MODEL.fullmatch(memory) if memory else None
     try:
@@ -95,7 +95,7 @@ def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data:
     Args:
         memory: the memory with its benchmark.
         now: how useful the memory was just now, by planner and configuration.
-        data: a data folder whose Prefect server gets the events, besides that of the default folder, or None.
+        data: a data folder whose Prefect server also receives the events, besides the default one, or None.
 
     Returns:
         a line for each comparison.

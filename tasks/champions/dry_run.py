@@ -77,10 +77,10 @@ def _row(folder: DataFolder, settings: RunSettings, pending: PendingRetraining, 
 def _changes(
     folder: DataFolder, settings: RunSettings, pending: PendingRetraining, name: str
 ) -> tuple[int, list[int], int]:
-    """What a retraining would make anew for one class.
+    """What a retraining would make for one class.
 
-    Candidates are made of what was learned, and chosen among, as in a retraining. If the champion's run is no
-    longer here, all plans are new.
+    Candidates are made from what was learned, and chosen, as in a retraining. If the champion's run no longer
+    exists, all plans are new.
 
     Returns the number of plans that the champion's run does not have, the numbers of their shards, and the
     number of all shards.

@@ -1,4 +1,4 @@
-"""What retraining has to do: which memories have no champion, and what was learned since the others."""
+"""What retraining has to do: which memories have no champion, and what is new for the others."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class PendingRetraining(NamedTuple):
     ]  # all experiences gained on the job, for each class with a champion
     fresh: Mapping[
         str, list[SearchedExperience]
-    ]  # those that no judged version has seen; only classes that have some
+    ]  # experiences that no judged version has seen; only for classes that have some
     last_judged: Mapping[str, Version]  # by memory: the newest judged version, which may be the champion
 
 
@@ -116,7 +116,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
 
     Args:
         folder: the data folder.
-        settings: what a run is asked to do.
+        settings: the settings of a run.
         registry: the registry of the champions.
 
     Returns:
@@ -191,7 +191,7 @@ def _next_number(registry: Registry) -> int:
 
 
 def _is_judged(version: Version, champion: Version | None) -> bool:
-    """Whether a version has its verdict; one whose retraining was interrupted before that has none."""
+    """Whether a version has its verdict; a retraining that was interrupted leaves versions without."""
     return bool(version.tag("verdict")) or (champion is not None and version.number == champion.number)
 
 

@@ -1,4 +1,4 @@
-"""Change champions: make a judged challenger champion, or go back to the champion before."""
+"""Change champions: make a judged challenger champion, or return to the previous champion."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
 
 
 def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
-    """Make the champion before the current one champion again.
+    """Make the previous champion champion again.
 
     Args:
         data: the data folder.
@@ -117,7 +117,7 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
         registry.tagged(champion, {"verdict": ROLLED_BACK})
         registry.set_alias(
             before
-        )  # last: a roll back killed before this line goes back one version when repeated
+        )  # last: if the command is killed before this line, repeating it still goes back only one version
         changes.append(ChampionChange(champion.name, champion.number, before.number))
     return changes
 

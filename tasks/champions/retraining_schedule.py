@@ -1,4 +1,4 @@
-"""Retrain on a schedule, and when hits have fallen, with a Prefect server that nobody has to set up.
+"""Retrain on a schedule and when hits have fallen, with a Prefect server that needs no set-up.
 
 Prefect's runner asks the data folder's server which retrainings are due, and starts each as a process.
 """
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 DAY: Final = 86_400.0
 NAME: Final = "scheduled"
-QUERY_SECONDS: Final = 2.0  # between two questions to the server
+QUERY_SECONDS: Final = 2.0  # between two queries to the server
 CRON_FIELDS: Final = 5
-END_SECONDS: Final = 5.0  # a retraining may take so long to end after Ctrl-C; then it is killed
+END_SECONDS: Final = 5.0  # how long a retraining may take to end after Ctrl-C before it is killed
 
 _LOG = logging.getLogger(__name__)
 
@@ -95,13 +95,13 @@ def log_failure(_flow: Any, flow_run: Any, state: Any) -> None:
 
 
 def as_parameter(settings: RunSettings) -> dict[str, Any]:
-    """Settings as Prefect keeps them: plain JSON of their fields, without the version that files have."""
+    """Settings for Prefect: plain JSON of their fields, without the version that files have."""
     values: dict[str, Any] = json.loads(json.dumps(asdict(settings)))
     return values
 
 
 def _schedule(every: float | None, cron: str | None) -> dict[str, Any]:
-    """The schedule as Prefect's arguments. Prefect is not imported yet: its settings come with the server."""
+    """The schedule as arguments for Prefect, which is not imported before the server's settings exist."""
     if every is not None and cron is not None:
         raise UsageError("--every and --cron are both given; give one of them.")
     if every is not None and not 1.0 <= every < float("inf"):
@@ -146,12 +146,12 @@ def _run(deployment: RunnerDeployment) -> None:
 
     runner = Runner("motion-memory", query_seconds=QUERY_SECONDS, limit=1)
     runner.add_deployment(deployment)
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # so that asyncio ends the runner in order
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # lets asyncio stop the runner cleanly
     asyncio.run(runner.start())
 
 
 def _end_children() -> None:
-    """End all processes that were started here, except the server, which ends by itself."""
+    """Stop all processes that were started here, except the server, which stops by itself."""
     children = [child for child in psutil.Process().children(recursive=True) if not _is_server(child)]
     for child in children:
         with suppress(psutil.NoSuchProcess):

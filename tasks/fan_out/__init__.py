@@ -1,1 +1,1 @@
-"""What a stage is, and how its chunks are given to Dask workers."""
+"""Stages, and how their chunks are given to Dask workers."""

@@ -1,4 +1,4 @@
-"""A certificate for the local cluster of one command; it is only kept in memory."""
+"""A certificate for the local cluster of one command, kept only in memory."""
 
 from __future__ import annotations
 

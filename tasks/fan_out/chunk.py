@@ -1,4 +1,4 @@
-"""A chunk: a piece of a stage, with all that a worker on any machine needs to do it."""
+"""A chunk: a piece of a stage, with everything that a worker on any machine needs to process it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Piece(Protocol):
 
     @property
     def class_name(self) -> str:
-        """The name of what it is a piece of, for instance a problem class."""
+        """The name of the whole that it belongs to, for instance a problem class."""
 
     @property
     def index(self) -> int:
@@ -70,7 +70,7 @@ class Chunk:
 
 
 class Cut(NamedTuple):
-    """How the work on one class is cut into chunks. The cut must not depend on the number of workers."""
+    """How the work on one class is split into chunks, independently of the number of workers."""
 
     total: int  # problems, plans or epochs
     size: int  # how many of them are in a chunk; the last chunk may have fewer

@@ -1,4 +1,4 @@
-"""The fan-out: give chunks to Dask workers, give them again if a worker is lost, and show the progress."""
+"""The fan-out: give chunks to Dask workers, resubmit them if a worker is lost, and show progress."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ POLL_SECONDS: Final = 0.05
 AHEAD: Final = 200  # chunks submitted at a time: enough for all workers, few enough for any memory
 LOST: Final = ("cancelled", "lost")  # states of a chunk whose scheduler is gone
 GONE: Final = object()  # stands for the state of such a chunk
-LOOK_SECONDS: Final = 1.0  # between two looks at partly done chunks, which read files
+LOOK_SECONDS: Final = 1.0  # between two checks of partly done chunks, which read files
 
 Client: Any = distributed.Client  # Dask has no types
 LocalCluster: Any = distributed.LocalCluster
@@ -56,8 +56,8 @@ class ChunkError(RunError):
 def cluster(workers: int | None = None, scheduler: str | None = None) -> Iterator[Any]:
     """Yield a cluster that all flows inside this context share.
 
-    It is the cluster of an outer context if there is one, else that of the given scheduler, else a new one. A
-    new cluster is local; only this process and its workers have its certificate, so nobody else can use it.
+    It is the cluster of an outer context if there is one, else that of the given scheduler, else a new local
+    one. Only this process and its workers have the certificate of a new cluster, so nobody else can use it.
 
     Args:
         workers: number of worker processes of a new cluster, each with one thread; by default one per core.
@@ -119,7 +119,9 @@ def _check_encryption(address: str) -> None:
 
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # Prefect would show all that Dask does
+    logging.getLogger("distributed").setLevel(
+        logging.CRITICAL
+    )  # Prefect would show everything that Dask logs
     with scratch_folder() as scratch, dask.config.set({**_settings(), "temporary-directory": str(scratch)}):
         try:
             local = LocalCluster(
@@ -131,7 +133,7 @@ def _local(workers: int) -> Iterator[Any]:
                 scheduler_kwargs={"dashboard": False},
                 silence_logs="CRITICAL",
             )
-        except RuntimeError as error:  # Dask starts a worker again only once it has run
+        except RuntimeError as error:  # Dask restarts a worker only if it was running
             raise RunError(
                 "A worker process ended while it was starting. Finished chunks are kept; repeat the "
                 "command to continue."
@@ -139,7 +141,7 @@ def _local(workers: int) -> Iterator[Any]:
         try:
             yield local
         finally:
-            _kill(local)  # all results are written; ending workers in order takes seconds
+            _kill(local)  # all results are written; stopping workers cleanly takes seconds
             _close(local)
 
 
@@ -158,7 +160,7 @@ def _settings() -> dict[str, Any]:
 
 def _kill(local: Any) -> None:
     for nanny in local.workers.values():
-        nanny.close_gracefully()  # so that it is not started again
+        nanny.close_gracefully()  # keeps it from being restarted
         with suppress(
             AttributeError, ProcessLookupError
         ):  # while a worker is being replaced there is no process
@@ -255,14 +257,14 @@ def fan_out(job: Job[AnyPiece, Result], pieces: Sequence[AnyPiece]) -> list[Resu
 def _state(future: Any) -> Any:
     """Prefect's state of a chunk that has ended.
 
-    ``GONE`` if its result went away, with the scheduler or on its way from the worker; None if Dask gave the
-    chunk up.
+    ``GONE`` if its result was lost, with the scheduler or on its way from the worker; None if Dask gave up on
+    the chunk.
     """
     if future.status == "finished":
         try:
             return (
                 future.result()
-            )  # it holds the error of a chunk that failed: only the connection raises here
+            )  # the result holds the error of a failed chunk; only a lost connection raises here
         except OSError:
             return GONE
     return GONE if future.status in LOST else None

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-PACKAGES: Final = ("planners", "storage", "tasks")  # after an edit in one of them all chunks are made again
+PACKAGES: Final = ("planners", "storage", "tasks")  # an edit in one of them makes all chunks anew
 
 
 def key_of(*inputs: Any) -> str:

@@ -1,4 +1,4 @@
-"""A piece of work as a Prefect task, which is tried again if the reason of its failure may pass."""
+"""A piece of work as a Prefect task, which is retried if the cause of its failure may be temporary."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ FIRST_WAIT_SECONDS: Final = 2.0  # each later wait is twice as long
 def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
     """The Prefect task that does a piece of a job and keeps its result.
 
-    If storage does not answer, the task is tried again, with growing waits. Other failures would only happen
-    again, so they are final.
+    If storage does not answer, the task is retried with growing waits. Other failures would only be repeated,
+    so they are final.
     """
     name = job.do.__name__.replace("_", "-")
 
@@ -42,7 +42,7 @@ def piece_task(job: Job[AnyPiece, Result]) -> Task[[AnyPiece], Done[Result]]:
 
 
 def _may_pass(_task: object, _run: object, state: State[Any]) -> bool:
-    """Whether the reason of a failure may have passed the next time."""
+    """Whether the cause of a failure may be temporary."""
     error = state.data
     passing = (UnreachableError, OSError)
     is_wrapped = isinstance(error, StorageError) and isinstance(error.__cause__, passing)

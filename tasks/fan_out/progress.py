@@ -1,4 +1,4 @@
-"""Tell how far work has come, through the log: ``flows.cli`` shows it as a bar or as lines."""
+"""Log the progress of work; ``flows.cli`` shows it as a bar or as lines."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Progress:
-    """How far some work has come: a message in the log, at the level DEBUG."""
+    """The progress of some work, as a message in the log at the level DEBUG."""
 
     work: str
     done: int  # items
     total: int  # items; 0 if it is not known yet
     began: float  # time.monotonic()
     over: bool  # whether the work has ended, successfully or not
-    end_is_told: bool  # whether its end is worth a line if it took too little time for any other
+    end_is_told: bool  # whether to write a line at the end even if the work was too short for any other line
 
 
 @contextmanager
 def progress(work: str, total: int = 0, end_is_told: bool = True) -> Iterator[Callable[..., None]]:
-    """Tell the progress of work while it is done.
+    """Log the progress of work while the context lasts.
 
     Args:
         work: what is being done.
         total: number of items; 0 if it is not known yet.
-        end_is_told: whether the end of short work is worth a line.
+        end_is_told: whether to write a line at the end of short work.
 
     Yields:
         a function to call with the number of finished items, and with the number of all if ``total`` was 0.

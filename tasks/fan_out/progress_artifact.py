@@ -8,9 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
-EVERY_SECONDS: Final = (
-    10.0  # from one update to the next, as each is a request; shorter work gets no artifact
-)
+EVERY_SECONDS: Final = 10.0  # between updates, because each is a request; shorter work gets no artifact
 
 Show = Callable[[int], Any]
 
@@ -22,7 +20,7 @@ def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show
     Args:
         description: what is being done.
         total: number of items.
-        show: called with the number of finished items, also if Prefect does not answer.
+        show: called with the number of finished items, even if Prefect does not answer.
 
     Yields:
         a function to call with the number of finished items.
@@ -45,7 +43,7 @@ def progress_artifact(description: str, total: int, show: Show) -> Iterator[Show
                 )
             else:
                 artifacts.update_progress_artifact(artifact_id, share)
-        except Exception:  # the work goes on without, and the bar shows it
+        except Exception:  # the work continues without it, and the bar still shows progress
             answers = False
 
     yield update

@@ -1,4 +1,4 @@
-"""A stage: how its work is cut into chunks, what a chunk does and writes, and which chunks are done."""
+"""A stage: how its work is split into chunks, what a chunk does and writes, and which chunks are done."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Done(NamedTuple, Generic[Result]):
 
 @dataclass(frozen=True, kw_only=True)
 class Job(Generic[AnyPiece, Result]):
-    """Work that any number of workers do piece by piece.
+    """Work that any number of workers can do piece by piece.
 
     Each piece writes one output, and keeps a small result beside it. Doing a piece again replaces both with
     the same content.
@@ -51,7 +51,9 @@ class Job(Generic[AnyPiece, Result]):
     result: type[Any] = NoneType  # what ``do`` returns: a named tuple of JSON values, or nothing
     units: Callable[[AnyPiece], int]  # how many units of the progress bar a piece has
     unit: str = ""  # name of these units, unless they are problems or plans
-    units_done: Callable[[AnyPiece], int] = lambda piece: 0  # how many are done of a piece that a worker has
+    units_done: Callable[[AnyPiece], int] = lambda piece: (
+        0
+    )  # how many of them are done in a piece that a worker is doing
 
     @property
     def title(self) -> str:
@@ -80,9 +82,11 @@ class Job(Generic[AnyPiece, Result]):
 
 @dataclass(frozen=True, kw_only=True)
 class Stage(Job[Chunk, Result]):
-    """A stage of a run: work on each of its classes, or on each of its memories."""
+    """A stage of a run: the work on each of its classes or memories."""
 
-    cut: Callable[[str, RunSettings, str], Cut]  # how a class is cut, from data folder, settings and class
+    cut: Callable[
+        [str, RunSettings, str], Cut
+    ]  # how the work on a class is split, from data folder, settings and class
     units: Callable[[Chunk], int] = lambda chunk: chunk.last - chunk.first
     classes: Callable[[RunSettings], Sequence[str]] = attrgetter("class_names")
 
@@ -103,7 +107,7 @@ class Stage(Job[Chunk, Result]):
 
 
 def mark_done(folder: Path, key: str) -> None:
-    """Write the key of a folder into a file beside it, as a folder cannot carry one."""
+    """Write the key of a folder into a file beside it, because a folder has no metadata."""
     write_json(_mark(folder), {"key": key})
 
 

@@ -29,7 +29,7 @@ class Load(NamedTuple):
     """How long the workers of a fan-out were busy with chunks, and how much memory they held."""
 
     what: str  # name of the fan-out
-    chunks: int  # number of chunks that were done now, not before
+    chunks: int  # number of chunks that were done now
     workers: int  # number of workers that did them
     busy_seconds: float  # within chunks, summed over workers
     span_seconds: float  # from each worker's first chunk to the end of its last, summed over workers
@@ -43,7 +43,7 @@ class Load(NamedTuple):
 
 
 def work_since(began: float) -> Work:
-    """The work on a chunk that ends now; this process began it at ``began`` of ``time.monotonic``."""
+    """The work on a chunk that ends now and began at ``began``, by this process's ``time.monotonic``."""
     worker = f"{platform.node()}-{os.getpid()}"
     return Work(worker, began, time.monotonic(), psutil.Process().memory_info().rss)
 

@@ -1,4 +1,4 @@
-"""The run that made a champion, if it is still there: a retraining need not make again what it made."""
+"""The run that made a champion, if it still exists: a retraining copies its work instead of repeating it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ChampionRun(NamedTuple):
 
 
 def champion_run(data: str, name: str) -> ChampionRun | None:
-    """The run of that name; None where it has none, is gone, of another version or edited."""
+    """The run of that name; None if there is no name, or the run is gone, of another version or edited."""
     if not name:
         return None
     folder = open_data_folder(data).run(name)
@@ -31,7 +31,7 @@ def champion_run(data: str, name: str) -> ChampionRun | None:
 
 
 def champion_run_of(chunk: Chunk) -> ChampionRun | None:
-    """The run of the champion of a chunk's class; None as above, and if the chunk is not of a retraining."""
+    """The run of the champion of a chunk's class; None as above, or if this is no retraining."""
     retraining = chunk.settings.retraining
     champion = retraining.champion(chunk.class_name) if retraining else None
     return champion_run(chunk.data, champion.run) if champion else None

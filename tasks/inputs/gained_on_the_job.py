@@ -56,7 +56,7 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
 
 
 def with_gained(settings: RunSettings, data: Path, name: str) -> RunSettings:
-    """The settings with a snapshot of what was gained on the job, as more candidates to choose from.
+    """The settings with a snapshot of experiences gained on the job, as additional candidates.
 
     Args:
         settings: those of the run.

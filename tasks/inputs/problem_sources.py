@@ -1,4 +1,4 @@
-"""Where the problems of a class come from: a generator with a seed, or worlds or a map, read once a run."""
+"""Sources of a class's problems: a generator with a seed, or worlds or a map that a run reads once."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PARTS: Final[dict[Purpose, Part]] = {"collect": "train", "test": "test"}
 
 @dataclass(frozen=True)
 class Generated:
-    """A generated class: any number of problems; those to test with are never collected from."""
+    """A generated class with any number of problems; test problems are never used for collecting."""
 
     problems: ProblemClass
     seed: int
@@ -37,7 +37,7 @@ class Generated:
         return wanted
 
     def problem(self, purpose: Purpose, index: int) -> Problem:
-        """Problem ``index``; even seeds draw what is collected, odd ones what is tested with."""
+        """Problem ``index``; even seeds draw problems for collecting, odd seeds problems for testing."""
         return self.problems.draw(2 * self.seed + (purpose == "test"), index)
 
     def draw(self, rng: np.random.Generator) -> Obstacles:
@@ -47,7 +47,7 @@ class Generated:
 
 @dataclass(frozen=True)
 class Worlds:
-    """Worlds, or what was cut from a map: their ``train`` part to collect from, ``test`` to test with."""
+    """Worlds, or problems cut from a map: the part ``train`` is for collecting, ``test`` for testing."""
 
     run: RunFolder
     class_name: str
@@ -89,9 +89,9 @@ def source_of(data: str, settings: RunSettings, class_name: str) -> Source:
 
 
 def held_back(data: str, settings: RunSettings, class_name: str) -> Source:
-    """The source of the ``test`` problems by which a retraining is judged, and nothing else.
+    """The source of the ``test`` problems that judge only this retraining.
 
-    Only worlds and maps have no more than the one part to test with.
+    Worlds and maps have just one part to test with, so they use the same problems each time.
     """
     source = source_of(data, settings, class_name)
     if isinstance(source, Worlds):
@@ -107,7 +107,7 @@ def source_key(settings: RunSettings, class_name: str) -> list[str | int]:
 
 
 def class_settings(settings: RunSettings, class_name: str) -> dict[str, Any]:
-    """What a memory tells about its class: how obstacles are placed, or which worlds they come from."""
+    """What a memory records about its class: how obstacles are placed, or which worlds they come from."""
     if class_name not in settings.classes:
         return {"worlds": class_name, "digest": source_key(settings, class_name)[0]}
     drawn = problem_class(class_name, settings.difficulty)

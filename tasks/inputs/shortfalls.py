@@ -1,4 +1,4 @@
-"""Classes with fewer experiences than wanted: a run goes on with those there are, or without such a class."""
+"""Classes with fewer experiences than wanted: a run continues with those, or without such a class."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tasks.settings.errors import RunError
 from tasks.settings.run_settings import RunSettings
 
 _LOG = logging.getLogger(__name__)
-LEAST: Final = 5  # experiences of a class; fewer make no memory, unless no more are wanted
+LEAST: Final = 5  # experiences of a class; fewer do not make a memory, unless no more are wanted
 
 
 class Shortfall(NamedTuple):
@@ -24,7 +24,7 @@ class Shortfall(NamedTuple):
     class_name: str
     kept: int  # experiences
     wanted: int
-    is_left_out: bool  # or the run goes on with those that are kept
+    is_left_out: bool  # otherwise the run continues with those that are kept
 
     @property
     def found(self) -> str:
@@ -65,7 +65,7 @@ def begin_collecting(data: str, settings: RunSettings) -> RunSettings:
 
 
 def leave_out(data: str, settings: RunSettings) -> RunSettings:
-    """Leave out the classes that have too few experiences, keep that in the run's folder, and warn of it.
+    """Leave out the classes with too few experiences, record this in the run's folder, and log a warning.
 
     Args:
         data: the data folder.
@@ -92,7 +92,7 @@ def leave_out(data: str, settings: RunSettings) -> RunSettings:
 
 
 def log_shortfalls(short: Sequence[Shortfall]) -> None:
-    """Warn of classes with too few experiences."""
+    """Log a warning about each class with too few experiences."""
     for each in short:
         _LOG.warning(str(each))
 

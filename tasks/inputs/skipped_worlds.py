@@ -1,4 +1,4 @@
-"""Worlds that were left out, summed up by reason."""
+"""Skipped worlds, summarised by reason."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def summed_up(skipped: Sequence[tuple[str, str]]) -> str:
     """Say how many worlds were skipped, and for each reason how many, with the first of them.
 
     Args:
-        skipped: where each world stands, and why it was left out. Reasons that differ only in numbers count
+        skipped: where each world is, and why it was skipped. Reasons that differ only in numbers count
             as one.
     """
     reasons: dict[str, list[tuple[str, str]]] = {}

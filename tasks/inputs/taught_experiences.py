@@ -44,7 +44,7 @@ def taught_masks(run: RunFolder, settings: RunSettings, name: str) -> Bits:
 
 
 def grown_memory(chunk: Chunk, memory: Memory) -> Memory:
-    """A memory with all plans that were collected, read out from plain problems of its classes."""
+    """A memory with all collected plans, whose readout is fitted on plain problems of its classes."""
     settings, name = chunk.settings, chunk.class_name
     experiences = read_experiences(chunk.run.experiences(name), memory.vehicle)
     sources = [source_of(chunk.data, settings, each) for each in settings.classes_of(name)]

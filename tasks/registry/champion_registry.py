@@ -23,7 +23,7 @@ from tasks.tracking.model_names import PREFIX
 from tasks.tracking.tracking_address import tracking_uri
 
 CHAMPION: Final = "champion"
-CHALLENGER: Final = "challenger"  # a better version that waits for approval
+CHALLENGER: Final = "challenger"  # a better version that awaits approval
 _TAG: Final = "motion_memory."
 
 FIRST: Final = "first champion"
@@ -68,7 +68,7 @@ class Registry:
     """
 
     def __init__(self, data: DataFolder) -> None:
-        """Remember where the registry is; nothing is opened or made yet."""
+        """Remember where the registry is; nothing is opened or created yet."""
         self.uri = tracking_uri(data)
         self._own = None if os.environ.get("MLFLOW_TRACKING_URI") else data
         self._missing = not os.environ.get("MLFLOW_TRACKING_URI") and not data.mlflow_database.is_file()
@@ -101,13 +101,13 @@ class Registry:
     def register(
         self, name: str, run_id: str, model_id: str, key: str, tags: Mapping[str, Any], description: str
     ) -> Version:
-        """Register a logged model as a version, once however often this is called.
+        """Register a logged model as a version; calling this again makes no second version.
 
         Args:
             name: the memory's name in the registry.
             run_id: the MLflow run that logged the memory.
             model_id: the logged model that the version is made of.
-            key: what the version was made from; a version with the same key is taken again.
+            key: what the version was made from; a version with the same key is reused.
             tags: written to the version, whether it is new or not.
             description: likewise.
         """
@@ -158,7 +158,7 @@ class Registry:
             yield MlflowClient(self.uri)
         except (RunError, InUseError):
             raise
-        except Exception as error:  # each of MLflow's stores has errors of its own
+        except Exception as error:  # each of MLflow's stores has its own errors
             reason = " ".join(str(error).split())[:300] or type(error).__name__
             raise RunError(
                 redacted(

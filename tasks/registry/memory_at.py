@@ -1,4 +1,4 @@
-"""The one memory or library at an address, used for problems of whatever class."""
+"""The one memory or library at an address, used for problems of every class."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tasks.settings.run_settings import COMBINED
 
 @contextmanager
 def memory_at(address: str) -> Iterator[Path]:
-    """The folder of a memory, kept for as long as the context lasts.
+    """The folder of a memory, kept while the context lasts.
 
     Args:
         address: the folder of a memory or a library; or of a run, for its combined memory or its only one;

@@ -39,7 +39,7 @@ _SETTINGS: Final = {
 
 
 def set_mlflow_environment() -> None:
-    """Set quiet and impatient defaults for MLflow, and its password, unless the user has set them."""
+    """Set quiet defaults with short timeouts for MLflow, and its password, unless the user has set them."""
     for name, value in (_SETTINGS | auth_environment()).items():
         os.environ.setdefault(name, value)
 
@@ -51,9 +51,9 @@ def is_model_uri(address: str) -> bool:
 
 @contextmanager
 def memory_folder(address: str | None) -> Iterator[Path | None]:
-    """The folder of memories at an address; a model in MLflow is downloaded for as long as the context lasts.
+    """The folder of memories at an address; a model in MLflow is kept while the context lasts.
 
-    None has no folder. Raises RunError if MLflow does not answer or holds no such model.
+    An address of None has no folder. Raises RunError if MLflow does not answer or holds no such model.
     """
     if address is None or not is_model_uri(address):
         yield address if address is None else folders_here(address, "memories")
@@ -80,7 +80,7 @@ def load_from(address: str, vehicle: Vehicle) -> Memory | PlanLibrary:
     MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder. Raises RunError if it does not
     answer or holds no such model, and StorageError if the archive is damaged or of another vehicle.
     """
-    with memory_folder(address) as folder:  # a mapped file outlives its name
+    with memory_folder(address) as folder:  # a mapped file stays readable after it is deleted
         assert folder is not None  # only an address of None has no folder
         return load_memory_or_library(folder, vehicle)
 
@@ -105,7 +105,7 @@ def download(uri: str, scratch: str, server: str) -> Path:
     try:
         with environment(MLFLOW_TRACKING_URI=server):  # read by every part of MLflow that takes part
             folder = Path(download_artifacts(uri, dst_path=scratch))
-    except Exception as error:  # each of MLflow's stores has errors of its own
+    except Exception as error:  # each of MLflow's stores has its own errors
         reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RunError(redacted(f"{uri} cannot be fetched from MLflow at {server}: {reason}")) from error
     memories = sorted(found.parent for header in HEADERS for found in folder.rglob(header))

@@ -20,7 +20,7 @@ STAGE: Final = "gather"
 def registered_library(
     name: str, folder: Path, vehicle: Vehicle, parameters: Mapping[str, Any], metrics: Mapping[str, float]
 ) -> str:
-    """Log a library in MLflow and register it; the same library becomes one version, however often.
+    """Log a library in MLflow and register it; the same library always becomes the same version.
 
     MLflow is the one at $MLFLOW_TRACKING_URI, or in the usual data folder.
 
@@ -29,7 +29,7 @@ def registered_library(
         folder: the library.
         vehicle: whose plans it holds.
         parameters: how it was gathered.
-        metrics: what came of it.
+        metrics: the results of gathering.
 
     Returns:
         the address that ``--memory`` takes.

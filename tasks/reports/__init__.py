@@ -1,1 +1,1 @@
-"""What is told of a run once its rows are there."""
+"""Reports about a run once its rows exist."""

@@ -1,4 +1,4 @@
-"""Compare: runs against the first of them, paired by problem."""
+"""Compare runs with the first of them, paired by problem."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ ENDINGS: Final = (".md", ".json", ".csv")
 
 
 class Comparison(NamedTuple):
-    """What differs between runs."""
+    """The differences between runs."""
 
-    names: Sequence[str]  # of the runs, the one first that the others are compared with
-    different: list[list[str]]  # of each setting in which they differ the name, then the value of each run
-    how: str  # what is judged by, in words
-    tables: dict[str, pd.DataFrame]  # of each other run the rows of ``compare_runs``
+    names: Sequence[str]  # of the runs; the others are compared with the first
+    different: list[list[str]]  # for each setting in which they differ: its name, then the value of each run
+    how: str  # the measures that decide, in words
+    tables: dict[str, pd.DataFrame]  # for each other run, the rows of ``compare_runs``
 
     def told(self) -> Iterator[str | CellTable]:
         """All of it in lines and tables."""
@@ -47,13 +47,13 @@ class Comparison(NamedTuple):
 def compare(
     runs: Sequence[Path], out: Path | None, measure: bool = False, problems: int | None = None
 ) -> Comparison:
-    """Compare runs: in which settings they differ, and what each does better or worse than the first.
+    """Compare runs: the settings in which they differ, and what each does better or worse than the first.
 
     Args:
         runs: folders of runs.
         out: where to write the comparison too: .md, .json or .csv.
         measure: whether to measure the memories of both runs in turn, instead of reading their rows.
-        problems: how many of a class to measure; None for the default.
+        problems: how many to measure per class; None for the default.
 
     Raises:
         UsageError: there are fewer than two runs, or ``out`` has another ending or lies in a run's folder.

@@ -1,4 +1,4 @@
-"""Experience curve: what memories of fewer experiences recall, each made by a run of its own."""
+"""Experience curve: the recall of memories with fewer experiences, each made by its own run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LOG = logging.getLogger(__name__)
 def runs_of_curve(settings: RunSettings) -> list[RunSettings]:
     """The run with a fifth, two fifths … and all of its experiences; UsageError if it has too few.
 
-    The smaller runs are those of continual improvement, so neither makes again what the other has made.
+    The smaller runs are those of continual improvement, so neither repeats the work of the other.
     """
     return [*runs_of_continual(replace(settings, continual="all")), settings]
 
@@ -40,6 +40,6 @@ def _rows(data: str, run: RunSettings) -> pd.DataFrame:
     shards = [
         chunk.shard("recalls")
         for chunk in MEASURE_RECALL.chunks(data, run)
-        if chunk.index > 0 and chunk.class_name != COMBINED  # those with fewer experiences have none
+        if chunk.index > 0 and chunk.class_name != COMBINED  # runs with fewer experiences have none
     ]
     return experience_rows(read_recalls(shards))

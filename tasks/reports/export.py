@@ -1,4 +1,4 @@
-"""Export: the attempts of a run in the formats of the field's tools."""
+"""Export the attempts of a run in the formats of other tools in the field."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENDINGS: Final = {"ompl": "", "planner-arena": ".db", "csv": ".csv", "dynobench"
 
 
 def export_run(folder: Path, form: str, out: Path) -> None:
-    """Write the attempts of a run, or a plan, whole or not at all, in the format of another tool.
+    """Write the attempts of a run, or a plan, in the format of another tool; completely or not at all.
 
     Args:
         folder: the run's folder, or for ``dynobench`` a plan's file.
@@ -32,8 +32,8 @@ def export_run(folder: Path, form: str, out: Path) -> None:
         out: where to write them.
 
     Raises:
-        UsageError: another form, or a path that does not fit the form or lies in the run's folder.
-        StorageError: the folder is not a run, or has no attempts; or the file is no plan.
+        UsageError: the form is unknown, or the path does not fit the form or lies in the run's folder.
+        StorageError: the folder is not a run or has no attempts, or the file is not a plan.
     """
     check_known("format", [form], ENDINGS)
     if ENDINGS[form] and out.suffix != ENDINGS[form]:

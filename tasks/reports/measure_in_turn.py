@@ -1,4 +1,4 @@
-"""Measure the memories of two runs in turn, in one process: attempts that a comparison of times can go by."""
+"""Measure the memories of two runs in turn, in one process, which makes their times comparable."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from tasks.settings.checks import check_count
 from tasks.settings.run_settings import UNASSISTED, RunSettings
 
 PROBLEMS: Final = 300  # a class
-AT_ONCE: Final = 100  # so many problems are attempted before one of them is attempted again
-ROUNDS: Final = 3  # attempts of each run at a problem, of which the median counts
+AT_ONCE: Final = 100  # problems that are attempted before one of them is attempted again
+ROUNDS: Final = 3  # attempts of each run at a problem; the median counts
 FIRST, OTHER = "first", "other"
 _SAME: Final = ("planner", "problem_class", "problem_id", "assist", "recall", "top_k", "memory", "run_id")
 
@@ -40,13 +40,13 @@ def measure_in_turn(
     """Attempt the first run's test problems with the memories of both runs in turn.
 
     The order at each problem is drawn, every run attempts a problem ``ROUNDS`` times, and the median time
-    counts. Controls without memory are attempted for each run as if they were two, so that one sees whether
-    the measurement calls equal things different.
+    counts. Controls without memory are attempted separately for each run, which shows whether the measurement
+    calls equal things different.
 
     Args:
         first: the run whose problems are attempted.
         other: the run that it is compared with.
-        problems: how many of a class; fewer if there are not so many.
+        problems: how many to attempt per class; fewer if the class has fewer.
 
     Returns:
         the attempt rows of the first run, and those of the other.
@@ -109,7 +109,7 @@ def _memory(run: MeasuredRun, name: str) -> Memory:
 def _contestants(
     first: RunSettings, other: RunSettings, planners: list[str], memories: dict[MemoryOfRun, Memory]
 ) -> list[Contestant]:
-    """Every planner by every assist that both runs have, with each memory, once for each run."""
+    """Every planner with every assist that both runs have, with each memory, once for each run."""
     assists = [UNASSISTED, *(each for each in first.assists if each in other.assists)]
     everyone = []
     for planner in planners:
@@ -124,6 +124,6 @@ def _contestants(
 
 
 def _medians(rows: pd.DataFrame) -> pd.DataFrame:
-    """A row for all rounds, with the median of the planning times."""
+    """One row for all rounds, with the median of the planning times."""
     by = rows.groupby(list(_SAME), dropna=False, sort=False)["planning_seconds"]
     return rows.assign(planning_seconds=by.transform("median")).drop_duplicates(list(_SAME))

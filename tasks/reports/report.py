@@ -54,7 +54,7 @@ NOT_NEEDED: Final = (
     "recalled", "run_id", "vehicle", "seed", "nodes", "expansions", "length_m",
     "host", "commit",
 )  # fmt: skip
-MAY_DIFFER: Final = (  # settings of runs whose planning times can be compared by their experiences
+MAY_DIFFER: Final = (  # settings that may differ between runs compared by their number of experiences
     "experiences", "preset", "classes", "worlds", "planners", "assists", "test_problems", "combined",
     "strict", "candidates", "continual", "left_out",
 )  # fmt: skip
@@ -115,7 +115,7 @@ def report_run(data: str, settings: RunSettings) -> Report:
 
 
 def check_verified(attempts: pd.DataFrame) -> None:
-    """Refuse ``attempts`` of which one counts as solved by a plan that the authority did not accept.
+    """Refuse ``attempts`` if one counts as solved with a plan that the authority did not accept.
 
     Raises:
         StorageError: there is such an attempt.
@@ -133,7 +133,7 @@ def check_verified(attempts: pd.DataFrame) -> None:
 
 
 def claims_by_other(data: str, settings: RunSettings) -> list[Claim]:
-    """The claims as a run by the other method decides them, the paper's or the product's.
+    """The claims as decided by a run with the other method, the paper's or the product's.
 
     Args:
         data: the data folder.
@@ -166,10 +166,10 @@ def _runs_with_rows(data: str) -> Iterator[tuple[RunFolder, RunSettings]]:
 
 
 def continual_rows(data: str, settings: RunSettings, attempts: pd.DataFrame) -> pd.DataFrame:
-    """The attempts of all runs that are like this one but for the number of their experiences.
+    """The attempts of all runs that differ from this one only in their number of experiences.
 
-    Runs may also differ in what they measured. A planner on a class is here if runs with several numbers of
-    experiences measured it, and so is the combined memory.
+    Runs may also differ in what they measured. A planner on a class is included if runs with several numbers
+    of experiences measured it, and so is the combined memory.
 
     Args:
         data: the data folder.
@@ -218,7 +218,7 @@ def _recall_rows(data: str, settings: RunSettings) -> pd.DataFrame:
 
 
 def log_tables(report: Report, run: RunFolder) -> None:
-    """Log the tables of a report, how long each stage took, and last what was found, in words."""
+    """Log the tables of a report, how long each stage took, and finally the findings in words."""
     for table in summary_tables(report.summary):
         _LOG.info(table)
     log_retrieval(report.retrieval)
@@ -233,7 +233,7 @@ def log_retrieval(retrieval: pd.DataFrame) -> None:
 
 
 def log_variants(chunks: Iterable[Chunk]) -> None:
-    """Log how well each variant of a sweep ranks."""
+    """Log how well each variant of a sweep ranks plans."""
     _LOG.info(sweep_table(sweep_rows(chunks)))
 
 

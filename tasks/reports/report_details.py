@@ -53,8 +53,8 @@ def page_of(
         summary: planning times, as ``summarise`` gives them.
         retrieval: what the memories recall, as ``summarise_retrieval`` gives it.
         claims: the paper's claims, with a verdict each.
-        others: the same by the other method; empty if that was not measured.
-        made_by: "host" and "commit", and all that the rows say of them.
+        others: the same for the other method; empty if that was not measured.
+        made_by: "host" and "commit", each with all values in the rows.
         short: classes with fewer experiences than wanted.
     """
     problems = attempts["problem_id"].nunique()
@@ -74,7 +74,7 @@ def page_of(
 
 
 def _pictures(run: RunFolder) -> list[Picture]:
-    """Every figure once, as the smaller one of PNG and SVG."""
+    """Every figure once, as PNG or SVG, whichever is smaller."""
     smaller: dict[str, Path] = {}
     drawn = [fetch(path) for path in files_in(run.figures, "*.[ps][nv]g")]
     for path in sorted(drawn, key=lambda path: path.stat().st_size):

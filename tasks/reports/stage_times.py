@@ -72,7 +72,7 @@ def stage_cells(records: Sequence[dict[str, Any]]) -> list[list[str]]:
 
 
 def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
-    """The row of one stage; dashes if it did no chunk."""
+    """The row of one stage; dashes if it processed no chunk."""
     if load is None:
         return [name, decimal(seconds, 1), *[NOTHING] * 5]
     megabytes = [decimal(size / 1e6, 0) for size in (load.first_bytes, load.last_bytes)]
@@ -82,7 +82,7 @@ def _cells(name: str, seconds: float, load: Load | None) -> list[str]:
 
 @functools.cache
 def machine() -> dict[str, Any]:
-    """Everything that measured times depend on: host, processor, operating system, versions, commit."""
+    """Everything that affects measured times: host, processor, operating system, versions, commit."""
     return {
         "host": platform.node(),
         "processor": _processor(),

@@ -1,1 +1,1 @@
-"""Work on a user's own problems, maps and runs, one request at a time."""
+"""Requests about a user's own problems, maps and runs, one at a time."""

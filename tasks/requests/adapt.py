@@ -1,4 +1,4 @@
-"""The command ``adapt``: drive the plans of a memory as another vehicle, and keep those that pass."""
+"""The command ``adapt``: drive the plans of a memory with another vehicle, and keep those that pass."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from tasks.settings.errors import RunError
 
 AdaptFlow = Callable[[AdaptRequest], Sequence[Driven]]
 
-FEW_PLANS: Final = 200  # so many take less time here than starting a server and workers
-LABELLED: Final = 500  # problems of each class, from which the readout of a memory is made anew
+FEW_PLANS: Final = 200  # driving so few takes less time here than starting a server and workers
+LABELLED: Final = 500  # problems of each class, from which the readout of a memory is fitted again
 GOOD: Final = (Outcome.WHOLE, Outcome.PART)
 
 
 class Kept(NamedTuple):
-    """What became of the stored plans."""
+    """The outcomes of the stored plans."""
 
     summary: str
     answer: dict[str, Any]  # for programs
@@ -57,7 +57,7 @@ class Kept(NamedTuple):
 def adapt(
     memory: str, vehicle: str, out: Path, seed: int, workers: int = 1, flow: AdaptFlow | None = None
 ) -> Kept:
-    """Drive the plans of a memory or a library as another vehicle, and write those that pass.
+    """Drive the plans of a memory or a library with another vehicle, and write those that pass.
 
     The same arguments give the same bytes, whatever the number of workers. After a kill, the command drives
     only the plans that it had not driven before.
@@ -66,12 +66,12 @@ def adapt(
         memory: the address of a memory or a library: a folder, a run, or a model in MLflow.
         vehicle: the other vehicle: a name, or the path of a file.
         out: the folder to write; it may replace an earlier memory or library.
-        seed: of the problems from which the readout of a memory is made anew.
+        seed: seed of the problems from which the readout of a memory is fitted again.
         workers: number of worker processes.
         flow: does the pieces in worker processes; None does everything in this process.
 
     Raises:
-        UsageError: a name or a number is wrong, or there is something else at ``out``.
+        UsageError: a name or a number is wrong, or ``out`` exists and is something else.
         StorageError: the memory cannot be read.
         RunError: no plan can be kept.
     """

@@ -1,4 +1,4 @@
-"""Pieces of adapting: some stored plans are driven as another vehicle, judged, and kept in a file."""
+"""Pieces of adapting: some stored plans are driven with another vehicle, judged, and kept in a file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.part_folder import NumberedPiece, is_readable
 
-PIECE: Final = 25  # plans: some seconds of work
+PIECE: Final = 25  # plans: a few seconds of work
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class AdaptRequest:
 
     memory: Path  # of a memory or a library
     memory_digest: str  # of its header, which holds checksums of everything else
-    plans: int  # that it holds
+    plans: int  # in the memory
     old: Vehicle
     new: Vehicle
     out: Path
@@ -55,13 +55,13 @@ class AdaptPiece(NumberedPiece[AdaptRequest]):
 
 
 class Driven(NamedTuple):
-    """What became of a piece."""
+    """The result of a piece."""
 
     outcomes: list[str]  # of each stored plan
 
 
 def adapt_piece(chunk: AdaptPiece) -> Driven:
-    """Drive the plans of a piece as the new vehicle, and write those that the authority accepts."""
+    """Drive the plans of a piece with the new vehicle, and write those that the authority accepts."""
     request, workspace = chunk.request, Workspace()
     memory = _loaded(request.memory, request.memory_digest, request.old)
     canonical = isinstance(memory, Memory)
@@ -87,7 +87,7 @@ def adapt_piece(chunk: AdaptPiece) -> Driven:
 
 @functools.lru_cache(maxsize=1)
 def _loaded(folder: Path, _digest: str, vehicle: Vehicle) -> Memory | PlanLibrary:
-    """The memory of this process, which is read once as long as it is the same."""
+    """The memory of this process; it is read only once unless it changes."""
     return load_memory_or_library(folder, vehicle)
 
 

@@ -43,11 +43,13 @@ from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
-WARM_EXPANSIONS: Final = 1000  # of an improver after its first polish: enough for a search, and a guided one
+WARM_EXPANSIONS: Final = (
+    1000  # of an improver after its first polish: enough for one free and one guided search
+)
 
 
 class AssistantSettings(NamedTuple):
-    """How problems are to be solved."""
+    """How to solve problems."""
 
     planner: str
     assist: str
@@ -60,7 +62,7 @@ class AssistantSettings(NamedTuple):
 
 
 class PlannedOne(NamedTuple):
-    """What came of planning for one problem."""
+    """The result of planning for one problem."""
 
     attempt: Attempt
     plan: Plan | None  # in the frame of the problem
@@ -70,7 +72,7 @@ class PlannedOne(NamedTuple):
 
 
 class Assistant:
-    """Plans with one vehicle, planner and assist; loads the memory of a class when a problem of it comes."""
+    """Plans with one vehicle, planner and assist; loads the memory of a class with its first problem."""
 
     def __init__(self, settings: AssistantSettings) -> None:
         """Check the settings; memories are loaded later.
@@ -93,14 +95,16 @@ class Assistant:
             raise UsageError(f"--improve-seconds is {improve_seconds}: give 0 or more.")
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
-        self.files = [] if memory is None else [Path(memory)]  # that it may read: not to be written over
+        self.files = (
+            [] if memory is None else [Path(memory)]
+        )  # files that it may read, which must not be overwritten
         self._memories: dict[str, Memory | PlanLibrary] = {}
         self._workspace = Workspace()
 
     def memory_of(self, class_name: str) -> Memory | PlanLibrary | None:
         """The memory for problems of a class: that of the class, else the combined, else the only one.
 
-        Where a library of plans is given, that serves all classes.
+        A library of plans serves all classes.
         """
         if self._address is None:
             return None
@@ -120,9 +124,9 @@ class Assistant:
     def warm_up(self, problem: Problem) -> None:
         """Attempt the mirror image of a problem at least once, and for ``WARM_SECONDS`` if it is quick.
 
-        So the code and the memory are ready, as those of a robot that has planned before, but nothing of the
-        problem itself is in the caches when it is attempted. What improves plans is made ready too, if it is
-        asked for, or the first one would spend its seconds on compiling.
+        Code and memory are then ready, as on a robot that has planned before, but nothing of the problem
+        itself is in the caches when it is attempted. If plans are to be improved, that code is made ready
+        too; otherwise the first plan would spend its seconds on compiling.
         """
         other = mirrored(to_canonical(problem)[0])
         deadline = perf_counter() + WARM_SECONDS
@@ -186,7 +190,7 @@ def plan_one(
     explained: bool = False,
     learn: Path | None = None,
 ) -> PlannedOne:
-    """Plan for the one problem in a file.
+    """Plan for the only problem in a file.
 
     Args:
         assistant: solves the problem.
@@ -197,7 +201,7 @@ def plan_one(
         learn: the data folder to which the problem and its plan are added as an experience, or None.
 
     Returns:
-        what came of it; finding no plan is an answer too.
+        the result; finding no plan is a result too.
 
     Raises:
         UsageError: the name of an output has a wrong ending, or an output would be written over an input.

@@ -1,4 +1,4 @@
-"""The command ``draw``: new problems of a class, or manoeuvres of a family, into a file of problems."""
+"""The command ``draw``: write new problems of a class, or manoeuvres of a family, to a file."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ PICTURED: Final = 6  # problems at most in a picture
 def draw_problems(
     name: str, difficulty: str, problems: int, seed: int, vehicle: str, out: Path, drawing: Path | None
 ) -> None:
-    """Draw problems and write them for a vehicle, whole or not at all; the same seed draws the same ones.
+    """Draw problems for a vehicle and write them, all or none; the same seed draws the same problems.
 
     Args:
         name: of a class or a family.
         difficulty: easy, standard or hard.
         problems: how many to draw, at least 1.
-        seed: that they follow from, 0 or more.
+        seed: seed of the drawing, 0 or more.
         vehicle: the name of a built-in one, or the path of a vehicle's file.
         out: the file, whose ending says its format.
         drawing: where to draw the first ones, or None.

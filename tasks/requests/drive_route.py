@@ -1,4 +1,4 @@
-"""The command ``route``: one drive over a map, from a pose through goals, composed of local plans."""
+"""The command ``route``: one drive across a map, from a pose through goals, made of local plans."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class DrivenRoute(NamedTuple):
 
     legs: CellTable
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
-    answer: dict[str, Any]  # for programs: of ``plan_answer``, and what it is made of
+    answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of
 
 
 def _numbers_of(text: str, count: int, option: str, meaning: str) -> tuple[float, ...]:
@@ -86,7 +86,7 @@ def drive_route(
     out: Path | None,
     drawing: Path | None,
 ) -> DrivenRoute:
-    """Plan a route over a map, check it as one plan, and write plan and picture.
+    """Plan a route across a map, check it as one plan, and write plan and picture.
 
     Args:
         path: the map's file.
@@ -279,7 +279,7 @@ def _from_memory(route: Route) -> int:
 
 
 def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
-    """A line: the mean speed, beside that of who drives as far at full speed, and rests at each goal."""
+    """A line with the mean speed, and that of a drive as long at full speed with a rest at each goal."""
     shortest = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in route.paths)
     mean = plan.length_m / max(plan.duration_s, 1e-9)
     share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)

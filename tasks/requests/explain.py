@@ -20,7 +20,7 @@ USES: Final = {
     "guide": "guided the search",
     "": "",
 }
-_PARTS: Final = {  # by the source of the answer, where parts of plans are recalled and not whole ones
+_PARTS: Final = {  # by the source of the answer, if parts of plans are recalled instead of whole plans
     "recalled": "parts {}, driven again",
     "repaired": "the search joined the end of one {}",
     "searched": "no part {} leads to the goal more quickly than the plan found without them",
@@ -49,7 +49,7 @@ def log_explanation(
         memory: the memory or library that was used, or None.
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
         scale: how many metres of the problem are one canonical metre.
-        by_parts: whether parts of plans can answer the problem, and not whole ones.
+        by_parts: whether parts of plans instead of whole plans can answer the problem.
     """
     _LOG.info(_recall_line(attempt, memory, recalled, by_parts))
     if recalled:

@@ -1,4 +1,4 @@
-"""The command ``gather``: ask many general questions, and keep the plans as a library."""
+"""The command ``gather``: solve many general questions, and keep the plans as a library."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ FIELDS: Final = ("source", "questions", "plans", "driving_s")
 
 
 class SourceCounts(NamedTuple):
-    """What came of one source."""
+    """The results from one source."""
 
     name: str
     questions: int  # that were asked
@@ -70,7 +70,7 @@ def gather(
     workers: int = 1,
     flow: GatherFlow | None = None,
 ) -> list[SourceCounts]:
-    """Ask questions of each source in turn until enough are answered, and write the plans as a library.
+    """Draw questions from each source in turn until enough are answered, and write the plans as a library.
 
     A class, a family of manoeuvres and a map give any number of questions, a file of problems those that it
     holds. Each plan is polished and judged. Where the search stands still on its way to a pose, its own plan

@@ -113,7 +113,7 @@ def import_worlds(
         a table that counts the problems of each part.
 
     Raises:
-        UsageError: an option is not possible or would change nothing, ``out`` holds something else, or an
+        UsageError: an option is impossible or would change nothing, ``out`` holds something else, or an
             output would be written over an input.
         RunError: there is no problem to write, or two parts have a problem of the same id.
     """

@@ -47,7 +47,7 @@ class InitialGuess:
     seed: int  # of the planner
 
     def guess(self, problem: Problem) -> tuple[Plan, str]:
-        """Return the guess and the name of its planner. Raises RunError if there is no plan to begin with."""
+        """Return the guess and the name of its planner. Raises RunError if there is no plan to start from."""
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
             if record.plan is None or len(record.plan.controls) == 0:
@@ -77,7 +77,7 @@ class InitialGuess:
 
 
 class OptimisedOne(NamedTuple):
-    """How a plan was optimised, and the plan that came of it, in metres of the problem."""
+    """How a plan was optimised, and the resulting plan, in metres of the problem."""
 
     summary: str  # how it ended, after how many iterations and milliseconds
     length_m: float
@@ -93,9 +93,9 @@ def initial_guess(
     """The source of the first guess, from the options of the command; the default is a plan by Follow.
 
     Args:
-        plan_file: a plan file to begin with, or None.
-        planner: the planner whose plan to begin with, or None.
-        straight: whether to begin with a straight line from start to goal.
+        plan_file: a plan file to start from, or None.
+        planner: the planner whose plan to start from, or None.
+        straight: whether to start from a straight line from start to goal.
         vehicle: the vehicle's name.
         seed: the planner's seed, 0 or more.
 
@@ -120,8 +120,7 @@ def optimise_one(
     Args:
         initial: where the first guess comes from.
         problem_file: the file; it must hold one problem.
-        clearance_weight: weight of the clearance in the objective, 0 or more; 0 asks for the least time
-            alone.
+        clearance_weight: weight of the clearance in the objective, 0 or more; with 0, only time counts.
         out: where to write the plan, or None. Why there is none is written too, but over no older file.
         drawing: where to draw it, or None.
 
@@ -141,7 +140,7 @@ def optimise_one(
     problem = problems[0]
     weights = DEFAULT_SETTINGS.weights._replace(clearance_weight=clearance_weight)
     initial.warn_of_other_problem(problem)
-    initial.guess(problem)  # compiles and fills caches before the time counts
+    initial.guess(problem)  # compiles and fills caches before timing starts
     start = perf_counter()
     guess, planner = initial.guess(problem)
     optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)

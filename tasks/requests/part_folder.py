@@ -21,7 +21,7 @@ from tasks.settings.errors import UsageError
 
 
 class Request(Protocol):
-    """What a command was asked for, whose work is done piece by piece."""
+    """A request to a command that does its work piece by piece."""
 
     @property
     def out(self) -> Path:
@@ -60,7 +60,7 @@ class NumberedPiece(Generic[AnyRequest]):
 
 
 def parts_folder(out: Path) -> Path:
-    """Where the finished parts of the output ``out`` lie."""
+    """The folder of the finished parts of the output ``out``."""
     return out.with_name(f"{out.name}.parts")
 
 
@@ -115,14 +115,14 @@ def is_readable(shard: Path, key: str) -> bool:
 
 
 def refuse_foreign(out: Path, is_own: Callable[[Path], bool], called: str) -> None:
-    """Raise UsageError if there is anything at ``out`` but an empty folder or what ``is_own``."""
+    """Raise UsageError if ``out`` exists, unless it is an empty folder or ``is_own`` accepts it."""
     if out.exists() and not (is_own(out) or (out.is_dir() and not any(out.iterdir()))):
         raise UsageError(f"{out} exists and is not a {called}; give --out the name of a new folder.")
 
 
 @contextmanager
 def part_workers(out: Path, workers: int) -> Iterator[None]:
-    """A server of Prefect and worker processes, for a flow that does the parts of ``out``."""
+    """Provide a Prefect server and worker processes for a flow that makes the parts of ``out``."""
     with local_server(parts_folder(out).absolute()) as server:
         from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
 

@@ -1,4 +1,4 @@
-"""What ``plan``, ``optimise`` and ``route`` answer, for programs (docs/commands.md)."""
+"""The answers of ``plan``, ``optimise`` and ``route`` for programs (docs/commands.md)."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def no_plan(name: str, summary: str, out: Path | None, written: Path | None) -> 
 
 
 def plan_answer(record: PlanRecord, out: Path | None, verified: bool | None) -> dict[str, Any]:
-    """The fields of a plan's file, and what else is asked of a plan.
+    """The fields of a plan's file, and further facts about the plan.
 
     Args:
         record: the plan, or how the attempt failed.
-        out: the file that holds states and controls, which are not told again; None: they are.
+        out: the file that holds states and controls, which are then left out here; None includes them.
         verified: whether the authority accepted the plan; None without a plan.
     """
     fields = plan_fields(record)

@@ -1,4 +1,4 @@
-"""Cut a file of problems into parts; a worker solves a part at a time and writes it whole or not at all."""
+"""Split a file of problems into parts; a worker solves one part at a time and writes all of it or nothing."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 from tasks.requests.part_folder import parts_folder
 
-PART_PROBLEMS: Final = 500  # a second of work, or minutes where problems are hard
-KEEP_SECONDS: Final = 5.0  # of work on a part that a killed worker may lose; Ctrl-C loses none
+PART_PROBLEMS: Final = 500  # a second of work, or minutes if problems are hard
+KEEP_SECONDS: Final = 5.0  # of work on a part that may be lost if a worker is killed; Ctrl-C loses none
 PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
 MOST_IN_ONE_FOLDER: Final = 10_000  # plans; for more problems each part writes its plans into its own folder
 COLLECT_EVERY: Final = 50  # problems from one garbage collection to the next
@@ -93,7 +93,7 @@ class PartResult(NamedTuple):
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:
-    """Cut a file of problems into parts, in a way that does not depend on the number of workers.
+    """Split a file of problems into parts, in a way that does not depend on the number of workers.
 
     Raises StorageError if the file is missing or damaged, or holds no problems.
     """
@@ -119,7 +119,7 @@ def _parts_of(request: SolveRequest, _file_state: tuple[int, int] | None) -> lis
 
 
 def _identity(part: ProblemSlice) -> tuple[str, int, int, int]:
-    """What makes a slice the same as before; not its offset in a text, which moves with earlier lines."""
+    """What identifies a slice: not its offset in a text, which changes with earlier lines."""
     return part.digest, part.first, part.count, part.offset if part.path.suffix == ".parquet" else 0
 
 
@@ -176,7 +176,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
 
 @contextmanager
 def _kept_if_interrupted(keep: Callable[[], None]) -> Iterator[None]:
-    """Keep what was done if Ctrl-C ends the context."""
+    """Keep finished work if Ctrl-C ends the context."""
     try:
         yield
     except KeyboardInterrupt:
@@ -195,7 +195,7 @@ SOLVE: Final = Job(
 
 @functools.lru_cache(maxsize=1)
 def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
-    """The assistant of this process, which keeps the memories that it has read."""
+    """The assistant of this process, which keeps the memories that it has loaded."""
     return Assistant(settings)
 
 

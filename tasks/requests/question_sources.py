@@ -1,4 +1,4 @@
-"""Where questions to gather experience from come from: each source gives them by their numbers."""
+"""Sources of the questions that ``gather`` solves: each source gives its questions by number."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from storage.fields import nearest
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
 
-OWN_SEEDS: Final = 1 << 32  # more than a seed that anyone draws problems to be asked with
+OWN_SEEDS: Final = 1 << 32  # larger than any seed with which users draw problems
 
 
 @dataclass(frozen=True)
 class QuestionSource:
     """Any number of questions, or those of a file."""
 
-    draw: Callable[[int], Problem | None]  # by number, from 0; None where there was no room for a question
+    draw: Callable[[int], Problem | None]  # by number, from 0; None if there was no room for a question
     most: float = math.inf  # how many there are
 
 
 def is_drawn(name: str) -> bool:
-    """Whether the source of this name is a class or a family, and nothing that lies on the disk."""
+    """Whether the name is that of a class or a family, and not of a file or folder."""
     return name in (*CLASSES, *FAMILIES) and not Path(name).exists()
 
 
@@ -41,13 +41,13 @@ def question_source(
 
     Args:
         name: of a class or a family, or the path of a map, of worlds or of a file of problems.
-        plans: how many plans are wanted: into as many windows is a map cut.
+        plans: how many plans are wanted; a map is cut into as many windows.
         poses: the share of drawn questions that ask for a pose.
         difficulty: of a class or a family.
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
 
     Raises:
-        StorageError: there is nothing at the path, or nothing that can be read.
+        StorageError: the path does not exist or cannot be read.
     """
     vehicle = settings.vehicle
     seed = OWN_SEEDS + settings.seed
@@ -78,7 +78,7 @@ def question_source(
 
 
 def _asked_in(world_of: Callable[[int], Problem], poses: float, settings: ImportSettings) -> QuestionSource:
-    """One question in each world, again and again."""
+    """One question in each world in turn, again and again."""
 
     def draw(number: int) -> Problem | None:
         pose = math.floor((number + 1) * poses) > math.floor(number * poses)

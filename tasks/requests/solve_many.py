@@ -1,4 +1,4 @@
-"""Solve a file of few or very many problems: solve the parts that are left, then join the rows of all."""
+"""Solve a file of few or very many problems: solve the remaining parts, then join the rows of all."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 SolveFlow = Callable[[SolveRequest], list[PartResult]]
 
-FEW_PARTS: Final = 2  # solving so many here takes less time than starting a server and workers
+FEW_PARTS: Final = 2  # solving so few here takes less time than starting a server and workers
 
 
 class Tally(NamedTuple):
@@ -50,12 +50,12 @@ class Tally(NamedTuple):
 
 
 class SolvedMany(NamedTuple):
-    """What became of the problems of a file."""
+    """The results for the problems of a file."""
 
     tally: Tally
     solved_now: int  # problems that were attempted by this command; an earlier one attempted the others
     seconds: float  # that these took
-    drift: Sequence[str]  # lines on how the memory did beside its benchmark
+    drift: Sequence[str]  # lines that compare the memory with its benchmark
 
     @property
     def planning_seconds(self) -> tuple[float, float, float]:
@@ -189,7 +189,7 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally
 
 
 def _repeated_id(parts: Sequence[FilePart], id_hashes: Floats) -> str | None:
-    """A message about an id that occurs twice, found by the hashes of all ids; None if there is none."""
+    """A message about a repeated id, found with the hashes of all ids; None if there is none."""
     order = np.argsort(id_hashes, kind="stable")
     same = np.flatnonzero(id_hashes[order][1:] == id_hashes[order][:-1])
     ends = np.cumsum([part.problem_slice.count for part in parts])

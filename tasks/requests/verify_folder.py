@@ -1,4 +1,4 @@
-"""Check a data folder: files are whole, stored plans are free, attempts have the same outcome again."""
+"""Check a data folder: files are complete, stored plans are free, repeated attempts end as before."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from tasks.settings.run_settings import RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
 from tasks.stages.measure_recall import LONGEST_ORDER
 
-LABELS_EVERY: Final = 50  # one hallucinated problem in so many has its grid and labels made again
+LABELS_EVERY: Final = 50  # one hallucinated problem in this many has its grid and labels computed again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "learned", "curated", "experiences")
 MOST_FAULTS_TOLD: Final = 20
 

@@ -1,1 +1,1 @@
-"""Servers that commands start: who may reach them, and how they live and end."""
+"""Servers that commands start: who may reach them, and how they start and stop."""

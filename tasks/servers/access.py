@@ -1,8 +1,8 @@
 """Who may use our servers: by default they listen on loopback only, and on other addresses with a password.
 
-The password is set by ``MOTION_MEMORY_AUTH=user:password`` in the environment, and nowhere else. Then all our
-servers ask for it, those of Prefect and MLflow too, and our clients send it. A server that always needs a
-password makes one if none is set, in a file that only its owner can read.
+The password is set only by ``MOTION_MEMORY_AUTH=user:password`` in the environment. All our servers then ask
+for it, including those of Prefect and MLflow, and our clients send it. A server that always needs a password
+makes one if none is set, in a file that only its owner can read.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def auth_environment() -> dict[str, str]:
 def new_secret(file: Path) -> str:
     """Make a ``user:password`` that nobody can guess; write it to a new file that only its owner can read."""
     secret = f"{USER}:{secrets.token_urlsafe(32)}"
-    file.unlink(missing_ok=True)  # a program that has the old file open does not see the new secret
+    file.unlink(missing_ok=True)  # a program that still has the old file open does not see the new secret
     with open(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w") as sink:
         sink.write(secret)
     return secret

@@ -1,14 +1,14 @@
 """Bounds on connections: how long a server waits for a request, and how many connections it keeps.
 
 Uvicorn waits for ever for the headers of a first request. It can only bound the number of all connections,
-and then a few silent ones make it answer everybody else with 503. Here a connection that does not send whole
-headers in time is closed. If there are too many connections, some are closed to make room: first those that
-never sent a request, then those between two requests, then those that are still sending or reading; within
-each group those that have been in that state longest. A connection whose request is being answered is never
-closed for that reason.
+and then a few silent ones make it answer everybody else with 503. Here, a connection that does not send
+complete headers in time is closed. If there are too many connections, some are closed to make room: first
+those that never sent a request, then those between two requests, then those that are still sending or
+reading; within each group, those that have been in that state longest. A connection whose request is being
+answered is never closed for that reason.
 
-Uvicorn also keeps all of an answer that its client does not read. Here the unread answers of a process are
-bounded: if they have too many bytes, the clients that have been reading longest are cut off.
+Uvicorn also keeps all of an answer that its client does not read. Here, the unread answers of a process are
+bounded: if they have too many bytes, the clients that have been reading longest are disconnected.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from typing import Any, Final
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-MOST: Final = 2_000  # connections of a process, some 30 MB; with fewer, clients that are closed come again
-SHARE: Final = 10  # a tenth is closed at once, since choosing one costs as much as accepting one
+MOST: Final = 2_000  # connections of a process, about 30 MB; with fewer, closed clients reconnect
+SHARE: Final = 10  # a tenth is closed at once, because choosing one costs as much as accepting one
 HEADER_SECONDS: Final = 10.0  # for the headers of a first request
 IDLE_SECONDS: Final = 30.0  # from an answer to the headers of the next request
-MOST_UNREAD: Final = 256 << 20  # bytes of answers, in a process
-AHEAD: Final = 8 << 20  # bytes that an answer may be ahead of its reader; all of any page of Prefect's
+MOST_UNREAD: Final = 256 << 20  # bytes of answers in a process
+AHEAD: Final = 8 << 20  # bytes that an answer may be ahead of its reader; more than any of Prefect's pages
 FIRST_MESSAGE: Final = 64 << 10  # bytes of a websocket's first message, which proves the password
 
 
@@ -36,7 +36,7 @@ def files_allowed() -> int:
 
 
 def backlog() -> int:
-    """How many connections to accept at once: so few that the bounds act before files run out."""
+    """How many connections to accept at once, so that the bounds act before files run out."""
     return min(2_048, files_allowed() // 16)
 
 
@@ -51,13 +51,13 @@ class TimedProtocol(H11Protocol):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self._timer: TimerHandle | None = None  # runs while the headers of a request are awaited
+        self._timer: TimerHandle | None = None  # runs while waiting for the headers of a request
         self._unread = math.inf  # bytes of the last answer that were unread at the last look
-        self._since = self.loop.time()  # when the present state began
-        self._reading_since: float | None = None  # since when some of the answers has been unread
+        self._since = self.loop.time()  # when the current state began
+        self._reading_since: float | None = None  # since when part of an answer has been unread
 
     def connection_made(self, transport: Transport) -> None:  # type: ignore[override]  # as in Uvicorn
-        """Wait for a request; if there are too many connections now, close some."""
+        """Wait for a request; if there are now too many connections, close some."""
         super().connection_made(transport)
         transport.set_write_buffer_limits(high=AHEAD)  # slow readers do not keep the application waiting
         self._watch()
@@ -142,7 +142,7 @@ class TimedProtocol(H11Protocol):
             each.transport.abort()
 
     def _bound_unread(self) -> None:
-        """Note that the client has something to read; if all clients together have too much, cut some off."""
+        """Note that the client has something to read; if all together have too much, disconnect some."""
         if self.transport.get_write_buffer_size() == 0:
             return
         if self._reading_since is None:

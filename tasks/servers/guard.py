@@ -12,9 +12,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-OPEN: Final = ("/ping", "/health")  # whoever asks may know that a server is alive
-# Headers of each answer: other sites can neither read it nor show it in a frame, and its page asks no other
-# site for anything (Prefect's would ask one for settings whenever it is opened).
+OPEN: Final = ("/ping", "/health")  # anybody may know that a server is alive
+# Headers of each answer: other sites can neither read it nor show it in a frame, and its page contacts no
+# other site (Prefect's would request settings from one whenever it is opened).
 _ADDED: Final = {
     "Content-Security-Policy": "connect-src 'self'",
     "Cross-Origin-Resource-Policy": "same-origin",
@@ -28,9 +28,9 @@ _SHARED: Final = "access-control-"  # headers that let other sites read answers 
 class Guard:
     """Protects an ASGI application from pages of other sites, and from users without the password.
 
-    A web page can make the browser send requests to any address, loopback included. Two headers reveal such a
-    request, and the page cannot choose them: Origin is the address of the page, Host is the name of the
-    server that the page asked for. A Host that is not ours means DNS rebinding: the name of the page's site
+    A web page can make the browser send requests to any address, including loopback. Two headers reveal such
+    a request, and the page cannot choose them: Origin is the address of the page, and Host is the name of the
+    server that the page contacted. A Host that is not ours means DNS rebinding: the name of the page's site
     was made to point at this machine.
     """
 
@@ -47,7 +47,7 @@ class Guard:
             app: the application to protect.
             secret: the ``user:password`` to ask for (HTTP Basic); None asks for none.
             names: names by which clients may call the server, besides its address.
-            closed: paths that nobody gets an answer from.
+            closed: paths that are answered for nobody.
         """
         self._app = app
         self._credentials = None if secret is None else base64.b64encode(secret.encode())

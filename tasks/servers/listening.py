@@ -1,4 +1,4 @@
-"""Serve an ASGI application by worker processes at one port, which opens when the first of them is ready."""
+"""Serve an ASGI application from worker processes on one port, which opens when the first is ready."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 READY_SECONDS: Final = (
     300.0  # for a worker to load its model, and to compile the kernels if they are not cached
 )
-STOP_SECONDS: Final = 5  # for the requests that are being answered at the end
-HEALTH_SECONDS: Final = 60  # a worker that does not answer for so long is replaced
+STOP_SECONDS: Final = 5  # for requests that are still being answered at the end
+HEALTH_SECONDS: Final = 60  # a worker that does not answer for this long is replaced
 
 
 def bound(host: str, port: int) -> socket.socket:
@@ -102,7 +102,7 @@ def config_of(
 def serve_with(
     app: Callable[[], Any], listener: socket.socket, workers: int, on_ready: Callable[[], None]
 ) -> None:
-    """Serve an application by worker processes until Ctrl-C; a worker that dies is replaced.
+    """Serve an application from worker processes until Ctrl-C; a worker that dies is replaced.
 
     Args:
         app: an importable function that makes the ASGI application; each worker calls it.

@@ -1,8 +1,8 @@
 """Prefect's server behind the guard.
 
-``python -m tasks.servers.prefect_app FOLDER SOCKET`` runs the server of a data folder at a port that a
+``python -m tasks.servers.prefect_app FOLDER SOCKET`` runs the server of a data folder on a port that a
 command has opened (``SOCKET`` is the number of its file descriptor). It ends when no command uses the server
-any more.
+any longer.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from tasks.servers.prefect_server import POLL_SECONDS, SECRET, STOP_SECONDS, URL
 from tasks.servers.sockets import Sockets
 from tasks.servers.users import is_used, locked
 
-# Pages of FastAPI that describe the server to whoever asks; Prefect's own page does not need them.
+# Pages of FastAPI that describe the server to everyone; Prefect's own page does not need them.
 DESCRIPTIONS: Final = ("/docs", "/docs/oauth2-redirect", "/openapi.json", "/redoc")
 
 
 def prefect_app() -> Guard:
     """Prefect's server behind the guard; requests need the password in PREFECT_SERVER_API_AUTH_STRING.
 
-    Prefect checks the password of requests itself, once it has begun to work for them; that of websockets is
-    checked before.
+    Prefect itself checks the password of requests, but only once it has begun to work for them; that of
+    websockets is checked before.
     """
     from prefect.server.api.server import create_app
     from prefect.settings import get_current_settings
@@ -43,10 +43,10 @@ def prefect_app() -> Guard:
 
 
 def wait_until_unused(folder: Path) -> None:
-    """Return when no command uses the server of ``folder``; its address and its password are removed then."""
+    """Return when no command uses the server of ``folder``, after removing its address and its password."""
     while True:
         time.sleep(POLL_SECONDS)
-        with suppress(OSError), locked(folder):  # no more files can be opened now, but soon they can
+        with suppress(OSError), locked(folder):  # no more files can be opened now, but soon
             if not is_used(folder):
                 for name in (URL, SECRET):  # the next command starts another server
                     (folder / name).unlink(missing_ok=True)

@@ -2,7 +2,7 @@
 
 The server is a child process (``tasks.servers.prefect_app``) that watches the commands registered with it.
 It stops when the last of them has ended, even by kill -9. A command that finds a server running shares it. If
-the server dies, a command starts it again at the same address, with the same password, and goes on. Each new
+the server dies, a command restarts it at the same address with the same password, and continues. Each new
 server has a new password, in a file that only the owner can read.
 """
 
@@ -28,7 +28,7 @@ from tasks.settings.environment import environment
 
 START_SECONDS: Final = 90.0  # a cold start on a busy machine took 20
 POLL_SECONDS: Final = 0.1
-STOP_SECONDS: Final = 0.8  # to stop in order; then the child exits at once, which SQLite survives
+STOP_SECONDS: Final = 0.8  # to stop cleanly; then the child exits at once, which SQLite survives
 
 RESTARTS: Final = 2  # in a row, without an answer in between
 PORT_SECONDS: Final = 5.0  # how long another process may hold the port of a dead server
@@ -53,7 +53,7 @@ ENVIRONMENT: Final = {
     "PREFECT_SERVER_SERVICES_TASK_RUN_RECORDER_FLUSH_INTERVAL": "1",
     "PREFECT_SERVER_SERVICES_EVENT_PERSISTER_BATCH_SIZE": "200",
     "PREFECT_LOGGING_LEVEL": "CRITICAL",  # the command itself reports a failure, in one line
-    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server missed is no failure
+    "PREFECT_INTERNAL_LOGGING_LEVEL": "CRITICAL",  # an event that a dead server missed is not a failure
     "PREFECT_LOGGING_EXTRA_LOGGERS": "tasks,storage",  # only what is logged here goes into a run's log
     "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",  # before and after a flow
     "PREFECT_CLIENT_MAX_RETRIES": "6",  # two minutes in all
@@ -121,7 +121,7 @@ class LocalServer:
 def set_environment(data: Path) -> None:
     """Set environment variables that keep the libraries quiet and private, and their files in a data folder.
 
-    Variables that are set already stay as they are. If servers need a password (``tasks.servers.access``), it
+    Variables that are already set stay as they are. If servers need a password (``tasks.servers.access``), it
     is set for Prefect's and MLflow's servers and clients.
     """
     home = data / "prefect"
@@ -139,7 +139,7 @@ def set_environment(data: Path) -> None:
 def local_server(data: Path) -> Iterator[LocalServer | None]:
     """Share or start the server of a data folder, and make this process its client while the context lasts.
 
-    Yields the server, or None if PREFECT_API_URL names another one. A new server needs some 5 s to start:
+    Yields the server, or None if PREFECT_API_URL names another one. A new server takes about 5 s to start;
     ``LocalServer.wait`` waits for it.
     """
     set_environment(data)
@@ -182,7 +182,7 @@ def _join(folder: Path) -> tuple[LocalServer, socket.socket | None]:
 
 
 def _start(server: LocalServer, listener: socket.socket) -> None:
-    """Start the server in a child process, at a port that is open already."""
+    """Start the server in a child process, on a port that is already open."""
     folder = server.folder
     with (folder / URL).open("w") as state, (folder / LOG).open("ab") as sink:
         state.write(server.url)
@@ -204,11 +204,11 @@ def _start(server: LocalServer, listener: socket.socket) -> None:
             pass_fds=[listener.fileno(), state.fileno()],  # the child holds the lock until it ends
             start_new_session=True,  # Ctrl-C ends the command; the server then stops by itself
         )
-    threading.Thread(target=child.wait, daemon=True).start()  # so that a dead child leaves no zombie
+    threading.Thread(target=child.wait, daemon=True).start()  # keeps a dead child from becoming a zombie
 
 
 def _keep(server: LocalServer, listener: socket.socket | None, done: threading.Event) -> None:
-    """Start the server again whenever it dies, until this command no longer uses it.
+    """Restart the server whenever it dies, until this command no longer uses it.
 
     While a command keeps the port open, clients that connect wait for the next server.
     """

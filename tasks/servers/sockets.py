@@ -1,8 +1,8 @@
-"""Websockets of Prefect's server: the server works for one only when it has proved the password.
+"""Websockets of Prefect's server: the server works for one only after it has sent the password.
 
-Prefect accepts every websocket, and takes the password from its first message. Until that comes, which may be
-never, the websocket holds one of the few places that Prefect has for requests. Here the first message is read
-before Prefect learns of the websocket.
+Prefect accepts every websocket and takes the password from its first message. Until that arrives, which may
+be never, the websocket occupies one of Prefect's few places for requests. Here, the first message is read
+before Prefect knows about the websocket.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _REFUSED: Final = {"type": "websocket.close", "code": 1008, "reason": "Invalid t
 
 
 class Sockets:
-    """Passes an ASGI application those websockets alone whose first message has the password."""
+    """Passes on to an ASGI application only websockets whose first message has the password."""
 
     def __init__(self, app: ASGIApp, secret: str) -> None:
         """Protect an application.
@@ -62,7 +62,7 @@ class Sockets:
         await self._app(scope, receive_again, send_once)
 
     async def _first_message(self, receive: Receive) -> Message:
-        """The first message; an empty one if none comes in time, or if others need the room."""
+        """The first message; an empty one if none arrives in time, or if others need the place."""
         try:
             async with asyncio.timeout(PROOF_SECONDS) as limit:
                 self._waiting[limit] = None

@@ -13,7 +13,7 @@ USERS: Final = "users"  # folder of one file for each process that uses the serv
 
 
 def register(folder: Path) -> IO[str]:
-    """Register this process as a user of the server of ``folder``; closing the returned file ends that."""
+    """Register this process as a user of the server of ``folder`` until the returned file is closed."""
     (folder / USERS).mkdir(parents=True, exist_ok=True)
     user = (folder / USERS / str(os.getpid())).open("w")
     fcntl.flock(user, fcntl.LOCK_EX)

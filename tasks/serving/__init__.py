@@ -1,1 +1,1 @@
-"""What is served to others: a memory, the dashboard, Prefect and MLflow for a team."""
+"""What is served to other people: a memory, the dashboard, Prefect and MLflow for a team."""

@@ -1,9 +1,9 @@
-"""MLflow's scoring server for a memory, with its requests checked first: a bad one gets one clear line.
+"""MLflow's scoring server for a memory. Requests are checked first; a bad one gets one clear line.
 
 ``/invocations`` takes MLflow's protocol as JSON (``dataframe_split``, ``dataframe_records``, ``instances`` or
 ``inputs``, and ``params``); MLflow parses it and enforces the signature. ``/ping``, ``/health`` and
-``/version`` are MLflow's own. MLflow's server by itself answers some bad requests with 500 or a stack trace,
-has no bounds on requests, and spends most of its time on writing numbers.
+``/version`` are MLflow's own. MLflow's server alone answers some bad requests with 500 or a stack trace, has
+no bounds on requests, and spends most of its time writing numbers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from tasks.tracking.memory_model import TOP_K
 PATH: Final = "/invocations"
 MOST_BYTES: Final = 8 << 20  # in a request
 MOST_HELD: Final = 1 << 30  # bytes, of all requests together
-MOST_PLANS: Final = 1_000  # problems times top_k in a request; the answer then has some 30 MB
+MOST_PLANS: Final = 1_000  # problems times top_k in a request; the answer then has about 30 MB
 BODY_SECONDS: Final = 20.0  # for a whole request to arrive
 LONGEST_MESSAGE: Final = 400  # characters
 FORMATS: Final = ("dataframe_split", "dataframe_records", "instances", "inputs")

@@ -39,7 +39,7 @@ def serve_dashboard(data: Path, port: int, open_browser: bool) -> None:
         open_browser: whether to open the dashboard in a browser.
 
     Raises:
-        UsageError: the port cannot be used, or the folder is no data folder.
+        UsageError: the port cannot be used, or the folder is not a data folder.
     """
     folder = _existing_folder(data)
     if not 0 <= port <= 65535:
@@ -119,7 +119,7 @@ def _read_ahead(versions: Versions) -> None:
 
 
 def _existing_folder(data: Path) -> DataFolder:
-    """The data folder at a path; it is not made if it does not exist."""
+    """The data folder at a path; it is not created if it does not exist."""
     folder = data.expanduser().absolute()
     if not folder.is_dir():
         raise UsageError(f"{folder} does not exist; give --data the folder that holds your runs.")

@@ -58,7 +58,7 @@ def serve_memory(memory: str, vehicle: str, host: str, port: int, workers: int) 
 
 
 def scoring_app(folder: str, vehicle: str) -> Guard:
-    """What a worker serves, loaded, compiled and tried once. The worker ends with its parent process."""
+    """The application of a worker, loaded, compiled and tried once; the worker ends with its parent."""
     end_with_parent()
     from tasks.serving.scoring import Scoring
     from tasks.tracking.memory_model import (  # late: imports MLflow and pandas
@@ -74,7 +74,7 @@ def scoring_app(folder: str, vehicle: str) -> Guard:
 
 
 def sample_request(memory: Memory | PlanLibrary) -> bytes:
-    """A request that needs all kernels: it has the memory's scale, a turned start and a notched obstacle."""
+    """A request that needs all kernels: it has the memory's scale, a rotated start and a notched obstacle."""
     scale = memory.scales[0]
     notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]
     problem = {

@@ -45,14 +45,14 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
     """Serve until Ctrl-C or SIGTERM.
 
     Args:
-        data: the data folder; it is made if it does not exist.
+        data: the data folder; it is created if it does not exist.
         host: the address to listen on.
         prefect_port: the port of Prefect's server; 0 takes any free one.
         mlflow_port: the port of MLflow's server.
 
     Raises:
         UsageError: the address is malformed or not protected.
-        RunError: Servers run already for the folder, a port cannot be used, or a server ended.
+        RunError: servers are already running for the folder, a port cannot be used, or a server ended.
     """
     check_address(host)
     folder = open_data_folder(data)
@@ -60,7 +60,9 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
         only_servers(folder),
         bound(host, prefect_port) as prefect_socket,
         bound(host, mlflow_port) as mlflow_socket,
-        password_set(folder) as access_line,  # last: a command that fails before leaves others' file as it is
+        password_set(
+            folder
+        ) as access_line,  # last: a command that fails before this leaves another command's file as it is
     ):
         set_environment(folder.path)
         apps: dict[str, tuple[Callable[[], Any], socket.socket]] = {
@@ -78,7 +80,7 @@ def servers(data: Path, host: str, prefect_port: int, mlflow_port: int) -> None:
 
 @contextmanager
 def only_servers(folder: DataFolder) -> Iterator[None]:
-    """Keep other ``servers`` commands off a data folder. Raises RunError if one runs for it."""
+    """Lock a data folder against other ``servers`` commands. Raises RunError if one is running for it."""
     with ExitStack() as stack:
         try:
             stack.enter_context(locked(folder.path / "servers.lock", str(folder.path)))
@@ -122,7 +124,7 @@ def mlflow_app(data: DataFolder) -> Guard:
         constants.ARTIFACTS_DESTINATION_ENV_VAR: artifacts,
         "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",  # would start ten processes that nobody needs
     }
-    with warnings.catch_warnings():  # of a part of Starlette that MLflow uses, not the user
+    with warnings.catch_warnings():  # about a part of Starlette that MLflow uses, not the user
         warnings.filterwarnings("ignore", category=StarletteDeprecationWarning)
         from mlflow.server.fastapi_app import app
     from mlflow.server.handlers import initialize_backend_stores
@@ -135,7 +137,7 @@ def mlflow_app(data: DataFolder) -> Guard:
 def _running(
     apps: dict[str, tuple[Callable[[], Any], socket.socket]],
 ) -> Iterator[Callable[[Callable[[], bool], float], None]]:
-    """Run a process for each server; yields a function that waits for a condition or the end.
+    """Run a process for each server; yield a function that waits for a condition or the end.
 
     The function takes a condition and a limit in seconds. It raises RunError if a process ends or the time
     runs out.

@@ -1,1 +1,1 @@
-"""What one command needs around its flow: its locked folder, its server, its workers."""
+"""What one command needs around its flow: a locked folder, a server, workers."""

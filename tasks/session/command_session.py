@@ -30,7 +30,7 @@ _LOG = logging.getLogger(__name__)
 def command_session(
     name: str, settings: RunSettings, data: Path, workers: int, scheduler: str | None
 ) -> Iterator[str]:
-    """Provide everything that the flow of a command needs; log at the end where its results lie.
+    """Provide everything that the flow of a command needs; at the end, log where its results are.
 
     Prefect reads its environment when it is imported, so import the flow only inside this context.
 

@@ -54,7 +54,7 @@ def _compile_rest(vehicle: Vehicle) -> None:
             solve(EMPTY, planner, assist, vehicle=vehicle)
 
 
-# Of two workers each compiles one of the first two groups, and the
+# With two workers, each compiles one of the first two groups, and the
 # one that finishes first compiles the last.
 GROUPS: Final[tuple[Callable[[Vehicle], object], ...]] = (
     _compile_collecting,

@@ -17,7 +17,7 @@ from tasks.settings.run_settings import RunSettings
 def stage_flow(stage: Callable[[RunSettings, str], None]) -> Flow[[RunSettings, str], None]:
     """Make a flow that locks its data folder, uses the shared cluster, and records how long it took.
 
-    The stages after the first get the settings without the classes that collecting has left out.
+    Stages after the first receive the settings without the classes that collecting has left out.
     """
     name = stage.__name__.replace("_", "-")
     named = flow(name=name, flow_run_name=f"{name} {{settings.title}}", task_runner=task_runner())

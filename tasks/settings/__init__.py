@@ -1,1 +1,1 @@
-"""The settings of a run, and checks of what commands are given."""
+"""The settings of a run, and checks of command-line values."""

@@ -1,4 +1,4 @@
-"""Check the values of a command's options; each check raises a UsageError that says what is possible."""
+"""Check the values of a command's options; each check raises a UsageError that says what is allowed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from storage.fields import nearest
 from storage.vehicles.vehicle_files import text_of_vehicle
 from tasks.settings.errors import UsageError
 
-PICTURES: Final = (".png", ".svg", ".pdf")  # endings of what can be drawn
+PICTURES: Final = (".png", ".svg", ".pdf")  # endings of pictures
 
 
 def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mapping[str, Any]) -> None:
@@ -32,10 +32,11 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
 
 
 def checked_vehicle(given: str) -> str:
-    """What says all of a vehicle, wherever it is read (``storage.vehicles.vehicle_files.said_vehicle``).
+    """A complete description of a vehicle (``storage.vehicles.vehicle_files.said_vehicle``).
 
     Args:
-        given: the name of a built-in vehicle, the path of a vehicle's YAML file, or what this function gave.
+        given: the name of a built-in vehicle, the path of a vehicle's YAML file, or what this function
+            returned.
 
     Raises:
         UsageError: there is no such vehicle, or its file is wrong; the message is one line.
@@ -48,7 +49,7 @@ def checked_vehicle(given: str) -> str:
 
 
 def check_count(what: str, count: int) -> None:
-    """Refuse a number of something that is less than one."""
+    """Refuse a number below one."""
     if count < 1:
         raise UsageError(f"{count} {what}: give 1 or more.")
 
@@ -72,14 +73,14 @@ def check_plan_file(path: Path | None) -> None:
 
 
 def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> None:
-    """Refuse to write over what is read.
+    """Refuse to overwrite files that are read.
 
     Args:
         inputs: the files that a command reads, and the folders of which it reads files.
-        outputs: where it would write; None stands for an output that is not wanted.
+        outputs: the paths to write to; None stands for an output that is not wanted.
 
     Raises:
-        UsageError: an output is an input by whatever name, or lies in a folder that is read.
+        UsageError: an output is an input, under any name, or lies in a folder that is read.
     """
     read = [(path, Path(os.path.realpath(path))) for path in inputs]
     for output in (output for output in outputs if output is not None):

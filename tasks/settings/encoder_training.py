@@ -29,7 +29,7 @@ class Learning:
     dimensions: int = _DEFAULT.architecture.dimensions
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", tuple(self.channels))  # lists if they come from JSON
+        object.__setattr__(self, "channels", tuple(self.channels))  # lists when they come from JSON
         object.__setattr__(self, "hidden", tuple(self.hidden))
         if self.seeds < 1:
             raise ValueError(f"{self.seeds} training seeds: give 1 or more.")

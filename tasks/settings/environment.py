@@ -1,4 +1,4 @@
-"""Environment variables: what commands take from them, and variables that are set for a while."""
+"""Environment variables: those that commands read, and those that are set temporarily."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path
 
 
 def default_data() -> Path:
-    """The data folder of a command that is given none: $MOTION_MEMORY_DATA or ./data."""
+    """The default data folder of a command: $MOTION_MEMORY_DATA or ./data."""
     return Path(os.environ.get("MOTION_MEMORY_DATA") or "data")
 
 
 def run_named(name: str | Path) -> Path:
-    """A folder as it is given; or, if there is none, the run of that name in the default data folder."""
+    """The given folder or, if it does not exist, the run of that name in the default data folder."""
     given, run = Path(name), default_data() / "runs" / name
     return run if len(given.parts) == 1 and not given.exists() and run.is_dir() else given
 
 
 def memory_named(address: str) -> str:
-    """The address of a memory as it is given; or the folder of the run of that name."""
+    """The given address of a memory, or the folder of the run of that name."""
     return address if ":" in address else str(run_named(address))
 
 
@@ -31,7 +31,7 @@ def default_scheduler() -> str | None:
 
 @contextmanager
 def environment(**variables: str) -> Iterator[None]:
-    """Set variables of this process and its later children, and put back what they were at the end.
+    """Set variables of this process and its later children, and restore them at the end.
 
     Args:
         variables: values by name.

@@ -15,7 +15,7 @@ def runs_of_continual(settings: RunSettings) -> list[RunSettings]:
     """The run with a fifth, two fifths … of its experiences, chosen from as small a share of its candidates.
 
     There are none if ``continual`` is ``none``, or if it is ``paper``, which measures GUST on curves, and the
-    run has not both. UsageError if there are too few experiences.
+    run lacks one of them. Raises UsageError if there are too few experiences.
     """
     if settings.continual == "none":
         return []

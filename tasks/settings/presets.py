@@ -24,7 +24,7 @@ from tasks.settings.run_settings import (
     RunSettings,
 )
 
-LARGEST_WEIGHT: Final = 1e9  # so that a sum of weights is a number
+LARGEST_WEIGHT: Final = 1e9  # keeps sums of weights finite
 
 
 class Method(NamedTuple):
@@ -51,7 +51,7 @@ class Preset(NamedTuple):
     """The size of a run and its method; the fields are those of ``RunSettings``."""
 
     experiences: int
-    candidates: int  # 0: as many as experiences, so that none is chosen
+    candidates: int  # 0: as many as experiences, so there is no choice
     problems_per_experience: int
     test_problems: int
     epochs: int

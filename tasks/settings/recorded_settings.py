@@ -1,4 +1,4 @@
-"""The settings in the folder of a run, which are refused if somebody has edited them."""
+"""The settings in the folder of a run; they are refused if somebody has edited them."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tasks.settings.run_settings import RunSettings
 def recorded_settings(run: RunFolder) -> RunSettings:
     """The settings in a run's folder.
 
-    A run's name follows from its settings. The folder bears it, or the run's rows if the folder was renamed.
+    A run's name follows from its settings. The folder has this name, or the run's rows do if it was renamed.
 
     StorageError: they were edited, or are of another version, or cannot be read; one line says which.
     """
     try:
         settings = RunSettings.from_json(read_text(run.settings))
-    except (ValueError, TypeError, AttributeError) as error:  # no JSON, or other fields
+    except (ValueError, TypeError, AttributeError) as error:  # not JSON, or other fields
         raise StorageError(f"{run.settings}: {error}") from None
     if settings.run_name != run.path.name and settings.run_name not in _runs_of_rows(run):
         raise StorageError(

@@ -1,4 +1,4 @@
-"""Secrets are taken out of a text before it is shown, logged or stored."""
+"""Remove secrets from a text before it is shown, logged or stored."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import Final
 
 HIDDEN: Final = "***"
-SHORTEST: Final = 6  # letters: shorter values are words that any text may hold
+SHORTEST: Final = 6  # letters: shorter values are words that any text may contain
 _NAMES: Final = re.compile(r"(PASSWORD|PASSWD|SECRET|TOKEN|KEY|AUTH_STRING|_AUTH)$")
 _IN_ADDRESS: Final = re.compile(r"(?<=://)[^/\s\"']*@")  # scheme://user:password@host
 
@@ -17,7 +17,9 @@ _IN_ADDRESS: Final = re.compile(r"(?<=://)[^/\s\"']*@")  # scheme://user:passwor
 def redacted(text: str) -> str:
     """The text, with ``***`` for passwords in addresses and for values of secret environment variables."""
     text = _IN_ADDRESS.sub(f"{HIDDEN}@", text)
-    for secret in sorted(set(_secrets()), key=len, reverse=True):  # a secret before one that is part of it
+    for secret in sorted(
+        set(_secrets()), key=len, reverse=True
+    ):  # a secret before another that is part of it
         text = text.replace(secret, HIDDEN)
     return text
 

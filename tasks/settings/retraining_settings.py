@@ -1,4 +1,4 @@
-"""What a retraining adds to a run's settings: its number, and the champions that it begins from."""
+"""What a retraining adds to a run's settings: its number, and the champions that it starts from."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ class Champion(NamedTuple):
     """The memory in use, identified by its content rather than by its place in the registry."""
 
     memory: str  # a class, or the combined memory
-    run: str  # that made it; empty if that is not recorded
+    run: str  # the run that made it; empty if not recorded
     digest: str  # of the archive
 
 
 @dataclass(frozen=True)
 class Retraining:
-    """A run that begins from champions: their encoders, and what was hallucinated around their plans."""
+    """A run that starts from champions: their encoders, and the problems around their plans."""
 
-    number: int  # from 1; the problems to judge by follow from it
+    number: int  # from 1; the held-back problems follow from it
     champions: tuple[Champion, ...]
 
     def __post_init__(self) -> None:
@@ -39,7 +39,7 @@ def number_of(retraining: Retraining | None) -> int:
 
 
 def held_back_seed(seed: int, number: int) -> int:
-    """The seed of the problems by which a retraining is judged; no run and no other retraining has it."""
+    """The seed of the problems that judge a retraining; no run and no other retraining uses it."""
     return seed + SEEDS_APART * (number + 1)
 
 

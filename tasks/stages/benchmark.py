@@ -1,4 +1,4 @@
-"""Benchmark: every planner with and without memory on problems that nobody has seen, one row an attempt."""
+"""Benchmark every planner with and without memory on unseen problems, with one row per attempt."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tasks.inputs.problem_sources import source_key, source_of
 from tasks.settings.run_settings import ABLATION_PLANNER, UNASSISTED, RunSettings
 from tasks.stages.build_memory import BUILD_MEMORY
 
-CHUNK_PROBLEMS: Final = 100  # some 10 s of work
+CHUNK_PROBLEMS: Final = 100  # about 10 s of work
 
 
 def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:

@@ -34,7 +34,7 @@ class Built(NamedTuple):
 def build_chunk(chunk: Chunk) -> Built:
     """Build one memory with the encoder that is best on the validation problems, the first of equals.
 
-    Plans that no encoder was taught join it then.
+    Plans that no encoder was taught join it afterwards.
     """
     run, name = chunk.run, chunk.class_name
     memories = memories_by_seed(chunk)

@@ -1,6 +1,6 @@
-"""Collect: draw problems of a class, solve them, polish and check the plans: candidates to choose from.
+"""Collect candidates: draw problems of a class, solve them, polish and check the plans.
 
-A problem gives several candidates: some are quicker, others fit more problems. Curation chooses among all.
+Each problem gives several candidates: some are quicker, others fit more problems. Curation chooses among all.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from tasks.settings.run_settings import RunSettings
 
 SMALLEST_CHUNK: Final = 25
 LARGEST_CHUNK: Final = 100  # a second of work
-PATIENCE: Final = 2  # problems tried for each wanted candidate, once as many are solved as must be kept
-GIVE_UP: Final = 20  # problems tried for each wanted experience; a class this hard is no class to remember
+PATIENCE: Final = 2  # problems tried for each wanted candidate, once enough to keep are solved
+GIVE_UP: Final = 20  # problems tried for each wanted experience; a harder class is not worth remembering
 
 
 class Variant(NamedTuple):
-    """How one of the candidates of a problem is made."""
+    """How one candidate of a problem is made."""
 
     planner: str | None  # None: the run's collector
     margin_m: float  # of the polished plan
 
 
-# a quick plan, one that is as good as quick and fits more problems, and one that often takes another way
+# a quick plan, one that is nearly as quick and fits more problems, and one that often takes another path
 VARIANTS: Final = (Variant(None, 0.4), Variant(None, 0.8), Variant("follow", 0.8))  # docs/optimisation.md
 
 
 class Collected(NamedTuple):
-    """What came of a range of problems."""
+    """The results for a range of problems."""
 
     solved: int
     tried: int
@@ -71,7 +71,7 @@ def collect_chunk(chunk: Chunk) -> Collected:
 
 
 def _variants(settings: RunSettings) -> Sequence[Variant]:
-    """The variants that a run makes: only the first where nothing is chosen or plans stay as found."""
+    """The variants that a run makes: only the first if there is no choice or plans stay as found."""
     chosen = settings.wanted > settings.experiences and not settings.as_published
     return VARIANTS if chosen else VARIANTS[:1]
 
@@ -106,12 +106,12 @@ def candidates_of(
 def candidate_of(
     found: SearchedExperience, margin_m: float, settings: RunSettings, workspace: Workspace
 ) -> SearchedExperience:
-    """What an experience becomes as a candidate: polished, and checked by the authority.
+    """Make a candidate of an experience: polish it, and have the authority check it.
 
     Args:
         found: the experience as a search found it.
         margin_m: the margin of its polished plan, in metres.
-        settings: those of the run; they may say that plans stay as they were found.
+        settings: those of the run; with ``as_published``, plans stay as they were found.
         workspace: the caller's buffers.
 
     Raises:
@@ -142,7 +142,7 @@ def _cut(data: str, settings: RunSettings, name: str) -> Cut:
 
 
 def _problems_to_try(settings: RunSettings, source: Source, size: int, results: Sequence[Collected]) -> int:
-    """How many problems to try in all, given what came of the first ones.
+    """How many problems to try in all, given the results for the first ones.
 
     A class without enough problems, or with too few that are solved, makes do with fewer.
     """

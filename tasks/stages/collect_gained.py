@@ -1,7 +1,7 @@
-"""Collect gained: make candidates of what was gained on the job, as good as those of drawn problems.
+"""Make candidates of experiences gained on the job, as good as those of drawn problems.
 
-A plan at work is the first that was found, in a hurry. So the problem is solved again as ``collect`` does it,
-and the gained plan competes with the results, polished as well.
+A plan at work is the first that was found. Therefore the problem is solved again as in ``collect``, and the
+gained plan, polished as well, competes with the results.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tasks.stages.collect import LARGEST_CHUNK, VARIANTS, candidate_of, candidat
 
 
 def collect_gained_chunk(chunk: Chunk) -> None:
-    """Make candidates of a range of a class's gained experiences, but for those the run is measured by."""
+    """Make candidates of a range of a class's gained experiences, except those that the run tests with."""
     settings, name = chunk.settings, chunk.class_name
     snapshot = snapshot_path(open_data_folder(chunk.data).gained(settings.vehicle_label), settings.learned)
     rows = rows_of_class(snapshot, name)[chunk.first : chunk.last]
@@ -47,7 +47,7 @@ def candidates_of_gained(
 ) -> list[SearchedExperience]:
     """Make the collector's variants of a gained experience, and one of the gained plan.
 
-    The gained plan takes the place of the last variant, the one that often takes another way.
+    The gained plan replaces the last variant, the one that often takes another path.
     """
     own = candidate_of(gained, VARIANTS[-1].margin_m, settings, workspace)
     if settings.as_published:

@@ -1,4 +1,4 @@
-"""Curate: of all solved problems of a class choose the N that are most useful to remember."""
+"""Curate: choose the N solved problems of a class that are most useful to remember."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tasks.stages.collect_gained import COLLECT_GAINED
 
 
 def curate_chunk(chunk: Chunk) -> None:
-    """Choose among the candidates of a class, which lie in shards ``first`` to before ``last``."""
+    """Choose among the candidates of a class, which are in shards ``first`` to ``last - 1``."""
     run, settings, name = chunk.run, chunk.settings, chunk.class_name
     shards = [run.shard("candidates", name, i) for i in range(chunk.first, chunk.last)]
     drawn = [each for shard in shards for each in read_experiences(shard, chunk.vehicle)]
@@ -44,7 +44,7 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
     everything = [*drawn, *gained]
     candidates = [everything[row] for row in rows]
     kept = curate(candidates, settings.taught, said_vehicle(settings.vehicle)).tolist()
-    if settings.grown:  # the others join these: which ones hardly matters
+    if settings.grown:  # the others join these, and which ones hardly matters
         taken = {candidates[i].problem.id for i in kept}
         others = {each.problem.id: i for i, each in reversed([*enumerate(candidates)])}
         joining = sorted(i for identity, i in others.items() if identity not in taken)
@@ -53,7 +53,7 @@ def chosen(drawn: Sequence[Experience], gained: Sequence[Experience], settings: 
 
 
 def _by_problem(experiences: Sequence[Experience], first: int) -> list[list[int]]:
-    """The positions of the experiences, counted from ``first``, those of one problem together."""
+    """The positions of the experiences, counted from ``first``, grouped by problem."""
     rows: dict[str, list[int]] = {}
     for row, each in enumerate(experiences, first):
         rows.setdefault(each.problem.id, []).append(row)
@@ -61,7 +61,7 @@ def _by_problem(experiences: Sequence[Experience], first: int) -> list[list[int]
 
 
 def _alternating(ours: Sequence[list[int]], theirs: Sequence[list[int]]) -> list[int]:
-    """The rows of our first problem, of their first, of our second …, so that curation looks at both."""
+    """The rows of our first problem, their first, our second …, so that curation considers both."""
     pairs = zip_longest(ours, theirs)
     return [row for pair in pairs for rows in pair for row in rows or ()]
 

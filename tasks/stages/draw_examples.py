@@ -33,7 +33,7 @@ def _name(class_name: str) -> str:
 
 
 def _examples(chunk: Chunk) -> Iterator[Example]:
-    """Some problems, solved again, which gives the same plans."""
+    """Some problems solved again, which gives the same plans."""
     settings, name, vehicle = chunk.settings, chunk.class_name, chunk.vehicle
     planner = SHOWN_PLANNER if SHOWN_PLANNER in settings.planners else settings.planners[0]
     rows = read_attempts(chunk.run.table("results", name))

@@ -34,7 +34,7 @@ from tasks.inputs.taught_experiences import taught_counts, taught_experiences
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.keep_experiences import experiences_key
 
-CHUNK_PROBLEMS: Final = 5_000  # some seconds of work
+CHUNK_PROBLEMS: Final = 5_000  # a few seconds of work
 NO_PLAN: Final = "no-plan"
 NO_PLAN_SHARE: Final = 0.05  # problems that no plan solves, for each one that is made for a plan
 DRAWN: Final = "drawn"
@@ -60,7 +60,7 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
     """Make problems for a range of experiences, problems that no plan solves, and ordinary ones of the class.
 
     Ordinary problems are like those that a robot meets. They are labelled like the others, so the encoder
-    learns from them which plans are free there. By the paper's method there are only the first.
+    learns from them which plans are free there. The paper's method makes only the first kind.
     """
     settings, name = chunk.settings, chunk.class_name
     source = source_of(chunk.data, settings, name)
@@ -91,7 +91,7 @@ def hallucinate_chunk(chunk: Chunk) -> Hallucinated:
 
 
 def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: Bounds) -> list[MadeProblem]:
-    """A chunk's share of the problems that no plan solves, and of those that the class gives as they come.
+    """A chunk's share of the problems that no plan solves, and of ordinary problems of the class.
 
     Args:
         chunk: the chunk.
@@ -116,7 +116,7 @@ def problems_for_none(chunk: Chunk, source: Source, sweeps: PlanSweeps, bounds: 
 
 
 def identity_of(experience: Experience) -> Identity:
-    """What tells an experience from all others: its problem and its plan."""
+    """The identity of an experience: its problem and its plan."""
     return experience.problem.id, experience.plan.states.tobytes() + experience.plan.controls.tobytes()
 
 
@@ -192,7 +192,7 @@ def write_labelled(
 
 
 def _inputs(settings: RunSettings, name: str) -> list[Any]:
-    """What the problems around a plan depend on, besides the experience."""
+    """Everything that the problems around a plan depend on, besides the experience."""
     hallucination = [settings.seed, settings.problems_per_experience, settings.hallucination]
     return [*hallucination, *source_key(settings, name)]
 
@@ -218,7 +218,7 @@ HALLUCINATE: Final = Stage(
 
 
 def log_copied(results: Iterable[Hallucinated]) -> None:
-    """Tell for how many plans problems were copied from the champion's run, if there are any."""
+    """Log for how many plans problems were copied from the champion's run, if there are any."""
     results = list(results)
     copied = sum(result.copied_plans for result in results)
     plans = sum(result.plans for result in results)

@@ -1,4 +1,4 @@
-"""Judge: champion and challenger at the same held-back problems, next to each other, one row an attempt.
+"""Judge champion and challenger on the same held-back problems, side by side, with one row per attempt.
 
 Before that, every plan of the challenger is checked once more by the authority.
 """
@@ -27,7 +27,7 @@ from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.keep_experiences import experiences_key
 
 CHUNK_PROBLEMS: Final = 100
-PLANS_AT_ONCE: Final = 25  # checked by FCL, some seconds
+PLANS_AT_ONCE: Final = 25  # checked by FCL, a few seconds
 
 
 def check_plans_chunk(chunk: Chunk) -> None:
@@ -44,7 +44,7 @@ CHECK_PLANS: Final = Stage(
     cut=lambda data, settings, name: Cut(
         settings.experiences, PLANS_AT_ONCE, [experiences_key(data, settings, name), settings.vehicle]
     ),
-    output=lambda chunk: chunk.result,  # which is all that it leaves
+    output=lambda chunk: chunk.result,  # which is all that it writes
     is_whole=lambda *_: True,
 )
 
@@ -57,7 +57,7 @@ def sides_of(settings: RunSettings, class_name: str) -> list[MemoryOfRun]:
 
 
 def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
-    """Every planner with every memory of both sides, by every assist that uses one."""
+    """Every planner with every memory of both sides and every assist that uses a memory."""
     return [
         Contestant(planner, assist, *side)
         for planner in settings.planners

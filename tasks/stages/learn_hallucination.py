@@ -1,4 +1,4 @@
-"""Learn to hallucinate: train a class's network for learned hallucination, before its problems are made."""
+"""Train a class's network for learned hallucination, before its problems are made."""
 
 from __future__ import annotations
 

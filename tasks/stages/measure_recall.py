@@ -1,4 +1,4 @@
-"""Measure recall: how each memory ranks its plans for problems that training did not see, beside the truth.
+"""Measure how each memory ranks its plans for problems that training did not see, beside the truth.
 
 *Held out*: hallucinated problems, kept from training. *Fresh*: new problems of the classes, those that the
 benchmark solves.
@@ -31,12 +31,12 @@ from tasks.stages.build_memory import BUILD_MEMORY, memories_by_seed
 from tasks.stages.relabel import problems_of_memory
 
 CHUNK_PROBLEMS: Final = 2_000
-HELD_OUT_PROBLEMS: Final = 10_000  # a class, at most: a share within 1 %
-LONGEST_ORDER: Final = 100  # plans of a ranking that are kept: figures ask for some twenty
+HELD_OUT_PROBLEMS: Final = 10_000  # per class, at most: enough for a share within 1 %
+LONGEST_ORDER: Final = 100  # plans of a ranking that are kept; figures need about twenty
 
 
 class LabelledProblem(NamedTuple):
-    """A problem, and the truth about it."""
+    """A problem and the truth about it."""
 
     identity: str
     class_name: str

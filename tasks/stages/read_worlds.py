@@ -1,4 +1,4 @@
-"""Read worlds: the folders of worlds and the maps of a run, brought to the canonical frame once."""
+"""Read the worlds and maps of a run and bring them into the canonical frame, once."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from tasks.inputs.skipped_worlds import summed_up
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import world_class
 
-CUT_FROM_MAP: Final = 2  # problems to collect from, for each solved one that is wanted: some are not solved
+CUT_FROM_MAP: Final = (
+    2  # problems to collect from for each wanted solved problem, because some are not solved
+)
 
 _LOG = logging.getLogger(__name__)
 
 
 class WorldsRead(NamedTuple):
-    """What came of a folder of worlds or a map."""
+    """The result of reading a folder of worlds or a map."""
 
     skipped: list[tuple[str, str]]  # worlds that were left out, and why
     unusable: str | None = None  # why the class has no problems, if it has none
@@ -35,7 +37,7 @@ class WorldsRead(NamedTuple):
 def read_worlds_chunk(chunk: Chunk) -> WorldsRead:
     """Read the worlds of a class, or cut its map into problems.
 
-    If a part has no usable problem the class has none. Raises RunError for that if the settings are strict.
+    If a part has no usable problem, the class has none. Raises RunError in that case if settings are strict.
     """
     settings, run = chunk.settings, chunk.run
     source = source_at(next(Path(path) for path in settings.worlds if world_class(path) == chunk.class_name))
@@ -73,7 +75,7 @@ READ_WORLDS: Final = Stage(
 
 
 def log_skipped(results: Iterable[WorldsRead]) -> None:
-    """Warn of the worlds that were left out, summed up by reason, and of classes without any."""
+    """Log warnings about skipped worlds, summarised by reason, and about classes without any."""
     results = list(results)
     skipped = [(world, reason) for result in results for world, reason in result.skipped]
     if skipped:

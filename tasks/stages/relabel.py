@@ -17,7 +17,7 @@ from tasks.stages.keep_experiences import experiences_key
 
 
 def relabel_chunk(chunk: Chunk) -> None:
-    """Label a shard of one class for the plans of all classes, as a shard of the combined memory."""
+    """Label a shard of one class for the plans of all classes, as a shard for the combined memory."""
     settings = chunk.settings
     origin = HALLUCINATE.chunks(chunk.data, settings)[chunk.index]
     shard = origin.shard("hallucinated")

@@ -1,4 +1,4 @@
-"""Sweep: encoders of several sizes and learning rates, trained on the same problems, side by side."""
+"""Sweep: compare encoders of several sizes and learning rates, trained on the same problems."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SIZES: Final = (  # channels of the convolution, width of the hidden layer
 
 
 def variants(settings: RunSettings) -> list[Learning]:
-    """What is tried: every size with the run's learning rate, and every rate with the run's size."""
+    """The variants: every size with the run's learning rate, and every rate with the run's size."""
     base = replace(settings.learning, seeds=1)
     sizes = [replace(base, channels=channels, hidden=hidden) for channels, hidden in SIZES]
     rates = [replace(base, learning_rate=rate) for rate in RATES]

@@ -1,4 +1,4 @@
-"""Train: encoders of each memory, one for each training seed, on all its problems but those held out."""
+"""Train encoders for each memory, one per training seed, on all its problems except those held out."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tasks.stages.relabel import labelling_of, problems_of_memory
 
 
 class Trained(NamedTuple):
-    """What an encoder was trained on, and how that went."""
+    """What an encoder was trained on, and how the training went."""
 
     problems: int
     plans: int
@@ -29,16 +29,16 @@ class Trained(NamedTuple):
 
 
 def train_chunk(chunk: Chunk) -> Trained:
-    """Train one encoder; a training that was interrupted goes on after its last epoch.
+    """Train one encoder; a training that was interrupted continues after its last epoch.
 
-    A retraining begins with the encoder of the champion if that has the same sizes.
+    A retraining starts from the encoder of the champion if that has the same sizes.
     """
     run_settings = chunk.settings
     problems = problems_of_memory(chunk.data, run_settings, chunk.class_name)
     settings = run_settings.learning.settings(
         run_settings.objective, run_settings.epochs, run_settings.seed + chunk.index
     )
-    # of very many plans the readout alone picks candidates, so it has to know all that cells tell
+    # with very many plans, the readout alone picks candidates, so it has to know what the cells say
     settings = replace(settings, by_cells=not run_settings.grown)
     path = _checkpoint(chunk)
 

@@ -1,1 +1,1 @@
-"""What runs leave in MLflow and among Prefect's artifacts."""
+"""What runs record in MLflow and in Prefect's artifacts."""

@@ -1,4 +1,4 @@
-"""Publish a report as artifacts of the Prefect flow that made it, and say in its log where it lies."""
+"""Publish a report as artifacts of the Prefect flow that made it, and log where it is."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def publish(run: RunFolder, claims: Sequence[Claim], pages: Mapping[str, str]) -
     for title, address in ({"Report": uri_of(run.report)} | dict(pages)).items():
         _LOG.info("%-8s %s", title, address)
     try:
-        if "Report" not in pages:  # browsers open no file from a page of a server
+        if "Report" not in pages:  # browsers do not open files from a server's page
             told = f"`{uri_of(run.report)}` on {platform.node()}; `motion-memory dashboard` shows its figures"
             create_markdown_artifact(told, key=_key(run, "report"), description="Where the report is")
         create_markdown_artifact(read_text(run.summary("md")), key=_key(run, "summary"))
@@ -54,7 +54,7 @@ def publish_pages(run: RunFolder, pages: Mapping[str, str]) -> None:
     try:
         for title, address in pages.items():
             create_link_artifact(address, title, key=_key(run, title), description=title)
-    except Exception as error:  # they are in the log, too
+    except Exception as error:  # they are also in the log
         _warn("the pages", error)
 
 

@@ -59,7 +59,7 @@ def log_training(data: str, settings: RunSettings, trained: Mapping[Chunk, Train
     Args:
         data: the data folder.
         settings: those of the run.
-        trained: what training left, by chunk.
+        trained: the results of training, by chunk.
     """
     log, run = tracker(data), run_folder(data, settings)
     for chunk, result in trained.items():
@@ -83,7 +83,7 @@ def log_memories(
     Args:
         data: the data folder.
         settings: those of the run.
-        built: what building the memories left, by chunk.
+        built: the results of building the memories, by chunk.
         retrieval: the retrieval table of the run, a row for each memory, protocol and recall.
     """
     log, run = tracker(data), run_folder(data, settings)
@@ -97,7 +97,7 @@ def log_memories(
                 for figure in ("retrieval", *figure_names(name)):
                     log.artifacts(run_id, run.figure(figure, "png"), "figures")
                 of_memory = retrieval_metrics(retrieval[retrieval["memory"] == name])
-                own = f"{name}/memory-{name}/"  # known from the model's name, and MLflow cuts long names
+                own = f"{name}/memory-{name}/"  # known from the model's name, and MLflow shortens long names
                 shown = {metric.removeprefix(own): value for metric, value in of_memory.items()}
                 log.metrics(run_id, [shown], model_id=model_id)
                 log.mark_logged(run_id, chunk.key, "memory")

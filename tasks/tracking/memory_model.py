@@ -40,8 +40,8 @@ CODE: Final = Path(__file__).with_name("memory_model_code.py")
 ARTIFACT: Final = "memory"  # the archive, under this name in the model's context
 WHEELS: Final = "code"  # the folder of a model where MLflow keeps the wheel of this package
 TOP_K: Final = 5
-MOST_CORNERS: Final = 10_000  # of all obstacles of a problem: other requests wait meanwhile
-MOST_CORNERS_OF_ONE: Final = 1_000  # the time to cut a polygon into convex pieces grows with their square
+MOST_CORNERS: Final = 10_000  # of all obstacles of a problem; other requests wait meanwhile
+MOST_CORNERS_OF_ONE: Final = 1_000  # the time to cut a polygon into convex pieces grows with the square
 _ROWS: Final = Array(Array(DataType.double))
 SIGNATURE: Final = ModelSignature(
     inputs=Schema([ColSpec(DataType.string, "problem")]),
@@ -50,7 +50,7 @@ SIGNATURE: Final = ModelSignature(
             ColSpec(DataType.string, "problem_id"),
             ColSpec(DataType.long, "rank"),  # from 1
             ColSpec(DataType.long, "plan"),  # its number in the memory; -1: made of parts of stored plans
-            ColSpec(DataType.boolean, "free"),  # it answers the problem: checked exactly
+            ColSpec(DataType.boolean, "free"),  # it solves the problem: checked exactly
             ColSpec(DataType.double, "score"),  # the encoder's, higher is better
             ColSpec(DataType.double, "dt"),  # seconds
             ColSpec(_ROWS, "states"),  # [T, S] in the problem's own frame
@@ -81,8 +81,8 @@ class MemoryModel(PythonModel):
     ) -> pd.DataFrame:
         """The ``top_k`` best plans for each problem, best first.
 
-        There are none if the encoder says that none fits. A library, and a memory whose problem is at another
-        distance, from a motion or to a pose, has at most one: a free plan made of parts of stored plans.
+        There are none if the encoder says that none fits. From a library, and for a problem that is not
+        canonical, there is at most one: a free plan made of parts of stored plans.
 
         Raises MlflowException, with one line, if a problem is malformed or impossible.
         """
@@ -131,7 +131,7 @@ def pyfunc_of(model: MemoryModel) -> PyFuncModel:
 
 
 def _refuse_too_many_corners(fields: object) -> None:
-    """Raise ValueError if the polygons have so many corners that other requests would have to wait."""
+    """Raise ValueError if the polygons have so many corners that other requests would wait too long."""
     polygons = fields.get("obstacles") if isinstance(fields, Mapping) else None
     corners = (
         [len(polygon) for polygon in polygons if isinstance(polygon, list)]

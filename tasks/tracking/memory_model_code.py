@@ -1,4 +1,4 @@
-"""All the code that MLflow keeps of a memory's model; the rest is the installed package's."""
+"""All the code that MLflow stores for a memory's model; the rest is in the installed package."""
 
 from mlflow.models import set_model
 

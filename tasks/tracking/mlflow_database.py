@@ -1,7 +1,7 @@
 """Make MLflow's database in a data folder, or upgrade it to the schema of the installed MLflow.
 
-MLflow changes the tables one by one, and a kill in between leaves a database that nothing can open. So a copy
-is upgraded, which then replaces the database in one step. The old database is kept beside it.
+MLflow changes the tables one by one, and a kill in between leaves a database that nothing can open. Therefore
+a copy is upgraded and then replaces the database in one step. The old database is kept beside it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def ready_database(data: DataFolder) -> None:
-    """Make the database of a data folder if there is none; upgrade it if an older MLflow made it.
+    """Create the database of a data folder if there is none; upgrade it if an older MLflow made it.
 
     Raises:
         RunError: a newer MLflow made the database.

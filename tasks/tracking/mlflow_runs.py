@@ -32,9 +32,9 @@ EXPERIMENT: Final = "motion-memory"
 RUN_TAG: Final = "motion_memory.run"  # the name of the run's folder
 STAGE_TAG: Final = "motion_memory.stage"  # "run", "train trap", "benchmark", ...
 KEY_TAG: Final = "motion_memory.key"  # digest of what the logged content depends on
-MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory logged_model with its encoder
+MEMORY_TAG: Final = "motion_memory.memory"  # of a training: the memory that was logged with its encoder
 MODEL_TAG: Final = "motion_memory.model"  # of a training: the id of that memory's model
-_TRAINING: Final = "workflowType=machine_learning"  # or MLflow opens its pages for language models
+_TRAINING: Final = "workflowType=machine_learning"  # otherwise MLflow opens its pages for language models
 PARENT_TAG: Final = "mlflow.parentRunId"  # MLflow's own: nests a run
 
 
@@ -89,11 +89,11 @@ class Tracker:
     def run(
         self, run_name: str, stage: str, tags: Mapping[str, str], parent: str | None = None
     ) -> Iterator[str]:
-        """Open the MLflow run of a stage, or make it; it ends as FINISHED, or as FAILED on an error.
+        """Open the MLflow run of a stage, or create it; it ends as FINISHED, or as FAILED on an error.
 
         Args:
             run_name: the name of the run's folder.
-            stage: "run" for the parent run, else what the child run is of, such as "train trap".
+            stage: "run" for the parent run, else the stage of the child run, such as "train trap".
             tags: set on the MLflow run.
             parent: the id of the parent run, or None.
 
@@ -159,7 +159,7 @@ class Tracker:
         )
 
     def parameters(self, run_id: str, values: Mapping[str, Any]) -> None:
-        """Log the parameters that the run does not have yet: MLflow lets none change."""
+        """Log the parameters that the run does not have yet; MLflow does not allow changes."""
         from mlflow.entities import Param
 
         logged = self._client.get_run(run_id).data.params
@@ -179,7 +179,7 @@ class Tracker:
             run_id: the MLflow run.
             rows: metrics by name, one row for each step.
             step: names the column that holds the step's number; None if there is one row.
-            model_id: the model that they are figures of, or None.
+            model_id: the model that the metrics describe, or None.
         """
         from mlflow.entities import Metric
 
@@ -228,13 +228,13 @@ class Tracker:
         return str(logged_model.model_id)
 
     def model_of(self, run_name: str, memory: str) -> str | None:
-        """The id of the model that a run has logged last of a memory, or None."""
+        """The id of the last model that a run has logged for a memory, or None."""
         condition = f"tags.`{RUN_TAG}` = '{run_name}' and tags.`{MEMORY_TAG}` = '{memory}'"
         runs = self._client.search_runs([self._experiment], filter_string=condition, max_results=1)
         return str(runs[0].data.tags[MODEL_TAG]) if runs else None
 
     def page(self, run_id: str, artifact: str = "") -> str | None:
-        """The address of a run's page, or of an artifact's; None if MLflow is a database and no server."""
+        """The address of a run's page, or of an artifact's; None if MLflow is a database without a server."""
         if not self.uri.startswith("http"):
             return None
         shown = f"/artifacts/{artifact}" if artifact else ""
@@ -247,7 +247,7 @@ class Tracker:
         Args:
             run_id: the MLflow run.
             name: the name of the data.
-            path: where the data lie, a Parquet file or a folder of such files.
+            path: a Parquet file, or a folder of such files.
             digest: of their content.
             context: what the data was used for: "training" or "benchmark".
         """

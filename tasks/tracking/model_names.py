@@ -1,4 +1,4 @@
-"""What memories are called as models of MLflow, logged and registered."""
+"""The names of memories as logged and registered models in MLflow."""
 
 from __future__ import annotations
 

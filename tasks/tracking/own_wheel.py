@@ -1,4 +1,4 @@
-"""The installed package as a wheel, made of its own files, so that a model can carry the code it needs."""
+"""The installed package as a wheel, made from its own files, so that a model contains the code it needs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TAGS: Final = "Wheel-Version: 1.0\nGenerator: motion-memory\nRoot-Is-Purelib: t
 def write_wheel(folder: Path) -> Path:
     """Write the wheel of the installed package into a folder, with the same bytes each time; return its path.
 
-    It holds what ``pip wheel`` would put into it, also if the package is installed from a checkout.
+    It holds what ``pip wheel`` would put into it, even if the package is installed from a checkout.
     """
     installed = distribution(DISTRIBUTION)
     stem = f"{DISTRIBUTION.replace('-', '_')}-{installed.version}"

@@ -1,4 +1,4 @@
-"""A run's settings as flat texts, by which MLflow can compare and search runs."""
+"""A run's settings as flat texts, with which MLflow can compare and search runs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tasks.settings.run_settings import RunSettings
 def parameters_of(settings: RunSettings) -> dict[str, str]:
     """Each setting under its name; nested settings are joined with a dot, such as ``learning.margin``."""
     values = asdict(settings) | {"hallucination": _shares(settings), "assists": _assists(settings)}
-    del values["left_out"]  # it is found while the run is done, and parameters stay as they were
+    del values["left_out"]  # it is found during the run, and parameters cannot change
     return dict(_leaves("", values))
 
 

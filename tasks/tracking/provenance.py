@@ -1,4 +1,4 @@
-"""Where a run in MLflow comes from: who started it, from which commit, by which run in Prefect."""
+"""The origin of a run in MLflow: who started it, from which commit, and which run in Prefect."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tasks.settings.redaction import redacted
 
 
 def provenance() -> dict[str, str]:
-    """Tags with the names that MLflow shows as user, source and version; what is not known is left out."""
+    """Tags with the names that MLflow shows as user, source and version; unknown ones are left out."""
     try:
         user = getpass.getuser()
     except (KeyError, OSError, ImportError):  # a container whose user has no name

@@ -1,4 +1,4 @@
-"""Log the report of a run in MLflow: what was found, all figures, and what each model is worth."""
+"""Log the report of a run in MLflow: the findings, all figures, and the value of each model."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SUMMARY_METRICS = (
 
 
 def log_report(data: str, settings: RunSettings, report: Report) -> None:
-    """Log the benchmark as a child run, and on the parent run what was found and how runs are compared.
+    """Log the benchmark as a child run; log the findings and the headline metrics on the parent run.
 
     Args:
         data: the data folder.
@@ -50,7 +50,7 @@ def log_report(data: str, settings: RunSettings, report: Report) -> None:
 
 
 def _log_figures(data: str, settings: RunSettings, report: Report, run_id: str) -> None:
-    """Log the figures of every class, planner and configuration, and of each model what it is worth."""
+    """Log the figures of every class, planner and configuration, and the value of each model."""
     log = tracker(data)
     metrics: dict[str, float] = {}
     for row in report.summary.to_dict("records"):
@@ -65,7 +65,7 @@ def _log_figures(data: str, settings: RunSettings, report: Report, run_id: str) 
 
 
 def pages_of(data: str, settings: RunSettings) -> dict[str, str]:
-    """Pages in MLflow about a run, by title; none if MLflow is a database and no server."""
+    """Pages in MLflow about a run, by title; none if MLflow is a database without a server."""
     log = tracker(data)
     run, benchmark = (log.find(settings.run_name, stage) for stage in ("run", "benchmark"))
     pages = {
@@ -76,7 +76,7 @@ def pages_of(data: str, settings: RunSettings) -> dict[str, str]:
 
 
 def _description(data: str, settings: RunSettings, report: Report) -> str:
-    """What a run's page in MLflow shows first: what was found, and links to the report and to Prefect."""
+    """The top of a run's page in MLflow: the findings, and links to the report and to Prefect."""
     prefect = flow_run_tags().get("prefect.flow_run_url")
     links = pages_of(data, settings) | ({"Run in Prefect": prefect} if prefect else {})
     linked = [f"[{name}]({address})" for name, address in links.items() if name != "MLflow"]

@@ -16,14 +16,14 @@ _TYPES: Final = {  # of columns, in MLflow's words; all others are shown as text
 
 
 class TableShape(NamedTuple):
-    """What MLflow shows of a data set."""
+    """What MLflow shows about a data set."""
 
     schema: str  # the columns with their types
     profile: str  # how large it is
 
 
 def table_shape(shards: Sequence[Path]) -> TableShape:
-    """The shape of a table that lies in one or more Parquet files of the same columns.
+    """The shape of a table in one or more Parquet files with the same columns.
 
     Raises StorageError if a file is missing or damaged.
     """

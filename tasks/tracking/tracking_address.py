@@ -1,4 +1,4 @@
-"""Where MLflow is. A robot asks for it, too, so this needs neither MLflow nor tables."""
+"""The address of MLflow. Robots use this too, so it needs neither MLflow nor tables."""
 
 from __future__ import annotations
 
