@@ -1,1 +1,1 @@
-"""Where things lie: the only code that touches bytes."""
+"""Where data is stored: the only code that reads and writes files."""

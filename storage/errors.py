@@ -8,14 +8,14 @@ class StorageError(Exception):
 
 
 class UnreachableError(StorageError):
-    """Object storage does not answer now, or answers with errors that may pass."""
+    """Object storage does not answer now, or answers with errors that may be temporary."""
 
 
 class InUseError(StorageError):
-    """Another process holds what is wanted."""
+    """Another process holds the wanted file or folder."""
 
 
 def sentence(subject: object, fault: object) -> str:
-    """One line of what is wrong with a ``subject``, with a full stop unless it ends in a question."""
+    """One line that says what is wrong with a ``subject``, with a full stop unless it ends in a question."""
     text = f"{subject} {fault}"
     return text if text.endswith(("?", ".")) else f"{text}."

@@ -1,4 +1,4 @@
-"""How JSON and fields that users hand in are read: no field may be unknown, and none may occur twice."""
+"""Strict reading of users' JSON and fields: no field may be unknown, and none may occur twice."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
 
     Args:
         text: the text.
-        where: where the text stands, for messages.
+        where: where the text comes from, for messages.
 
     Raises:
         StorageError: it is not JSON in UTF-8, or an object in it has a field twice.
@@ -50,10 +50,10 @@ def parse_json(text: str | bytes, where: str) -> Any:
 
 
 def _plain_object(text: str | bytes) -> dict[str, Any] | None:
-    """The object that a ``text`` holds, read in a fifth of the time, or None if it has to be read with care.
+    """The object in a plain ``text``, read in a fifth of the time, or None if it needs careful reading.
 
-    It is plain if its only texts are its fields and their values, none with a backslash. Then each has two
-    quotes, and a field that occurs twice leaves quotes over.
+    A text is plain if its only strings are its fields and their values, none with a backslash. Each string
+    then has two quotes, and a repeated field leaves extra quotes.
     """
     quote, escape = ('"', "\\") if isinstance(text, str) else (b'"', b"\\")
     try:
@@ -67,7 +67,7 @@ def _plain_object(text: str | bytes) -> dict[str, Any] | None:
 
 
 def nearest(given: str, names: Iterable[str]) -> str:
-    """What a message adds to a name that is unknown: in brackets the one that was meant, or nothing."""
+    """The part of a message about an unknown name that suggests the nearest known one; may be empty."""
     near = get_close_matches(given[:LONGEST].lower(), names, 1)
     return f" (nearest is {near[0]!r})" if near else ""
 
@@ -77,7 +77,7 @@ def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
 
     Args:
         fields: names of the fields of an object, or of the columns of a table.
-        names: those that are supported, which the message lists.
+        names: the supported names, which the message lists.
     """
     for field in fields:
         if field not in names:
@@ -94,11 +94,11 @@ def number_of(value: object, name: str) -> float:
     try:
         return float(value)
     except OverflowError:
-        return math.inf  # which checks refuse
+        return math.inf  # which the checks refuse
 
 
 def scale_of(value: object) -> float:
-    """Metres of the world outside in a canonical metre, 1 for None. Raises ValueError beyond the limits."""
+    """Real metres in a canonical metre; 1 for None. Raises ValueError beyond the limits."""
     scale = 1.0 if value is None else number_of(value, "scale")
     if not SMALLEST_SCALE <= scale <= LARGEST_SCALE:
         raise ValueError(
@@ -109,14 +109,14 @@ def scale_of(value: object) -> float:
 
 
 def text_of(value: object, name: str) -> str:
-    """The printable text that the field ``name`` holds. Raises ValueError if it holds none."""
+    """The printable text in the field ``name``. Raises ValueError if it holds anything else."""
     if not isinstance(value, str) or not value.isprintable():
         raise ValueError(f"{name} must be printable text, got {short(value)}")
     return value
 
 
 def short(value: object) -> str:
-    """A ``value`` as a message quotes it, in one line."""
+    """A ``value`` as quoted in a message, on one line."""
     text = repr(value)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 

@@ -1,4 +1,4 @@
-"""Strict reading of YAML: no aliases, no field twice, not more lists than are of use."""
+"""Strict reading of YAML: no aliases, no repeated fields, no more lists than are useful."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def yaml_fields(file: Path, what: str, names: Sequence[str], most_brackets: int)
     text = read_text(file)
     if text.count("[") + text.count("{") > most_brackets:
         raise ValueError(f"has more brackets than any {what}")
-    try:  # an alias stands for what was written before: a few lines of them could fill memory
+    try:  # aliases repeat earlier content: a few lines of them could fill memory
         events = yaml.parse(text, Loader=yaml.SafeLoader)
         alias = next((event.anchor for event in events if isinstance(event, yaml.AliasEvent)), None)
         node, fields = (None, None) if alias else (yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text))

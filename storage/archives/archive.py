@@ -1,4 +1,4 @@
-"""Archives: folders of named files with a header and checksums, written whole or not at all.
+"""Archives: folders of named files with a header and checksums, written completely or not at all.
 
 Reading one runs nothing, imports nothing and unpickles nothing: files are mapped, measured and hashed before
 their contents are used.
@@ -26,16 +26,16 @@ from storage.places.mirror import fetch_folder
 from storage.vehicles.definitions import definition_of
 from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
-VERSION: Final = 2  # one more whenever an older program could no longer read an archive
+VERSION: Final = 2  # increased whenever older programs can no longer read new archives
 LARGEST_HEADER_BYTES: Final = 1 << 24
 _NAME: Final = re.compile(r"[a-z0-9_]{1,40}\.[a-z]{1,20}")
 
-Contents = mmap.mmap  # a whole file, writable: kernels would be compiled anew for read-only arrays
+Contents = mmap.mmap  # a whole file, writable, because kernels would be compiled again for read-only arrays
 Files = Mapping[str, bytes | Array]
 
 
 def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str, Any], files: Files) -> None:
-    """Write an archive as one ``folder``, in place of what was there; the same content gives the same bytes.
+    """Write an archive as one ``folder``, replacing what was there; the same content gives the same bytes.
 
     Args:
         folder: where the archive is written.
@@ -45,7 +45,7 @@ def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str
         files: contents by name; arrays are written as ``.npy``.
 
     Raises:
-        StorageError: it cannot be written; the folder is then as it was.
+        StorageError: it cannot be written; the folder is then unchanged.
     """
     with whole_folder(folder) as temporary:
         for name, data in files.items():
@@ -69,16 +69,16 @@ def write_archive(folder: Path, kind: str, vehicle: Vehicle, header: Mapping[str
 
 
 def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, Any], dict[str, Contents]]:
-    """The header of an archive, and its files by name, after every byte was compared with what was written.
+    """The header of an archive and its files by name, after verifying every byte against the checksums.
 
     Args:
         folder: folder of the archive.
-        kind: the kind that it has to be of.
-        vehicle: the vehicle that it has to be made for.
+        kind: the kind that it must have.
+        vehicle: the vehicle that it must be made for.
 
     Raises:
-        StorageError: it is missing or damaged, has more or fewer files, or is of another version, for another
-            vehicle or grid.
+        StorageError: it is missing or damaged, has extra or missing files, has another version, or is for
+            another vehicle or grid.
     """
     header = _header(folder, kind)
     refuse_another(folder, header.get("vehicle"), vehicle)
@@ -119,7 +119,7 @@ def archived_vehicle(folder: Path, kind: str) -> Vehicle:
 
 
 def _header(folder: Path, kind: str) -> dict[str, Any]:
-    """The header of an archive of this version, the same to the last byte as it was written."""
+    """The header of an archive of this version, exactly as it was written."""
     path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
         raise StorageError(
@@ -179,7 +179,7 @@ def _size_of_plain_file(path: Path) -> int:
 def _hashed(paths: list[Path]) -> dict[str, tuple[Contents, str]]:
     """Contents and checksum of files, by name."""
     by_name = {}
-    for path in paths:  # threads gain nothing: one file, the states, is most of an archive
+    for path in paths:  # threads would not help: most of an archive is one file, the states
         try:
             with path.open("rb") as file:
                 contents = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_COPY)

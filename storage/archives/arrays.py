@@ -1,7 +1,7 @@
-"""Arrays as ``.npy`` files, which NumPy reads too; their headers are compared and never parsed.
+"""Arrays as ``.npy`` files, which NumPy can read too; their headers are compared and never parsed.
 
-The header of an array follows from its type, its columns and the size of its file. The numbers are used where
-the file is mapped, without a copy.
+The header of an array follows from its type, its columns and the size of its file. The numbers are used from
+the mapped file, without a copy.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Checkpoints: a training after its last finished epoch, from which a killed one goes on."""
+"""Checkpoints: the state of a training after its last finished epoch, from which a killed one resumes."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _KEY: Final = "key"
 
 
 def save_checkpoint(path: Path, checkpoint: Checkpoint, key: str) -> None:
-    """Write a ``checkpoint`` to ``path``, whole or not at all; ``key`` says which training it belongs to."""
+    """Write a ``checkpoint`` to ``path`` atomically; ``key`` says which training it belongs to."""
     tensors = {**checkpoint._asdict(), "history": packed_epochs(checkpoint.history)}
     with whole_file(path, f"{len(checkpoint.history)} {key}") as temporary:
         save_file(tensors, temporary, {_KEY: key})
 
 
 def load_checkpoint(path: Path, key: str) -> Checkpoint | None:
-    """The checkpoint at ``path`` of the training ``key``; None if there is none to go on from."""
+    """The checkpoint at ``path`` of the training ``key``; None if there is none to resume from."""
     tensors = _tensors(path, key, Checkpoint._fields)
     if tensors is None:
         return None

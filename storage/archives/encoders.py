@@ -1,4 +1,4 @@
-"""Trained encoders on disk: all that training leaves, to build a memory or to compare trainings."""
+"""Trained encoders on disk: everything needed to build a memory or to compare trainings."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def save_encoder(folder: Path, trained: TrainedEncoder, vehicle: Vehicle = CAR) 
 def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
     """The encoder in a ``folder``, trained for a ``vehicle``.
 
-    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version, for
+    Raises StorageError if it is missing or damaged, contradicts its header, has another version, or is for
     another vehicle or grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
@@ -61,7 +61,7 @@ def load_encoder(folder: Path, vehicle: Vehicle = CAR) -> TrainedEncoder:
 
 
 def _settings(described: object) -> TrainingSettings:
-    """The settings that a header describes. Raises ValueError or TypeError if no training had such."""
+    """The settings that a header describes. Raises ValueError or TypeError if they are impossible."""
     if not isinstance(described, dict):
         raise ValueError(f"its settings are {short(described)}, expected an object")
     others = {name: value for name, value in described.items() if name != "architecture"}

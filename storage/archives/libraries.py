@@ -1,4 +1,4 @@
-"""Libraries of plans on disk: archives of the plans as plain arrays, and of what they answered."""
+"""Libraries of plans on disk: archives of the plans as plain arrays, and of the questions they answer."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from storage.places.run_folder import checked_name
 _KIND: Final = "library"
 _HEADER: Final = f"{_KIND}.json"
 HEADERS: Final = ("memory.json", _HEADER)  # one of these files is in the folder of a memory, of a library
-_DRIFT: Final = 1e-6  # metres and radians by which states may differ from those of the controls
+_DRIFT: Final = 1e-6  # metres and radians by which states may differ from the simulated controls
 
 
 def save_library(folder: Path, library: PlanLibrary) -> None:
@@ -38,11 +38,11 @@ def save_library(folder: Path, library: PlanLibrary) -> None:
 def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
     """The library of a ``vehicle`` in a ``folder``; its plans are read from the disk when used.
 
-    Checksums say that files are as they were written, not that they are true. So the controls of every plan
-    are simulated again, and have to lead through its states.
+    Checksums show that files are unchanged, not that they are true. Therefore the controls of every plan are
+    simulated again, and must lead through its states.
 
-    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version or
-    for another vehicle.
+    Raises StorageError if it is missing or damaged, contradicts its header, has another version, or is for
+    another vehicle.
     """
     header, files = read_archive(folder, _KIND, vehicle)
     try:
@@ -63,13 +63,13 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
 
 
 def is_library(folder: Path) -> bool:
-    """Whether a ``folder`` holds a library, whole or not, and nothing else."""
+    """Whether a ``folder`` holds a library, complete or not, and nothing else."""
     names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
     return _HEADER in names and names <= {_HEADER, *PLAN_FILES}
 
 
 def is_memory_or_library(folder: Path) -> bool:
-    """Whether a ``folder`` holds a memory or a library, whole or not, and nothing else."""
+    """Whether a ``folder`` holds a memory or a library, complete or not, and nothing else."""
     return is_memory(folder) or is_library(folder)
 
 

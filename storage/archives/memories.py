@@ -1,7 +1,7 @@
 """Memories on disk: archives of the encoder, its readout, and the plans as plain arrays.
 
-Small arrays are safetensors. Those that grow with the plans lie in ``.npy`` files, which stay on the disk
-until they are used.
+Small arrays are safetensors. Arrays that grow with the plans are ``.npy`` files, which stay on the disk until
+they are used.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ _READOUT: Final = "readout.safetensors"
 _FILES: Final = {
     _WEIGHTS, _READOUT, *PLAN_FILES, "masks.npy", "boxes.npy",
 }  # fmt: skip
-SWEPT_AT_ONCE: Final = 1_000  # plans, whose boxes take 10 MB
-_LISTS: Final = "lists.safetensors"  # only in a memory of very many plans
+SWEPT_AT_ONCE: Final = 1_000  # plans; their boxes take 10 MB
+_LISTS: Final = "lists.safetensors"  # only in a memory with very many plans
 _UNREAD: Final = "encoder.onnx"  # earlier versions wrote it for other programs
 
 
@@ -74,14 +74,14 @@ def save_memory(folder: Path, memory: Memory) -> None:
 def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
     """The memory of a ``vehicle`` in a ``folder``; its plans and boxes are read from the disk when used.
 
-    Checksums say that files are as they were written, not that they are true. So every plan is swept again,
-    and its boxes and masks must be the same to the last bit (kernels give the same bits everywhere): no plan
-    may count as free because of boxes that are not its own, or that an older program made smaller. For 100
-    plans that takes 4 ms, for 10,000 a quarter of a second (hashing the files: a sixth). Boxes are compared
-    and not replaced, so that processes go on sharing the files' memory; unless all are of other sizes, as
-    where an older version took other margins.
+    Checksums show that files are unchanged, not that they are true. Therefore every plan is swept again, and
+    its boxes and masks must be the same to the last bit (kernels give the same bits everywhere). No plan may
+    count as free because of boxes that are not its own, or that an older program made smaller. This takes
+    4 ms for 100 plans and a quarter of a second for 10,000 (hashing the files takes a sixth). Boxes are
+    compared, not replaced, so that processes keep sharing the files' memory, unless all boxes have other
+    sizes because an older version used other margins.
 
-    Raises StorageError if it is missing or damaged, does not hold what it says, or is of another version, for
+    Raises StorageError if it is missing or damaged, contradicts its header, has another version, or is for
     another vehicle or grid.
     """
     header, files = read_archive(folder, _KIND, vehicle)
@@ -121,15 +121,15 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
 
 
 def is_memory(folder: Path) -> bool:
-    """Whether a ``folder`` holds a memory, whole or not, and nothing else."""
+    """Whether a ``folder`` holds a memory, complete or not, and nothing else."""
     names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
     return f"{_KIND}.json" in names and names <= {f"{_KIND}.json", _LISTS, _UNREAD, *_FILES}
 
 
 def _swept(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> tuple[PlanSweeps, Bits]:
-    """The sweeps with the stored boxes, and masks; made anew if all stored boxes are of other sizes.
+    """The sweeps with the stored boxes, and the masks; computed if all stored boxes have other sizes.
 
-    Raises ValueError if boxes or masks are not those of the plans.
+    Raises ValueError if boxes or masks do not match the plans.
     """
     sweeps = sweeps_with(boxes, plans)
     anew: list[tuple[Floats, Bits]] = []

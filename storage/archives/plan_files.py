@@ -1,4 +1,4 @@
-"""Many plans among the files of an archive: four arrays, which stay on the disk until they are used."""
+"""Many plans in an archive: four arrays, which stay on the disk until they are used."""
 
 from __future__ import annotations
 

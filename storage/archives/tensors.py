@@ -31,7 +31,7 @@ def unpacked(contents: mmap | bytes) -> dict[str, Array]:
 def check_floats(tensors: Mapping[str, Array], shapes: Shapes) -> None:
     """Raise ValueError unless ``tensors`` are float32 arrays with the names and shapes of ``shapes``.
 
-    Infinite numbers are fine, for centroids far away and rows that cannot be; NaN would compare as anything.
+    Infinite numbers are allowed, for centroids that cannot win; NaN is not, because it compares as anything.
     """
     different = ", ".join(sorted(tensors.keys() ^ shapes.keys()))
     if different:

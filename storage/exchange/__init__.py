@@ -1,1 +1,1 @@
-"""Files that people hand in and take away: problems, plans, exports for other tools."""
+"""Files that users provide and receive: problems, plans, exports for other tools."""

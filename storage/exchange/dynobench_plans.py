@@ -22,7 +22,7 @@ MOST_TRAILERS: Final = 1  # of dynobench's models
 def export_plan(path: Path, out: Path) -> None:
     """Write the plan in the file at ``path`` to ``out``, as a trajectory of dynobench.
 
-    Raises StorageError if it is no plan, holds none, or is of a vehicle that dynobench has no model for.
+    Raises StorageError if it is not a plan, holds none, or is for a vehicle that dynobench has no model for.
     """
     fields = read_json(path)
     vehicle = vehicle_recorded(fields.get("vehicle")) if isinstance(fields, dict) else None
@@ -64,8 +64,8 @@ def trajectory_of(record: PlanRecord, plan: Plan, vehicle: Vehicle) -> str:
 def states_and_actions(plan: Plan, vehicle: Vehicle) -> tuple[Floats, Floats]:
     """The rows of a ``plan`` as those of dynobench's models: states ``[T, n]``, actions ``[T - 1, 2]``.
 
-    A trailer has a heading there instead of a hitch angle. Of the first order, speed and steering (or turn
-    rate) are not states but the actions: those that a step takes on at its beginning.
+    There, a trailer has a heading instead of a hitch angle. In first-order models, speed and steering (or
+    turn rate) are not states but actions, which a step takes on at its beginning.
     """
     states = plan.states.copy()
     states[:, 5:] = states[:, 2:3] - np.cumsum(states[:, 5:], axis=1)

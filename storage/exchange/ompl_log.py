@@ -1,4 +1,4 @@
-"""Attempts as OMPL benchmark logs, one a problem class, which ``ompl_benchmark_statistics`` reads."""
+"""Attempts as OMPL benchmark logs, one per problem class, which ``ompl_benchmark_statistics`` reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from storage.places.files import whole_folder
 
 
 def write_ompl_logs(folder: Path, classes: dict[str, Path], origin: Origin) -> None:
-    """Make a ``folder`` of logs ``<class>.log``, whole or not at all.
+    """Make a ``folder`` of logs ``<class>.log``, completely or not at all.
 
     The rows go through a database for Planner Arena, which sorts them by planner on the disk.
 
@@ -32,7 +32,7 @@ def write_ompl_logs(folder: Path, classes: dict[str, Path], origin: Origin) -> N
 
 
 def _write_log(log: TextIO, database: sqlite3.Connection, experiment: tuple[object, ...]) -> None:
-    """Write one experiment in the words that the reader looks for."""
+    """Write one experiment with the words that the reader looks for."""
     number, name, total, seconds, megabytes, count, version, host, processor, date, seed, setup = experiment
     library, _, release = str(version).partition(" ")
     log.write(f"{library} version {release}\nExperiment {name}\nRunning on {host}\nStarting at {date}\n")

@@ -86,13 +86,13 @@ def enums() -> dict[str, list[str]]:
 
 @contextmanager
 def opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """The database at ``path``, committed at the end unless something is raised, and always closed."""
+    """The database at ``path``; it is committed unless an error is raised, and always closed."""
     with closing(sqlite3.connect(path)) as database, database:
         yield database
 
 
 def write_planner_arena(path: Path, classes: dict[str, Path], origin: Origin) -> None:
-    """Make a database at ``path`` of the attempts below the folder of each class.
+    """Make a database at ``path`` from the attempts below the folder of each class.
 
     Args:
         path: file of the new database.

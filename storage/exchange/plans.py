@@ -1,4 +1,4 @@
-"""Plans in files: all that is needed to simulate a plan again and judge it."""
+"""Plans in files: everything needed to simulate a plan again and judge it."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class PlanRecord:
     planner: str
     assist: str
     planning_seconds: float
-    plan: Plan | None  # in the lengths of its problem, whereas files hold those of the world outside
+    plan: Plan | None  # in the problem's units of length; files use real metres
     vehicle: Vehicle = CAR
-    scale: float = 1.0  # metres of the world outside in one of the plan's
+    scale: float = 1.0  # real metres in one metre of the plan
     offset: Point = (0.0, 0.0)  # real metres: where the plan's origin lies in the frame of the file
 
 
@@ -51,7 +51,7 @@ def plan_fields(record: PlanRecord) -> dict[str, Any]:
     """The fields of a ``record`` as in the plan contract's JSON.
 
     Without a plan, states and controls are empty and lengths null. If the scale is not 1, positions, speeds
-    and accelerations are those of a vehicle that is so much larger.
+    and accelerations are multiplied by it.
     """
     plan = record.plan and shifted(scaled(record.plan, record.scale), record.offset)
     scale = {} if record.scale == 1.0 else {"scale": record.scale}
@@ -69,7 +69,7 @@ def plan_fields(record: PlanRecord) -> dict[str, Any]:
 
 
 def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
-    """The plan of a ``vehicle`` in the file at ``path``, in its problem's lengths, and where it came from.
+    """The plan for a ``vehicle`` in the file at ``path``, in its problem's units, and where it came from.
 
     Raises StorageError if the file is missing or is not JSON, has an unknown field or lacks one, was made for
     another vehicle, or holds what no vehicle could have driven.
@@ -79,7 +79,7 @@ def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
         if not isinstance(fields, dict):
             raise ValueError(f"holds {short(fields)}, expected the object of a plan")
         check_fields(list(fields), FIELDS)
-        refuse_another(path, fields.get("vehicle", name_of(CAR)), vehicle)  # once files were of the car alone
+        refuse_another(path, fields.get("vehicle", name_of(CAR)), vehicle)  # once all files were for the car
         return _record(fields, vehicle)
     except KeyError as error:
         raise StorageError(f"{path} lacks the field {error}; is it a plan?") from None
@@ -129,7 +129,7 @@ def _rows(rows: object, name: str) -> Floats:
     """Numbers ``[T, n]``; an empty list is ``[0, 2]``."""
     try:
         array = np.array(rows)
-    except ValueError:  # rows of different lengths, or lists without end
+    except ValueError:  # rows of different lengths, or endlessly nested lists
         array = np.array(None)
     if array.shape == (0,):
         return np.empty((0, 2))

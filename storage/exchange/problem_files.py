@@ -1,4 +1,4 @@
-"""Files of problems, read object by object, whole or in slices, with only the current ones in memory."""
+"""Files of problems, read one by one or in slices, with only the current problems in memory."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ FIELDS: Final = (
     *QUESTION_FIELDS,
 )  # fmt: skip
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
-SLICES_A_GROUP: Final = 16  # to read the last rows of a row group, those before are decoded too
+SLICES_A_GROUP: Final = 16  # reading the last rows of a row group also decodes those before
 BUFFER_BYTES: Final = 1 << 20
 
 
 @dataclass(frozen=True)
 class ProblemSlice:
-    """Some consecutive problems of a file, and where they begin, so that nothing before need be read."""
+    """Some consecutive problems of a file, and where they begin, so that nothing before is read."""
 
     path: Path
     first: int  # number of the first line or problem, counted from 1
     count: int  # problems
     offset: int  # in a text the first byte; in a Parquet file the first row in the row group
     group: int  # row group; 0 in a text
-    digest: str  # of the content that it is read from
+    digest: str  # of the content of the slice
 
 
 def format_of(path: Path) -> str:
-    """The ending of ``path``, which says its format. Raises StorageError if problems have no such files."""
+    """The ending of ``path``, which gives its format. Raises StorageError for any other ending."""
     if path.suffix not in FORMATS:
         cut = ", or make problems from a map or worlds with import-worlds" if path.exists() else ""
         raise StorageError(
@@ -58,7 +58,7 @@ def check_problem_fields(fields: Sequence[object]) -> None:
 
 
 def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
-    """The objects in the file at ``path`` and their numbers, of the line or counted from 1.
+    """The objects in the file at ``path`` and their numbers: the line, or counted from 1.
 
     Raises StorageError if the file is missing or damaged; its message names the line.
     """
@@ -72,10 +72,10 @@ def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
 
 
 def slices_of(path: Path, size: int) -> list[ProblemSlice]:
-    """The file at ``path`` in slices of ``size`` problems, or more in a long row group; a text is read once.
+    """Split the file at ``path`` into slices of ``size`` problems, or more in a long row group.
 
-    Slices and digests depend on the file's content alone, so a corrected line leaves the slices before it as
-    they are. Raises StorageError if the file is missing or damaged.
+    Slices and digests depend only on the file's content, so correcting a line does not change the slices
+    before it. Raises StorageError if the file is missing or damaged.
     """
     match format_of(path):
         case ".json":
@@ -178,7 +178,7 @@ def _rows(
 
 @contextmanager
 def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    import pyarrow as pa  # late: a robot has no pyarrow
+    import pyarrow as pa  # late: a robot may not have pyarrow
     import pyarrow.parquet as pq
 
     try:

@@ -1,4 +1,4 @@
-"""Problems in the files of users: ``.json`` (one), ``.jsonl`` (one a line), ``.parquet``."""
+"""Problems in users' files: ``.json`` (one), ``.jsonl`` (one per line), ``.parquet``."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str
 
     Args:
         path: file in a format that its ending names.
-        vehicle: the vehicle that has to have room at the start.
+        vehicle: the vehicle that must have room at the start.
 
     Raises:
         StorageError: the file itself is missing, unreadable or of an unknown format.
@@ -102,11 +102,11 @@ def vehicle_of_problems(path: Path) -> Vehicle | None:
 
 
 def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = CAR) -> None:
-    """Write ``problems`` for a ``vehicle`` to ``path``, whole or not at all, in the format of its ending.
+    """Write ``problems`` for a ``vehicle`` to ``path``, all or none, in the format of its ending.
 
-    Each convex piece becomes a polygon; ``groups`` says which belong to one obstacle. Files hold the lengths
-    of the world outside, a problem's own times its scale. Reading gives the same problems back, exactly, or
-    to the last digit if the scale is not 1.
+    Each convex piece becomes a polygon; ``groups`` says which pieces belong to one obstacle. Files hold real
+    metres, which are a problem's own lengths times its scale. Reading gives the same problems back: exactly,
+    or up to the last digit if the scale is not 1.
     """
     rows = [fields_of(problem, vehicle) | statement_of(vehicle) for problem in problems]
     match format_of(path):
@@ -120,14 +120,14 @@ def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = C
             with whole_file(path) as temporary, temporary.open("w", encoding="utf-8") as file:
                 file.writelines(json.dumps(row, allow_nan=False, ensure_ascii=False) + "\n" for row in rows)
         case _:
-            from storage.tables.schemas import PROBLEMS  # late: a robot has no pyarrow
+            from storage.tables.schemas import PROBLEMS  # late: a robot may not have pyarrow
             from storage.tables.shards import table_of, write_table
 
             write_table(path, table_of([as_text(row) for row in rows], PROBLEMS, "problem"))
 
 
 def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Problem:
-    """The problem that the contract's object ``fields`` describes, checked for a ``vehicle``.
+    """The problem that ``fields`` of the exchange format describe, checked for a ``vehicle``.
 
     Args:
         fields: the fields by name.
@@ -208,7 +208,7 @@ def _text(fields: Mapping[str, Any], name: str, default: str) -> str:
 
 
 def fields_of(problem: Problem, vehicle: Vehicle = CAR) -> dict[str, Any]:
-    """The contract's object that describes a ``problem`` for a ``vehicle``, as ``problem_of`` takes it."""
+    """The fields of the exchange format for a ``problem`` and a ``vehicle``, as ``problem_of`` takes them."""
     obstacles, scale, offset = problem.obstacles, problem.scale, problem.offset
     x, y, heading = problem.start
     groups = np.diff(obstacles.obstacle_starts).tolist()

@@ -1,4 +1,4 @@
-"""The fields of a problem that say with what motion a drive begins, and how it is to end."""
+"""The fields of a problem that describe the motion at the start and the arrival at the goal."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
 
 
 class Goal(NamedTuple):
-    """What a problem asks for at its end, in the lengths of its file."""
+    """What a problem asks for at the goal, in the units of its file."""
 
     place: Point  # metres
     radius: float  # metres
@@ -30,7 +30,7 @@ class Goal(NamedTuple):
 def start_motion_of(fields: Mapping[str, Any], vehicle: Vehicle) -> tuple[float, ...]:
     """The motion that ``fields`` give at the start, in the order of the state of a ``vehicle``, speed first.
 
-    Raises ValueError if a field is malformed or the vehicle has nothing that it could mean.
+    Raises ValueError if a field is malformed or does not apply to the vehicle.
     """
     names = state_names(vehicle)[3:]
     hitches = [name for name in names if name.startswith("hitch")]
@@ -67,7 +67,7 @@ def _refuse_other_hitches(fields: Mapping[str, Any], trailers: int, vehicle: Veh
 
 
 def goal_of(fields: Mapping[str, Any]) -> Goal:
-    """The goal that ``fields`` describe. Raises ValueError, which says what is wrong with it."""
+    """The goal that ``fields`` describe. Raises ValueError if it is malformed."""
     goal = fields["goal"]
     if not isinstance(goal, list) or len(goal) not in (2, 3):
         raise ValueError(f"goal must be a list of 2 numbers, or 3 for a pose, got {short(goal)}")
@@ -123,7 +123,7 @@ def numbers_of(
 ) -> list[float]:
     """The ``count`` numbers that the field ``name`` lists, or the ``default`` if it is left out.
 
-    Raises ValueError if they are others.
+    Raises ValueError if the field holds anything else.
     """
     values = fields.get(name)
     if values is None and default is not None:

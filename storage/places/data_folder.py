@@ -26,8 +26,10 @@ from storage.places.mirror import (
 )
 from storage.places.run_folder import RunFolder, checked_name
 
-LAYOUT: Final = 1  # one more whenever an older program could no longer read the folder
-OWNER_ONLY: Final = 0o700  # of a folder that is made here; who wants it shared makes it, or uses chmod
+LAYOUT: Final = 1  # increased whenever older programs can no longer read the folder
+OWNER_ONLY: Final = (
+    0o700  # mode of a folder that is made here; to share it, create it beforehand or use chmod
+)
 MARK: Final = "motion-memory.json"
 HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
 
@@ -36,15 +38,15 @@ HOLDER: Final = ".holder"  # who has this copy of a folder in object storage
 class DataFolder:
     """A folder that holds runs, the tracking database and the orchestrator's own files.
 
-    One in object storage has a copy here (``mirror.py``); what is not written through this package, such as a
-    command's own Prefect server, stays in the copy.
+    A folder in object storage has a local copy (``mirror.py``). Files that are not written through this
+    package, such as those of a command's own Prefect server, stay in the copy.
     """
 
     path: Path  # absolute
 
     @property
     def place(self) -> str:
-        """What opens it again, on any machine: ``s3://bucket/folder`` or its path."""
+        """The place that opens it on any machine: ``s3://bucket/folder`` or its path."""
         return shown(self.path)
 
     @property
@@ -72,7 +74,7 @@ class DataFolder:
         return self.path / "learned" / checked_name(vehicle)
 
     def gained_folders(self) -> list[Path]:
-        """The folders of experiences that were gained on the job, one a vehicle."""
+        """The folders of experiences that were gained on the job, one per vehicle."""
         return folders_in(self.path / "learned")
 
     @property
@@ -81,16 +83,16 @@ class DataFolder:
         return self.path / "watched"
 
     def run(self, name: str) -> RunFolder:
-        """The folder of a run; a StorageError for a name that is no plain word."""
+        """The folder of a run. Raises StorageError unless the name is a plain word."""
         return RunFolder(self.path / "runs" / checked_name(name))
 
     def runs(self) -> list[RunFolder]:
-        """All runs that are there, by name."""
+        """All existing runs, by name."""
         return [RunFolder(path) for path in folders_in(self.path / "runs")]
 
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Hold the folder for this process; leftovers of killed writers are removed on the way in.
+        """Hold the folder for this process; leftovers of killed writers are removed first.
 
         StorageError: another command holds it; the message says which process.
         """
@@ -107,7 +109,7 @@ class DataFolder:
 
 
 def open_run(path: Path) -> RunFolder:
-    """The folder of a run that is there; a StorageError for any other place."""
+    """The folder of an existing run. Raises StorageError for any other path."""
     run = RunFolder(local_place(path))
     if not fetch(run.settings).is_file():
         raise StorageError(f"{path} is not a run: it has no {run.settings.name}; name a folder in DATA/runs.")
@@ -115,7 +117,7 @@ def open_run(path: Path) -> RunFolder:
 
 
 def open_data_folder(path: Path | str) -> DataFolder:
-    """Open a data folder, or make one of a missing or empty folder.
+    """Open a data folder, or create one if the folder is missing or empty.
 
     ``s3://bucket/folder`` is one in object storage.
 
@@ -145,7 +147,7 @@ def open_data_folder(path: Path | str) -> DataFolder:
 
 @functools.lru_cache(maxsize=8)
 def _open_remote(folder: Path) -> DataFolder:
-    """Open a folder in object storage, by its copy here; storage is asked once a process."""
+    """Open the local copy of a folder in object storage; storage is queried once per process."""
     try:
         folder.mkdir(OWNER_ONLY, parents=True, exist_ok=True)
     except OSError as error:
@@ -173,10 +175,10 @@ def _check_layout(folder: Path) -> None:
 
 
 def _holder(folder: Path) -> str:
-    """The name of this copy of a folder: whoever holds the copy may take over what it held in storage."""
+    """The name of this copy of a folder; whoever holds the copy may take over its lease in storage."""
     path = folder / HOLDER
     if not path.exists():
-        path.write_text(uuid.uuid4().hex)  # only the one who holds the lock comes here
+        path.write_text(uuid.uuid4().hex)  # only the holder of the lock gets here
     return path.read_text()
 
 

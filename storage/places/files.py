@@ -1,4 +1,4 @@
-"""Whole files and whole folders: whatever has its name is complete, whichever process was killed."""
+"""Atomic files and folders: whatever has its final name is complete, even if a process was killed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
         mode: permissions, from which the umask is taken.
 
     Raises:
-        StorageError: it cannot be written (disk full, no permission); ``path`` is then as it was.
+        StorageError: it cannot be written (disk full, no permission); ``path`` is then unchanged.
     """
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -54,7 +54,7 @@ def whole_file(path: Path, note: str = "", mode: int = 0o666) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Yield an empty temporary folder beside ``path``, and rename it to ``path`` once it is on the disk.
 
-    Raises StorageError if it cannot be written; ``path`` is then as it was.
+    Raises StorageError if it cannot be written; ``path`` is then unchanged.
     """
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,7 +67,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
                 _synchronise(file)
             _synchronise(temporary)
             publish_folder(temporary, path)
-            if path.exists():  # a full folder cannot be renamed over: the old one steps aside
+            if path.exists():  # a full folder cannot be replaced by renaming, so the old one is moved aside
                 path.replace(old)
             temporary.replace(path)
             _synchronise(path.parent)
@@ -83,8 +83,8 @@ def locked(path: Path, what: str) -> Iterator[None]:
     """Hold the lock file ``path`` for this process; a killed process loses it.
 
     Args:
-        path: the lock file; it is made if it does not exist.
-        what: what is in use while another process holds the lock, for the message.
+        path: the lock file; it is created if it does not exist.
+        what: the name of what is locked, for messages.
 
     Raises:
         InUseError: another process holds it; the message says which.
@@ -108,7 +108,7 @@ def locked(path: Path, what: str) -> Iterator[None]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Delete what killed writers left below ``folder``; only while no other process writes there."""
+    """Delete leftovers of killed writers below ``folder``; only while no other process writes there."""
     for leftover in [*folder.rglob(f".*{PARTIAL}")]:
         if leftover.is_dir():
             shutil.rmtree(leftover, ignore_errors=True)
@@ -126,12 +126,12 @@ def remove_folder(folder: Path) -> None:
 
 
 def write_json(path: Path, value: object, indent: int | None = 2) -> None:
-    """Write a ``value`` as JSON to ``path``, whole or not at all; the same value gives the same bytes.
+    """Write a ``value`` as JSON to ``path`` atomically; the same value gives the same bytes.
 
     Args:
         path: the file to write.
         value: a value that JSON can hold.
-        indent: spaces a level; None writes one line, ten times as fast.
+        indent: spaces per level; None writes one line, ten times as fast.
     """
     text = json.dumps(value, indent=indent, allow_nan=False, ensure_ascii=False) + "\n"
     with whole_file(path) as temporary:

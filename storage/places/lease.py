@@ -1,7 +1,7 @@
 """A lease: one command at a time holds a folder in object storage, and a dead one loses it.
 
-The lease is an object that is put only if there is none, and put again all the while. Another command may
-replace one that was not put again for a minute, by the server's own clock; of two that try, storage lets one
+The lease is an object that is created only if there is none, and is then renewed regularly. Another command
+may replace a lease that was not renewed for a minute by the server's clock; if two try, storage lets one
 succeed.
 """
 
@@ -29,13 +29,13 @@ _LOG = logging.getLogger(__name__)
 
 @contextmanager
 def leased(address: Address, owner: str, what: str) -> Iterator[None]:
-    """Hold the lease object at ``address`` for as long as this lasts.
+    """Hold the lease object at ``address`` while the context lasts.
 
     Args:
         address: address of the lease object.
-        owner: names what outlives a killed command. A command with the same owner takes the lease over at
-            once, and has to know by itself that the other is dead.
-        what: what is held, for messages.
+        owner: names something that outlives a killed command. A command with the same owner takes over the
+            lease at once, and has to make sure itself that the other command is dead.
+        what: the name of what is held, for messages.
 
     Raises:
         InUseError: another command holds it.
@@ -60,7 +60,7 @@ def leased(address: Address, owner: str, what: str) -> Iterator[None]:
 
 
 def _taken_over(address: Address, body: bytes, owner: str) -> str | None:
-    """The tag of the lease once it is ours instead of a dead command's; None if that one lives."""
+    """The tag of the lease after taking it over from a dead command; None if that command is alive."""
     head = objects.head(address)
     if head is None:
         return objects.put_if(address, body, None)
@@ -70,7 +70,7 @@ def _taken_over(address: Address, body: bytes, owner: str) -> str | None:
 
 
 def _keep(address: Address, body: bytes, owner: str, tag: str, what: str, ended: threading.Event) -> None:
-    """Put the lease again until the end; interrupt this command if another has taken it."""
+    """Renew the lease until the end; interrupt this command if another has taken it."""
     held: str | None = tag
     while not ended.wait(RENEWED_SECONDS):
         try:
@@ -87,7 +87,7 @@ def _keep(address: Address, body: bytes, owner: str, tag: str, what: str, ended:
 
 
 def _still_ours(address: Address, owner: str) -> str | None:
-    """The tag of the lease if it is ours after all: it was put, and only the answer was lost."""
+    """The tag of the lease if it is ours after all, because only the answer to creating it was lost."""
     head = objects.head(address)
     return head.etag if head is not None and _owner(address) == owner else None
 
@@ -95,7 +95,7 @@ def _still_ours(address: Address, owner: str) -> str | None:
 def _read(address: Address) -> dict[str, str]:
     try:
         fields: dict[str, str] = json.loads(objects.content(address))
-    except (StorageError, ValueError):  # it has just gone, or is no lease
+    except (StorageError, ValueError):  # it has just been deleted, or is not a lease
         return {}
     return fields
 

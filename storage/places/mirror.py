@@ -1,10 +1,10 @@
-"""A local copy of object storage: files are put there whole when written, and fetched when read.
+"""A local copy of object storage: files are uploaded when written, and fetched when read.
 
 A path below the cache folder stands for the object of the same name:
-``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. So any process of any machine knows from a
-path alone which object it is; nothing here applies to other paths. The object counts, the file is its copy,
-and the file's time marks which content it is a copy of. A folder that must appear at once is one object, a
-tar.
+``<cache>/<server>/<bucket>/<key>`` for ``s3://<bucket>/<key>``. Any process on any machine therefore knows
+from the path alone which object it is; nothing here applies to other paths. The object is the truth and the
+file its copy; the file's time marks which content it is a copy of. A folder that must appear at once is one
+object, a tar.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from storage.places.objects import Address
 
 SCHEME: Final = re.compile(r"s3:/{1,2}(?P<bucket>[^/]+)/?(?P<key>.*)")  # pathlib makes one slash of two
 FOLDER: Final = ".tar"
-PARTIAL: Final = ".partial"  # ending of what is still being written; nobody reads it
-_TICK: Final = 100  # nanoseconds that every usual file system keeps of a file's time
+PARTIAL: Final = ".partial"  # ending of files that are still being written; nobody reads them
+_TICK: Final = 100  # nanoseconds; every usual file system stores a file's time this precisely
 _SECOND: Final = 10**9
 
 _seen: ContextVar[set[Path] | None] = ContextVar("seen", default=None)
@@ -56,7 +56,7 @@ def local_place(place: Path | str) -> Path:
 
 
 def shown(path: Path) -> str:
-    """The name of a ``path`` for people and other programs: ``s3://bucket/key``, or the path itself."""
+    """The name of a ``path`` for users and other programs: ``s3://bucket/key``, or the path itself."""
     address = object_of(path)
     return str(path) if address is None else str(address).rstrip("/")
 
@@ -73,7 +73,7 @@ def cache_folder() -> Path:
 
 
 def object_of(path: Path) -> Address | None:
-    """The object that a ``path`` stands for; None if it is a path like any other."""
+    """The object that a ``path`` stands for; None if it is an ordinary path."""
     cache = cache_folder()
     if not path.is_relative_to(cache):
         return None
@@ -84,7 +84,7 @@ def object_of(path: Path) -> Address | None:
 
 @contextmanager
 def looking_once() -> Iterator[None]:
-    """Inside, storage is asked only once for each object: for a chunk, whose inputs are finished."""
+    """Inside, storage is queried only once per object; for a chunk, whose inputs are finished."""
     token = _seen.set(set())
     try:
         yield
@@ -122,7 +122,7 @@ def publish_folder(written: Path, path: Path) -> None:
 
 
 def fetch(path: Path) -> Path:
-    """Fetch the object that ``path`` stands for; without an object, there is no file at the path either."""
+    """Fetch the object that ``path`` stands for; without an object, no file stays at the path either."""
     address = object_of(path)
     if address is None or not _unseen(path):
         return path
@@ -147,7 +147,7 @@ def fetch_folder(path: Path) -> Path:
         return path
     head = objects.head(_as_folder(address))
     if head is not None and not _is_copy(path, head.etag):
-        with _scratch(path) as scratch, _alone(path):  # a full folder cannot be renamed over
+        with _scratch(path) as scratch, _alone(path):  # a full folder cannot be replaced by renaming
             if not _is_copy(path, head.etag):
                 objects.download(_as_folder(address), scratch / "whole.tar")
                 with tarfile.open(scratch / "whole.tar") as tar:
@@ -166,8 +166,8 @@ def fetch_folder(path: Path) -> Path:
 def folders_here(place: str, name: str) -> Path:
     """The path of a ``place``, after fetching what was published there as folders.
 
-    In object storage, that is all in its folder ``name``, or else the place itself. Raises StorageError if
-    there is neither.
+    In object storage, that is everything in its folder ``name``, or else the place itself. Raises
+    StorageError if there is neither.
     """
     if not is_remote(place):
         return Path(place)

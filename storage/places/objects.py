@@ -1,11 +1,10 @@
-"""Objects: the one module that speaks to S3-compatible storage.
+"""Objects: the only module that talks to S3-compatible storage.
 
 The usual AWS variables say which server, region and credentials to use (AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID,
 AWS_SECRET_ACCESS_KEY, AWS_REGION, a profile, an instance's role). A request that gets no answer, or an error
 from 500 up, is repeated with growing waits before it fails.
 
-All functions raise StorageError for a request that is refused, and UnreachableError for one that may succeed
-later.
+All functions raise StorageError if a request is refused, and UnreachableError if it may succeed later.
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ class Address(NamedTuple):
 
 
 class Head(NamedTuple):
-    """What is known of an object without its content."""
+    """What is known about an object without its content."""
 
     etag: str  # changes with the content
     note: str  # what it was made from, as its writer noted
@@ -55,7 +54,7 @@ def endpoint() -> str:
 
 
 def head(address: Address) -> Head | None:
-    """What is known of the object at an ``address``; None if there is none."""
+    """What is known about the object at an ``address``; None if there is none."""
     with _one_line("read", address):
         answer = _unless(_MISSING, _client().head_object, Bucket=address.bucket, Key=address.key)
     if answer is None:
@@ -78,7 +77,7 @@ def download(address: Address, path: Path) -> bool:
 
 
 def upload(path: Path, address: Address, note: str = "") -> str:
-    """Put the file at ``path`` at an ``address``, where it appears whole or not at all, and return its tag.
+    """Upload the file at ``path`` to an ``address``, where it appears atomically, and return its tag.
 
     Args:
         path: the file that holds the content.
@@ -183,7 +182,7 @@ def _errors() -> Any:
 
 @contextmanager
 def _one_line(verb: str, address: Address) -> Iterator[None]:
-    """Raise errors as StorageError, or as UnreachableError those that may pass."""
+    """Raise errors as StorageError, or as UnreachableError if they may be temporary."""
     client_errors = _client_errors()
     try:
         yield
@@ -215,7 +214,7 @@ def _code(error: Any) -> str:
 
 
 def _may_pass(error: Any) -> bool:
-    """Whether the server failed or could not be reached, rather than refused."""
+    """Whether the server failed or could not be reached, rather than refusing."""
     response = getattr(error, "response", None)
     if response is not None:
         status = int(response.get("ResponseMetadata", {}).get("HTTPStatusCode", 0))

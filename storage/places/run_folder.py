@@ -1,4 +1,4 @@
-"""Where everything of a run lies."""
+"""Where the files of a run are."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Table = Literal[
 
 @dataclass(frozen=True)
 class RunFolder:
-    """The places of one run; nothing is created by asking for a place, writers create folders."""
+    """The paths of one run; asking for a path creates nothing, writers create folders."""
 
     path: Path
 
     @property
     def settings(self) -> Path:
-        """What the run was asked for."""
+        """The settings of the run."""
         return self.path / "settings.json"
 
     @property
@@ -59,7 +59,7 @@ class RunFolder:
         return self.path / "stages.json"
 
     def result(self, class_name: str, key: str) -> Path:
-        """What the chunk of a key told when it was finished: a few numbers beside its rows."""
+        """The result of the finished chunk with a key: a few numbers beside its rows."""
         return self.path / "chunks" / checked_name(class_name) / f"{key}.json"
 
     def summary(self, suffix: str) -> Path:
@@ -96,11 +96,11 @@ class RunFolder:
         return self.path / "models" / checked_name(class_name) / str(seed)
 
     def checkpoint(self, class_name: str, seed: int) -> Path:
-        """Where a training that is not over yet keeps its last epoch."""
+        """The last epoch of a training that is not finished."""
         return self.path / "models" / checked_name(class_name) / f"{seed}.checkpoint.safetensors"
 
     def sweep(self, class_name: str, variant: int) -> Path:
-        """What one variant of an encoder came to in a sweep."""
+        """The result of one variant of the encoder in a sweep."""
         return self.path / "sweep" / checked_name(class_name) / f"{variant:02d}.json"
 
     def memory(self, class_name: str) -> Path:
@@ -112,7 +112,7 @@ class RunFolder:
         return self.path / "champions" / checked_name(class_name)
 
     def memory_names(self) -> list[str]:
-        """The memories that are there."""
+        """The existing memories."""
         headers = (self.path / "memories").glob("*/memory.json")
         return sorted(path.parent.name for path in headers if NAME.fullmatch(path.parent.name))
 
@@ -129,12 +129,12 @@ class RunFolder:
         return self.table(table, class_name) / f"{index:04d}.parquet"
 
     def shards(self, table: Table, class_name: str) -> list[Path]:
-        """The chunks of a table that are there, in order."""
+        """The existing chunks of a table, in order."""
         return files_in(self.table(table, class_name), "[0-9]*.parquet")
 
 
 def checked_name(name: str) -> str:
-    """The name of a class or run if it can be a file's name everywhere, else a StorageError."""
+    """The name of a class or run. Raises StorageError if it cannot be a file's name everywhere."""
     if not NAME.fullmatch(name):
         raise StorageError(
             f"{name[:100]!r} cannot name a class or run; use up to 100 letters, digits, '-' and '_', "

@@ -1,6 +1,6 @@
-"""Folders in the machine's temporary directory that last as long as their use, or as their process.
+"""Folders in the machine's temporary directory that exist while they are used or their process lives.
 
-A process locks its folder, and the kernel releases the locks of dead processes, which shows what was left
+A process locks its folder, and the kernel releases the locks of dead processes, which shows what they left
 behind.
 """
 
@@ -39,7 +39,7 @@ def _make() -> tuple[Path, int]:
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX))
         lock = _lock(folder)
-        if lock is not None and folder.exists():  # else another process removed it as left behind
+        if lock is not None and folder.exists():  # otherwise another process removed it as left behind
             return folder, lock
 
 

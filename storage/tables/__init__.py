@@ -1,1 +1,1 @@
-"""Parquet tables: one door to each."""
+"""Parquet tables, each read and written in one place."""

@@ -1,4 +1,4 @@
-"""Attempts: one row for every time a planner tried a problem."""
+"""Attempts: one row for each time a planner tried a problem."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def read_attempts(path: Path, without: Sequence[str] = ()) -> pd.DataFrame:
         StorageError: there are none.
     """
     frame: pd.DataFrame = pa.concat_tables(list(_tables(path, without))).to_pandas()
-    pa.default_memory_pool().release_unused()  # the files were decoded there: as much again
+    pa.default_memory_pool().release_unused()  # the files were decoded there, which takes as much again
     return frame
 
 

@@ -1,4 +1,4 @@
-"""Configurations: how an attempt uses a memory, how that is called, and in which order it is read."""
+"""Configurations: how an attempt uses a memory, how that is named, and in which order it is shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WITHOUT_MEMORY: Final = ("none", "fresh")
 
 
 class Configuration(NamedTuple):
-    """How an attempt uses a memory: what tells two attempts of a planner and memory at a problem apart."""
+    """How an attempt uses a memory, which distinguishes attempts at a problem by the same planner."""
 
     assist: str  # one of ASSISTS
     recall: str  # one of RECALLS; empty if nothing is recalled
@@ -31,7 +31,7 @@ class Configuration(NamedTuple):
 
     @property
     def rank(self) -> tuple[int, str, int, str, int]:
-        """The key that sorts configurations as they are read: known names in their order, then others."""
+        """The key that sorts configurations for display: known names in their order, then others."""
         return (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS), self.top_k)
 
 

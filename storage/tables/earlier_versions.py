@@ -1,4 +1,4 @@
-"""What earlier versions of the tables called things, so that they are still read."""
+"""Names in earlier versions of the tables, which can still be read."""
 
 from typing import Final
 

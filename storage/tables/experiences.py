@@ -23,7 +23,7 @@ from storage.vehicles.definitions import definition_of
 from storage.vehicles.recorded_vehicle import refuse_another, vehicle_recorded
 
 _CONTROL = 2
-_VEHICLE = b"vehicle"  # in the file's metadata: the settings, which also say how wide a state is
+_VEHICLE = b"vehicle"  # in the file's metadata: the vehicle's settings, which also give the size of a state
 
 
 class SearchedExperience(NamedTuple):
@@ -180,7 +180,7 @@ def _plan_columns(plans: Sequence[Plan]) -> dict[str, Any]:
 
 
 def vehicle_of_experiences(path: Path) -> Vehicle:
-    """The vehicle of the experiences in the file at ``path``. Raises StorageError if it does not say one."""
+    """The vehicle of the experiences in the file at ``path``. Raises StorageError if it names none."""
     vehicle = vehicle_recorded(_recorded(path))
     if vehicle is None:
         raise StorageError(f"{path} does not say which vehicle its plans are for; move it elsewhere.")

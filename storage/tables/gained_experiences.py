@@ -1,11 +1,11 @@
 """Experiences gained on the job: problems that any number of processes solved, no repeats, up to a limit.
 
-A folder holds shards whose names follow from their contents, so writers never meet. The process that writes
-one too many merges them all, under a lock.
+A folder holds shards whose names follow from their contents, so writers never collide. The process that
+writes one shard too many merges them all, under a lock.
 
-The rule: all experiences of a vehicle are put in the order of a digest of problem and plan. The first with
-each problem id and the first with each plan are kept, up to ``MOST`` a class. That is a fair sample of the
-work, whichever process solved it when.
+The rule: all experiences of a vehicle are sorted by a digest of problem and plan. The first with each problem
+id and the first with each plan are kept, up to ``MOST`` per class. This is a fair sample of the work,
+whichever process solved it and when.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from storage.tables.experiences import (
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import read_table, sound, write_table
 
-MOST: Final = 5_000  # experiences a class: five times what a memory is chosen from by default
-SHARDS: Final = 16  # more are merged
+MOST: Final = 5_000  # experiences per class: five times the default number of candidates for a memory
+SHARDS: Final = 16  # if there are more, they are merged
 SNAPSHOTS: Final = "snapshots"
 DIGITS: Final = 8  # of a snapshot's digest
-READINGS: Final = 3  # of shards that others may merge
+READINGS: Final = 3  # attempts to read shards that others may merge
 
 
 def add_gained(
@@ -84,8 +84,8 @@ def gained_shards(folder: Path) -> list[Path]:
 def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
 
-    Returns what the snapshot is called: the name and a digest of the content. Raises StorageError if nothing
-    is learned yet.
+    Returns the full name of the snapshot: the name and a digest of the content. Raises StorageError if
+    nothing has been learned yet.
     """
     if not gained_shards(folder):
         raise StorageError(f"{folder} holds no learned problems; solve problems with --learn first.")
@@ -100,12 +100,12 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
 
 
 def snapshot_path(folder: Path, snapshot: str) -> Path:
-    """The file of the ``snapshot`` of a ``folder`` that is called so, which ``read_experiences`` reads."""
+    """The file of a named ``snapshot`` of a ``folder``, which ``read_experiences`` reads."""
     return folder / SNAPSHOTS / f"{snapshot}.parquet"
 
 
 def snapshot_ids(folder: Path, snapshot: str) -> set[str]:
-    """The ids of the problems in a ``snapshot`` of a ``folder``; none if it is not there any more."""
+    """The ids of the problems in a ``snapshot`` of a ``folder``; none if it no longer exists."""
     try:
         return set(read_table(snapshot_path(folder, snapshot), EXPERIENCES, ["id"])["id"].to_pylist())
     except StorageError:
@@ -132,7 +132,7 @@ def rows_of_class(snapshot: Path, class_name: str) -> list[int]:
 
 
 def _merge(folder: Path, vehicle: Vehicle) -> None:
-    """Make one shard of all, unless another process does it."""
+    """Merge all shards into one, unless another process is doing so."""
     with suppress(InUseError), locked(folder / ".lock", str(folder)):
         shards, table, digest = _kept(folder, vehicle)
         merged = folder / f"{digest}.parquet"
@@ -143,7 +143,7 @@ def _merge(folder: Path, vehicle: Vehicle) -> None:
 
 
 def _kept(folder: Path, vehicle: Vehicle) -> tuple[list[Path], pa.Table, str]:
-    """All shards, what the rule keeps of them in its order, and a digest of that; call it with the lock."""
+    """All shards, the rows that the rule keeps, in its order, and their digest; needs the lock."""
     shards = gained_shards(folder)
     if not shards:
         return [], EXPERIENCES.empty_table(), ""

@@ -21,7 +21,7 @@ MOST_DIGITS: Final = 8  # of a number of plans
 
 
 class Labelled(NamedTuple):
-    """What training needs of n problems; bits are packed most significant first, as by ``np.packbits``."""
+    """The training data of n problems; bits are packed most significant first, as by ``np.packbits``."""
 
     grids: Bits  # uint8 [n, 512] occupancy 64 x 64, row by row
     plan_index: Integers  # int32 [n] the plan that a problem was made for; -1: for none
@@ -75,7 +75,7 @@ def write_hallucinated(
 
 
 def read_labelled(paths: Sequence[Path]) -> Labelled:
-    """What training needs of the problems in some shards at ``paths``; geometry is not read."""
+    """The training data of the problems in the shards at ``paths``; geometry is not read."""
     if not paths:
         raise StorageError("There are no hallucinated problems; run hallucinate.")
     plans = plans_of(paths[0])

@@ -1,4 +1,4 @@
-"""How every Parquet file is written and read: whole, compressed, stamped, the same bytes every time."""
+"""How every Parquet file is written and read: atomically, compressed, stamped, with reproducible bytes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SHARD_KEY: Final = b"key"
 
 
 def write_table(path: Path, table: pa.Table, key: str = "") -> None:
-    """Write a ``table`` to ``path``, whole or not at all; the same table and key give the same bytes.
+    """Write a ``table`` to ``path`` atomically; the same table and key give the same bytes.
 
     Args:
         path: the file to write.
@@ -30,7 +30,7 @@ def write_table(path: Path, table: pa.Table, key: str = "") -> None:
         key: what the rows were made from, so that a finished shard need not be made again.
 
     Raises:
-        StorageError: it cannot be written; what was at ``path`` is then still there.
+        StorageError: it cannot be written; ``path`` is then unchanged.
     """
     write_tables(path, [table], table.schema, key)
 
@@ -90,7 +90,7 @@ def read_table(path: Path, schema: pa.Schema, columns: Sequence[str] | None = No
 
 
 def _renamed(table: pa.Table) -> pa.Table:
-    """A ``table`` of the earlier version, with what is called otherwise today renamed."""
+    """A ``table`` of the earlier version with today's names."""
     for column, names in RENAMED.items():
         if column in table.column_names:
             values = table[column]
@@ -102,7 +102,7 @@ def _renamed(table: pa.Table) -> pa.Table:
 
 @contextmanager
 def sound(path: Path) -> Iterator[None]:
-    """Raise StorageError in place of whatever the rows of the file at ``path`` raise if they are unsound."""
+    """Raise StorageError instead of any error that unsound rows in the file at ``path`` raise."""
     try:
         yield
     except (pa.ArrowException, OSError, AttributeError, LookupError, TypeError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""How useful memories are at work, beside their benchmark: one small file for each file of problems."""
+"""How useful memories are at work, compared with their benchmark: one small file per file of problems."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Vehicles as people describe them: one file each, and what other files record of them."""
+"""Vehicle files, and what other files record about a vehicle."""

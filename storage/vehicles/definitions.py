@@ -1,7 +1,7 @@
-"""What a vehicle file says, field by field, and the vehicle that it describes.
+"""The fields of a vehicle file, and the vehicle that they describe.
 
-A definition holds metres, radians and seconds of the world outside. Planners work with lengths that are
-divided by the vehicle's scale, a power of two, so that no digit is lost on the way there and back.
+A definition holds real metres, radians and seconds. Planners work with lengths that are divided by the
+vehicle's scale, a power of two, so that no digit is lost in converting there and back.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ FIRST_ORDER: Final = "-first-order"
 def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
     """The vehicle that the ``fields`` of a definition describe.
 
-    Raises ValueError, the end of a sentence, which names the field that is wrong and what it should be.
+    Raises ValueError whose message, the end of a sentence, names the wrong field and what it should be.
     """
     check_fields(list(fields), FIELDS)
     kind = fields.get("kind")
@@ -81,7 +81,7 @@ def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
     least, most = limits["speed"]
     turning = limits["steering"] if is_car else limits["turn_rate"]
     change = limits.get("steering_rate" if is_car else "turn_acceleration", 2.0 * turning / step)
-    real: dict[str, Any] = {  # lengths still of the world outside
+    real: dict[str, Any] = {  # lengths are still real metres
         "front": box.front, "rear": box.rear, "width": box.width, "min_speed": least, "max_speed": most,
         "max_acceleration": limits.get("acceleration", (most - least) / step),
     }  # fmt: skip
@@ -97,7 +97,7 @@ def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
 
 
 def definition_of(vehicle: Vehicle) -> dict[str, Any]:
-    """The definition of a ``vehicle``, as JSON values; ``vehicle_of`` makes the same vehicle of it."""
+    """The definition of a ``vehicle`` as JSON values; ``vehicle_of`` turns it back into the same vehicle."""
     is_car, scale = not isinstance(vehicle, DifferentialDrive), vehicle.scale
     kind = "car" if is_car else "unicycle" if vehicle.first_order else "differential-drive"
     limits: dict[str, Any] = {"speed": [scale * vehicle.min_speed, scale * vehicle.max_speed]}
@@ -129,7 +129,7 @@ def definition_of(vehicle: Vehicle) -> dict[str, Any]:
 
 
 def first_difference(one: object, other: object, where: str = "") -> str:
-    """Where two definitions differ first, and how; empty if nowhere but in the name."""
+    """The first difference between two definitions; empty if they differ at most in the name."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         for name in [*one, *(name for name in other if name not in one)]:
             if where or name != "name":
@@ -243,5 +243,5 @@ def _ranged(value: object, name: str, where: str = "") -> float:
 
 
 def is_built_in(vehicle: Vehicle) -> bool:
-    """Whether a ``vehicle`` is one of those that every program knows by name."""
+    """Whether a ``vehicle`` is one of the built-in vehicles."""
     return VEHICLES.get(name_of(vehicle)) == vehicle

@@ -17,7 +17,7 @@ from storage.vehicles.definitions import definition_of, first_difference, is_bui
 
 
 def record_of(vehicle: Vehicle) -> str | dict[str, Any]:
-    """What a plan's file says of a ``vehicle``: the name of a built-in one, else its definition."""
+    """The record of a ``vehicle`` in a plan's file: the name of a built-in one, else its definition."""
     return name_of(vehicle) if is_built_in(vehicle) else definition_of(vehicle)
 
 
@@ -26,8 +26,8 @@ def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
 
     Args:
         where: the file or folder that records the vehicle.
-        made_for: a definition, the name of a built-in vehicle, or what earlier versions recorded of one. Of
-            other vehicles a name says too little.
+        made_for: a definition, the name of a built-in vehicle, or the record of an earlier version. The name
+            of any other vehicle is not enough.
         wanted: the vehicle that is wanted.
     """
     recorded = vehicle_recorded(made_for)
@@ -61,7 +61,7 @@ def vehicle_recorded(made_for: object) -> Vehicle | None:
 
 
 def _once_recorded(vehicle: Vehicle) -> dict[str, Any]:
-    """What earlier versions, which knew the built-in vehicles only, recorded of one."""
+    """The record that earlier versions, which only knew the built-in vehicles, made of one."""
     later = ("first_order", "scale", "about", "trailers")
     fields = {name: value for name, value in vehicle._asdict().items() if name not in later}
     if isinstance(vehicle, CarWithTrailers):

@@ -1,4 +1,4 @@
-"""What sizes, limits and step of a vehicle must have to do with each other, and the scale that follows."""
+"""How the sizes, limits and step of a vehicle must fit together, and the scale that follows from them."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle, trailers_of
 
 REACH_M: Final = 1.75  # ``planners.world.geometry.collision.REACH_M``, which compiles when it is imported
-ROOM: Final = 1.5  # times as long as the body are the places that roadmaps look for
+ROOM: Final = 1.5  # roadmaps look for places this many times as long as the body
 BEHIND_M: Final = 8.0  # room for trailers behind the start of canonical problems
 SCALES: Final = (2.0**-6, 2.0**6)
 ANGLES: Final = 41  # hitch angles at which bodies may not meet
 
 
 class _Pace(NamedTuple):
-    """How far a body's points get in half a step, at most."""
+    """The greatest distance that a body's points move in half a step."""
 
     body: str
     half_length: float
@@ -41,7 +41,7 @@ def check_sizes(vehicle: Vehicle) -> None:
     for number, trailer in enumerate(trailers_of(vehicle), start=1):
         angles = np.linspace(-trailer.max_hitch, trailer.max_hitch, ANGLES).tolist()
         if _shape(ahead).intersects(_turned(trailer, 0.0)):
-            angles = []  # a semi-trailer lies over the tractor that carries it
+            angles = []  # a semi-trailer overlaps the tractor that carries it
         for angle in angles:
             if _shape(ahead).intersects(_turned(trailer, angle)):
                 raise ValueError(
@@ -52,10 +52,10 @@ def check_sizes(vehicle: Vehicle) -> None:
 
 
 def scale_for(vehicle: Vehicle) -> float:
-    """How many metres make a canonical one, so that a ``vehicle`` given in metres suits canonical problems.
+    """How many metres make one canonical metre, so that a ``vehicle`` suits canonical problems.
 
-    It is the least power of two with which no box that planners check is larger than they can check, and
-    trailers have room behind the start. It is 1 for the built-in vehicles.
+    It is the smallest power of two with which planners can check every box and trailers have room behind the
+    start. It is 1 for the built-in vehicles.
     """
     needs = [
         max(math.hypot(length + way, width + way), ROOM * math.hypot(length, width)) / REACH_M

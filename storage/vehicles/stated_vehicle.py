@@ -1,4 +1,4 @@
-"""The vehicle that a problem's fields state, which need not."""
+"""The vehicle that a problem's fields may state."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from storage.vehicles.definitions import definition_of, first_difference
 from storage.vehicles.recorded_vehicle import record_of, vehicle_recorded
 from storage.vehicles.vehicle_files import text_of
 
-FIELD = "vehicle"  # a name, or all of a vehicle as an object or, in a table, as its text
+FIELD = "vehicle"  # a name, or a whole definition as an object or, in a table, as text
 
 
 def statement_of(vehicle: Vehicle) -> dict[str, Any]:
-    """The field that a file of problems has for a ``vehicle``; none for the car."""
+    """The field that a file of problems has for a ``vehicle``; there is none for the car."""
     record = record_of(vehicle)
     return {} if record == name_of(CAR) else {FIELD: record}
 
 
 def as_text(fields: dict[str, Any]) -> dict[str, Any]:
-    """These ``fields`` with the vehicle as a text, for a table."""
+    """The ``fields`` with the vehicle as text, for a table."""
     vehicle = stated_vehicle(fields)
     return fields if vehicle is None else fields | {FIELD: text_of(vehicle)}
 
@@ -40,12 +40,12 @@ def stated_vehicle(fields: Any) -> Vehicle | None:
         recorded = None
     vehicle = vehicle_recorded(recorded)
     if vehicle is None:
-        raise ValueError(f"vehicle is {short(said)}, which is no vehicle; give a name or leave it out")
+        raise ValueError(f"vehicle is {short(said)}, which is not a vehicle; give a name or leave it out")
     return vehicle
 
 
 def refuse_another_driver(fields: Any, driver: Vehicle) -> None:
-    """Raise ValueError if the ``fields`` of a problem state another vehicle than the one that drives."""
+    """Raise ValueError if the ``fields`` of a problem state a vehicle other than the one that drives."""
     stated = stated_vehicle(fields)
     if stated is None:
         return
@@ -53,5 +53,5 @@ def refuse_another_driver(fields: Any, driver: Vehicle) -> None:
     if difference:
         raise ValueError(
             f"is for vehicle {name_of(stated)}, but {name_of(driver)} is to drive: {difference}; name the "
-            "problem's with --vehicle, take a memory of it, or leave the field vehicle out"
+            "problem's vehicle with --vehicle, use a memory of it, or leave out the field vehicle"
         )

@@ -1,4 +1,4 @@
-"""Vehicles by name or from a YAML file (docs/vehicles.md), and as text that says all of one."""
+"""Vehicles by name or from a YAML file (docs/vehicles.md), and as text with the whole definition."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from storage.yaml_text import yaml_fields
 
 ENDINGS: Final = (".yaml", ".yml")
 BUILT_IN: Final = Path(__file__).parent / "built_in"  # a file for each vehicle that has a name
-_MOST_BRACKETS: Final = 2_000  # some hundred corners
+_MOST_BRACKETS: Final = 2_000  # a few hundred corners
 
 
 def read_vehicle(file: Path) -> Vehicle:
@@ -43,8 +43,8 @@ def read_vehicle(file: Path) -> Vehicle:
 def scale_for_vehicle(stated: object, vehicle: Vehicle) -> float:
     """The scale of a problem or a map for a ``vehicle``: its own unless one is ``stated``.
 
-    A vehicle from a file has the size that the file says. So another scale would be a mistake, whereas the
-    built-in ones stand for robots of any size. Raises ValueError, the end of a sentence.
+    A vehicle from a file has the size that the file states, so another scale would be a mistake. The built-in
+    vehicles stand for robots of any size. Raises ValueError, with the end of a sentence as its message.
     """
     scale = vehicle.scale if stated is None else scale_of(stated)
     if scale != vehicle.scale and not is_built_in(vehicle):
@@ -56,7 +56,7 @@ def scale_for_vehicle(stated: object, vehicle: Vehicle) -> float:
 
 
 def label_of(vehicle: Vehicle) -> str:
-    """A word that tells a ``vehicle`` from all others: its name, and unless it is built in a digest of it."""
+    """A word that identifies a ``vehicle``: its name and, unless it is built in, a digest."""
     if is_built_in(vehicle):
         return name_of(vehicle)
     definition = json.dumps(definition_of(vehicle), sort_keys=True)
@@ -65,9 +65,9 @@ def label_of(vehicle: Vehicle) -> str:
 
 
 def text_of_vehicle(given: str) -> str:
-    """What says all of a vehicle that was ``given`` by name, by the path of its file, or by such a text.
+    """The complete text for a vehicle that was ``given`` by name, by the path of its file, or by such a text.
 
-    That of a built-in vehicle is its name. Raises StorageError, with one line, if there is no such vehicle.
+    For a built-in vehicle this is its name. Raises StorageError, with one line, if there is no such vehicle.
     """
     if given in VEHICLES:
         return given
@@ -75,12 +75,12 @@ def text_of_vehicle(given: str) -> str:
 
 
 def text_of(vehicle: Vehicle) -> str:
-    """What says all of a ``vehicle``: the name of a built-in one, else its definition as JSON."""
+    """The complete text for a ``vehicle``: the name of a built-in one, else its definition as JSON."""
     return name_of(vehicle) if is_built_in(vehicle) else json.dumps(definition_of(vehicle))
 
 
 def said_vehicle(text: str) -> Vehicle:
-    """The vehicle of which ``text_of_vehicle`` says all, or to which its argument leads.
+    """The vehicle that a text of ``text_of_vehicle``, or one of its arguments, describes.
 
     Raises StorageError, with one line, if there is none.
     """

@@ -1,1 +1,1 @@
-"""Worlds and maps in the formats that others write: one file a format."""
+"""Worlds and maps in formats written by other software, one file per format."""

@@ -1,4 +1,4 @@
-"""Problems of worlds and maps of others, read or cut, and checked; unfit ones are listed with why."""
+"""Problems read from worlds or cut from maps, and checked; unfit ones are listed with the reason."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from storage.worlds.sources import PARTS, Part, Source
 
 CUT_PROBLEMS: Final = 1_000  # a part of a map, by default
 
-Progress = Callable[[int, int], None]  # called with how many are done, and of how many
-Item = tuple[str, Problem | str]  # where a problem stands, and the problem or what is wrong with it
+Progress = Callable[[int, int], None]  # called with the number done and the total
+Item = tuple[str, Problem | str]  # where a problem comes from, and the problem or what is wrong with it
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class ImportSettings:
 
     vehicle: Vehicle = CAR  # must have room to start
     strict: bool = False  # stop at the first unfit world
-    count: int | None = None  # problems of a part: at most, or of a map exactly
+    count: int | None = None  # problems per part: at most; for a map exactly
     seed: int = 1  # of the poses on a map
     scale: float = 1.0  # metres of a map in a canonical metre
-    resolution: float | None = None  # metres a cell, for a map that does not say
-    unknown: Literal["occupied", "free"] = "occupied"  # what unknown cells are
+    resolution: float | None = None  # metres per cell, for a map that does not state it
+    unknown: Literal["occupied", "free"] = "occupied"  # what unknown cells count as
     tolerance_m: float = 0.0  # how far the outline of what is occupied on a map may move
 
 
@@ -48,7 +48,7 @@ class Imported:
     """The problems of a part, and what was left out."""
 
     problems: list[Problem]
-    skipped: list[tuple[str, str]]  # where it stands, and why
+    skipped: list[tuple[str, str]]  # where it is, and why
     cuts: list[Cut]  # of a map: the problems and where they lie
 
     def explained(self) -> str:
@@ -73,7 +73,7 @@ def import_part(
         source: where the worlds are.
         part: "train" or "test".
         settings: how to read the source.
-        progress: told how many worlds are done, and of how many.
+        progress: called with the number of worlds done and the total.
 
     Raises:
         StorageError: nothing can be read, or a world is unfit and the settings are strict.

@@ -1,4 +1,4 @@
-"""Manoeuvres between poses that others have published: TPCAP, dynobench and Bench-MR, one reader each.
+"""Published manoeuvres between poses: TPCAP, dynobench and Bench-MR, one reader each.
 
 A reader gives the fields of a problem as ``storage.exchange.problems`` takes them, in the frame of the file.
 """
@@ -18,7 +18,7 @@ from storage.worlds.limits import check_file, whole_number
 from storage.yaml_text import yaml_fields
 
 LARGEST_FILE: Final = 10_000_000  # bytes
-PARKED: Final = [0.05, math.radians(1.0)]  # metres and radians: how exactly a car is to stand
+PARKED: Final = [0.05, math.radians(1.0)]  # metres and radians: how exactly a car must stop
 AROUND_M: Final = 20.0  # how far the ground of a TPCAP case reaches around its ends; it has no border
 DISTANCE: Final = 0.1  # dynobench's, weighted, within which a goal is reached
 _BRACKETS: Final = 4_000  # of a dynobench environment in YAML
@@ -75,8 +75,8 @@ def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]
     """Problems between poses in Bench-MR's polygon scenes, packed as JSON, for any ``vehicle``.
 
     The file has ``environments``, lists of polygons by name, and ``problems``, each with ``id``,
-    ``environment``, ``start``, ``goal`` and ``bounds``. These hold the reference point and not the body, and
-    so are widened by as far as the vehicle reaches. Raises ValueError or StorageError.
+    ``environment``, ``start``, ``goal`` and ``bounds``. The bounds contain the reference point, not the body,
+    so they are widened by the vehicle's reach. Raises ValueError or StorageError.
     """
     check_file(file, LARGEST_FILE, "is it a file with scenes of Bench-MR?")
     fields = _object(file)

@@ -18,7 +18,7 @@ from storage.yaml_text import yaml_fields, yaml_number
 
 MOST_BRACKETS: Final = 64  # a map has one list
 MODES: Final = ("trinary", "scale", "raw")
-FARTHEST_ORIGIN_M: Final = 1e8  # beyond any grid of the earth
+FARTHEST_ORIGIN_M: Final = 1e8  # farther than any map grid of the earth
 _REQUIRED: Final = ("image", "resolution", "origin", "occupied_thresh", "free_thresh")
 _FIELDS: Final = (*_REQUIRED, "negate", "mode")  # of map_server
 
@@ -48,7 +48,7 @@ def picture_of(file: Path) -> Path:
 
 
 def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
-    """Which pixels are surely occupied, and which are surely free; the others are unknown."""
+    """Which pixels are certainly occupied, and which are certainly free; the others are unknown."""
     occupied_from = _share(fields["occupied_thresh"], "occupied_thresh")
     free_to = _share(fields["free_thresh"], "free_thresh")
     mode = fields.get("mode", "trinary")
@@ -65,7 +65,7 @@ def _judged(picture: Picture, fields: Mapping[str, Any]) -> tuple[Cells, Cells]:
     if negate not in (0, 1):
         raise ValueError("has a negate that is neither 0 nor 1")
     share = (levels if negate else 255.0 - levels) / 255.0
-    if mode == "scale":  # a pixel between the thresholds is what it is more likely to be
+    if mode == "scale":  # a pixel between the thresholds counts as what is more likely
         free_to = occupied_from = 0.5 * (free_to + occupied_from)
         return picture.drawn & (share > occupied_from), picture.drawn & (share <= free_to)
     return picture.drawn & (share > occupied_from), picture.drawn & (share < free_to)

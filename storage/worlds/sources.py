@@ -1,4 +1,4 @@
-"""What lies at a path: worlds or a map, in which format, and in which files."""
+"""Worlds or a map at a path: which of them, in which format, and in which files."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Source:
         return [self.path]
 
     def digest(self) -> str:
-        """A digest of ``contents``, which raises the same, and of where they lie beside each other."""
+        """A digest of ``contents``, which raises the same errors, and of the files' relative paths."""
         digest = hashlib.sha256()
         for file in self.contents():
             digest.update(f"{file.relative_to(self.path.parent)}\0".encode())

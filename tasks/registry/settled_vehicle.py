@@ -1,4 +1,4 @@
-"""Which vehicle a command means: the one that is named, else that of the problems, else of the memory."""
+"""The vehicle that a command means: the given one, else that of the problems, else that of the memory."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tasks.settings.run_settings import DEFAULT_VEHICLE
 
 
 def settled_vehicle(given: str | None, problems: Path | None = None, memory: str | None = None) -> str:
-    """What says all of the vehicle that drives (``storage.vehicles.vehicle_files.said_vehicle``).
+    """A complete description of the vehicle that drives (``storage.vehicles.vehicle_files.said_vehicle``).
 
     Args:
         given: the name or file that the user gave, or None.
-        problems: a file of problems, whose first may state its vehicle; None or another file states none.
+        problems: a file of problems, whose first may state its vehicle; None or any other path states none.
         memory: the address of a memory, which is for one vehicle, or None.
 
     Raises:
-        UsageError: there is no vehicle of the given name, or its file is wrong.
-        StorageError: the problems or the memory are missing or damaged.
+        UsageError: there is no vehicle with the given name, or its file is wrong.
+        StorageError: the problems are damaged, or the memory is missing or damaged.
         RunError: MLflow does not have the memory.
     """
     if given is not None:
         return checked_vehicle(given)
-    if problems is not None and problems.suffix in FORMATS:
+    if problems is not None and problems.suffix in FORMATS and problems.is_file():
         stated = vehicle_of_problems(problems)
         if stated is not None:
             return text_of(stated)
