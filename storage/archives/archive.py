@@ -122,9 +122,7 @@ def _header(folder: Path, kind: str) -> dict[str, Any]:
     """The header of an archive of this version, exactly as it was written."""
     path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
-        raise StorageError(
-            f"{folder} does not contain a {kind} (it has no {kind}.json); check the path or build one."
-        )
+        raise StorageError(f"{folder} holds no {kind} (it has no {kind}.json); check the path or build one.")
     if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
         raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
     text = local_text(path)

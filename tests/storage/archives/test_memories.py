@@ -111,7 +111,7 @@ def test_a_memory_is_only_loaded_for_its_vehicle(tmp_path: Path, name: str) -> N
     assert all(map(same_plan, memory.plans, load_memory(tmp_path / "m", VEHICLES[name]).plans))
     for other in VEHICLES:
         if other != name:
-            told = f"made for vehicle {name}, expected {other}: .*; ask for --vehicle {name}, or make one"
+            told = f"made for vehicle {name}, expected {other}: .*; use --vehicle {name}, or make one"
             with pytest.raises(StorageError, match=told):
                 load_memory(tmp_path / "m", VEHICLES[other])
 

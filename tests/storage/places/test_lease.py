@@ -100,7 +100,7 @@ def test_a_lease_is_renewed_and_its_loss_ends_the_command(
         storage.put_object(Bucket=BUCKET, Key=PLACE.key, Body=b'{"owner": "other"}')
         assert ended.wait(5.0)
     assert signals == [signal.SIGINT]
-    assert "Another command took it over" in capsys.readouterr().err
+    assert "Another command took over" in capsys.readouterr().err
     assert objects.head(PLACE) is not None  # the other's
 
 

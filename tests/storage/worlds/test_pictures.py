@@ -151,7 +151,7 @@ def test_bad_pictures_are_skipped_each_with_its_reason(mixed: Path) -> None:
     assert "201 x 200 pixels, expected 201 x 201" in reasons["5"]
     assert "of kind I;16" in reasons["12"]
     assert "a file" in reasons["11"]
-    assert all("no whole PNG" in reasons[name] for name in ("6", "7", "8", "9", "13"))
+    assert all("not a complete PNG" in reasons[name] for name in ("6", "7", "8", "9", "13"))
     assert not any("\n" in reason for reason in reasons.values())
 
 
@@ -184,7 +184,7 @@ def test_a_part_may_hold_nothing_that_is_fit(tmp_path: Path) -> None:
     write_world(tmp_path / "woods" / "validation" / "1.png", world((178, 15)))
     found = import_part(source_at(tmp_path / "woods"), "validation")
     assert found.problems == []
-    assert found.explained().startswith("1 were skipped; the first cannot be planned in: start footprint")
+    assert found.explained().startswith("1 were skipped; the first one cannot be planned in: start footprint")
 
 
 def test_worlds_without_parts_are_divided_by_two(tmp_path: Path) -> None:
