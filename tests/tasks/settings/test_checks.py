@@ -61,7 +61,7 @@ def test_nothing_is_written_into_a_folder_that_is_read(tmp_path: Path) -> None:
         ["plan", "p.json", "--out", "p.json"],
         ["plan", "p.json", "--out", "./p.json"],
         ["plan", "p.json", "--out", "link.json"],
-        ["plan", "p.json", "--memory", "memory", "--out", "memory/memory.json"],
+        ["plan", "p.json", "--vehicle", "car", "--memory", "memory", "--out", "memory/memory.json"],
         ["optimise", "p.json", "--out", "p.json"],
         ["optimise", "p.json", "--plan", "plan.json", "--out", "plan.json"],
         ["solve", "p.parquet", "--out", "p.parquet"],
