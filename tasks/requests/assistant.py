@@ -99,6 +99,7 @@ class Assistant:
             [] if memory is None else [Path(memory)]
         )  # files that it may read, which must not be overwritten
         self._memories: dict[str, Memory | PlanLibrary] = {}
+        self.warm_classes: set[str] = set()  # of problems for which everything is ready
         self._workspace = Workspace()
 
     def memory_of(self, class_name: str) -> Memory | PlanLibrary | None:
@@ -146,6 +147,7 @@ class Assistant:
                 workspace=self._workspace,
             )
         OtherWork()()
+        self.warm_classes.add(problem.class_name)
 
     def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:
         """Attempt a canonical problem, with another assist or seed if given; the plan is not checked."""

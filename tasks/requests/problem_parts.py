@@ -26,7 +26,9 @@ from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
 from tasks.requests.part_folder import parts_folder
 
-PART_PROBLEMS: Final = 500  # a second of work, or minutes if problems are hard
+PART_PROBLEMS: Final = 500  # at most: a second of work, or minutes where problems are hard
+FEWEST_PROBLEMS: Final = 25  # of a part, unless its plans are improved
+PARTS: Final = 16  # of a file with few problems: workers share them, and progress has so many steps
 KEEP_SECONDS: Final = 5.0  # of work on a part that may be lost if a worker is killed; Ctrl-C loses none
 PART_SECONDS: Final = 10.0  # at most, for improving the plans of a part
 MOST_IN_ONE_FOLDER: Final = 10_000  # plans; for more problems each part writes its plans into its own folder
@@ -105,10 +107,15 @@ def parts_of(request: SolveRequest) -> list[FilePart]:
 def _parts_of(request: SolveRequest, _file_state: tuple[int, int] | None) -> list[FilePart]:
     settings = request.settings
     most = PART_SECONDS / settings.improve_seconds if settings.improve_seconds else PART_PROBLEMS
-    slices = slices_of(request.problems, max(1, int(min(PART_PROBLEMS, most))))
+    size = max(1, int(min(PART_PROBLEMS, most)))
+    slices = slices_of(request.problems, size)
     if not slices:
         raise StorageError(f"{request.problems} holds no problems; nothing to solve.")
-    own_folder = sum(each.count for each in slices) > MOST_IN_ONE_FOLDER
+    count = sum(each.count for each in slices)
+    smaller = max(FEWEST_PROBLEMS, -(-count // PARTS))
+    if smaller < size:
+        slices = slices_of(request.problems, smaller)
+    own_folder = count > MOST_IN_ONE_FOLDER
     folders = [str(folder.absolute()) if folder else None for folder in (request.plans, request.learn)]
     how = [*settings._replace(memory=None), request.memory_digest, *folders, own_folder]
     how.append(request.problems.stem)
@@ -151,7 +158,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
             if number < before:
                 on_problem()
                 continue
-            if number == before:
+            if number == before and problem.class_name not in assistant.warm_classes:
                 assistant.warm_up(problem)
             attempt, plan = assistant(problem)
             if request.learn is not None:

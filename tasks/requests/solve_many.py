@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
 
 SolveFlow = Callable[[SolveRequest], list[PartResult]]
 
-FEW_PARTS: Final = 2  # solving so few here takes less time than starting a server and workers
+FEW_PROBLEMS: Final = 1_000  # more are left to workers at once
+START_SECONDS: Final = 20.0  # about what a server and workers take to start
 
 
 class Tally(NamedTuple):
@@ -116,12 +118,13 @@ def solve_many(
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             begun = sum(len(part.rows_begun()) for part in left)
-            if flow is None or workers == 1 or len(left) <= FEW_PARTS:
-                results = _in_this_process(left)
-            else:
+            alone = flow is None or workers == 1
+            few = sum(part.problem_slice.count for part in left) <= FEW_PROBLEMS
+            results = _in_this_process(left, math.inf if alone else START_SECONDS) if alone or few else []
+            if flow is not None and len(results) < len(left):
                 with part_workers(out, workers):
-                    results = flow(request)
-            faults = [result.fault for result in results if result.fault]
+                    results += flow(request)
+            faults = list(dict.fromkeys(result.fault for result in results if result.fault))
             if faults:
                 raise _malformed(faults)
             seconds = time.monotonic() - began
@@ -134,10 +137,18 @@ def solve_many(
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request, tally))
 
 
-def _in_this_process(parts: Sequence[FilePart]) -> list[PartResult]:
+def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[PartResult]:
+    """Solve parts until all are solved, or the others seem to take so long that workers are worth a start."""
     numbers = count(1)  # of the problems, as they are solved
+    results: list[PartResult] = []
+    began = time.monotonic()
     with progress("solve", sum(part.problem_slice.count for part in parts), end_is_told=False) as show:
-        return [solve_part_reporting(part, lambda: show(next(numbers))) for part in parts]
+        for part in parts:
+            results.append(solve_part_reporting(part, lambda: show(next(numbers))))
+            left = len(parts) - len(results)
+            if left > 1 and (time.monotonic() - began) / len(results) * left > most_seconds:
+                break
+    return results
 
 
 def _malformed(faults: Sequence[str]) -> StorageError:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +18,13 @@ from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
 from storage.errors import StorageError
 from storage.exchange.plans import read_plan
-from storage.exchange.problems import write_problems
+from storage.exchange.problems import fields_of, write_problems
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked
 from storage.tables.attempts import read_attempts, write_attempts
 from storage.tables.gained_experiences import gained_shards
 from tasks.requests import problem_parts as parts
+from tasks.requests import solve_many as many_module
 from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.solve_many import solve_many
 from tests.flows.same_rows import equal_but_for_seconds
@@ -60,6 +63,38 @@ def test_parts_are_so_small_that_improving_one_takes_seconds(
     settings = ASSISTANT._replace(improve_seconds=seconds)
     file_parts = parts.parts_of(parts.SolveRequest(problems, tmp_path / "rows.parquet", settings, ""))
     assert file_parts[0].problem_slice.count == size
+
+
+def test_few_problems_are_shared_out_once_they_take_long_and_the_rows_are_the_same(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undisturbed: pd.DataFrame
+) -> None:
+    begun: list[int] = []
+
+    def flow(request: parts.SolveRequest) -> list[parts.PartResult]:
+        left = [part for part in parts.parts_of(request) if not parts.SOLVE.is_written(part)]
+        begun.append(left[0].index)
+        return [parts.SOLVE.run(part).result for part in left]
+
+    monkeypatch.setattr(many_module, "part_workers", lambda *_: nullcontext())
+    for seconds, expected in ((0.0, [1]), (math.inf, [])):
+        begun.clear()
+        monkeypatch.setattr(many_module, "START_SECONDS", seconds)
+        out = tmp_path / f"{seconds}.parquet"
+        assert solve_many(ASSISTANT, problems, out, workers=2, flow=flow).solved_now == COUNT
+        assert begun == expected
+        assert equal_but_for_seconds(read_attempts(out), undisturbed)
+
+
+def test_a_file_is_cut_into_parts_that_workers_can_share(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(parts, "PART_PROBLEMS", 500)
+    line = json.dumps(fields_of(problem_class("curves", "easy").draw(11, 0)))
+    for count, sizes in ((20, [20]), (400, [25] * 16), (1_650, [104] * 15 + [90])):
+        path = tmp_path / f"{count}.jsonl"
+        path.write_text("\n".join([line] * count))
+        cut = parts.parts_of(parts.SolveRequest(path, tmp_path / "rows.parquet", ASSISTANT, ""))
+        assert [part.problem_slice.count for part in cut] == sizes
 
 
 class StoppedError(Exception):
