@@ -104,13 +104,13 @@ def judge(champion: pd.DataFrame, challenger: pd.DataFrame, seed: int = 0) -> Ju
 
 def judgement_line(judged: Judgement) -> str:
     """The figures by which it was ``judged``, in one line."""
-    interval = f"{_seconds(judged.low_s)} to {_seconds(judged.high_s)}"
     less = 100 * judged.columns["reduction"].mean()
     counts = Counter(judged.columns["verdict"])
     named = ", ".join(f"{counts[each]} {each}" for each in (SOONER, LATER, FEWER, OPEN) if counts[each])
+    time = f"{abs(less):.1f} % {'more' if less < 0.0 else 'less'} time"
     return (
-        f"there {_seconds(judged.sooner_s)} s sooner ({interval}) on {judged.problems:,} problems, "
-        f"planning in {less:.1f} % less time: {named}"
+        f"the challenger is there {_sooner(judged.sooner_s)} ({_interval(judged.low_s, judged.high_s)}) on "
+        f"{judged.problems:,} problems, and plans in {time}: {named}"
     )
 
 
@@ -184,8 +184,15 @@ def _against(columns: pd.DataFrame, ends: tuple[float, float]) -> list[str]:
 
 
 def _interval_line(what: str, columns: pd.DataFrame, ends: tuple[float, float]) -> str:
-    mean = _seconds(columns["sooner_s"].mean())
-    return f"{what}: {mean} s saved, 95 % interval {_seconds(ends[0])} to {_seconds(ends[1])}"
+    return f"{what}: {_sooner(columns['sooner_s'].mean())}, {_interval(*ends)}"
+
+
+def _interval(low_s: float, high_s: float) -> str:
+    return f"95 %: {_sooner(low_s)} to {_sooner(high_s)}"
+
+
+def _sooner(seconds: float) -> str:
+    return f"{_seconds(abs(seconds))} s {'later' if seconds < 0.0 else 'sooner'}"
 
 
 def _seconds(value: float) -> str:

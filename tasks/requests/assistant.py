@@ -243,7 +243,10 @@ def plan_one(
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
-    from tasks.requests.explain import log_explanation  # late: tables cost a tenth of a second
+    from tasks.requests.explain import (
+        log_explanation,
+        log_without_memory,
+    )  # late: tables cost a tenth of a second
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
@@ -251,6 +254,9 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     by_parts = isinstance(memory, PlanLibrary) or not is_canonical(canonical)
     log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, by_parts)
+    if memory is not None:
+        with no_garbage_collection():
+            log_without_memory(attempt, assistant.attempt(canonical, UNASSISTED.name))
 
 
 def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:

@@ -59,6 +59,16 @@ def log_explanation(
     _LOG.info("ms       %s", _times(attempt))
 
 
+def log_without_memory(attempt: Attempt, alone: Attempt) -> None:
+    """Log what the same planner does ``alone`` with the problem of an ``attempt`` that had a memory."""
+    driving = [each.plan and f"{each.plan.duration_s:.1f} s driven" for each in (attempt, alone)]
+    told, told_alone = (
+        f"{1e3 * each.planning_seconds:.2f} ms, {driven or each.status}"
+        for each, driven in zip((attempt, alone), driving, strict=True)
+    )
+    _LOG.info("worth    with the memory %s; %s alone %s (once each)", told, attempt.planner, told_alone)
+
+
 def _recall_line(
     attempt: Attempt,
     memory: Memory | PlanLibrary | None,

@@ -76,6 +76,9 @@ def test_the_command_tells_and_draws_it(
     assert "guided the search" not in told  # the planner is soon done alone
     assert f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions" in told
     assert "in all" in told
+    alone = solve(WALL, "lattice", seed=1)
+    assert alone.plan is not None
+    assert re.search(rf"alone \S+ ms, {alone.plan.duration_s:.1f} s driven", told)
     assert marked.read_bytes() != plain.read_bytes()
     assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
     assert "no memory" in capsys.readouterr().out
