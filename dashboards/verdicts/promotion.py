@@ -122,7 +122,8 @@ def judgement_tables(judged: Judgement) -> list[CellTable]:
 
 def judgement_markdown(judged: Judgement, verdict: str) -> str:
     """What was ``judged`` as Markdown: what became of the challenger (``verdict``), figures and columns."""
-    head = f"**{verdict}**: {judged.why}.\n\n{judgement_line(judged)}.\n\n"
+    line = judgement_line(judged)
+    head = f"**{verdict}**: {judged.why}.\n\n{line[0].upper()}{line[1:]}.\n\n"
     return head + as_markdown(judgement_tables(judged))
 
 

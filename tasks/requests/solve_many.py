@@ -138,16 +138,20 @@ def solve_many(
 
 
 def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[PartResult]:
-    """Solve parts until all are solved, or the others seem to take so long that workers are worth a start."""
+    """Solve parts until all are solved, or the others seem to take so long that workers are worth a start.
+
+    The first part says nothing of that: it also takes what loading the memory and the kernels takes.
+    """
     numbers = count(1)  # of the problems, as they are solved
     results: list[PartResult] = []
-    began = time.monotonic()
+    began = math.inf  # of the second part
     with progress("solve", sum(part.problem_slice.count for part in parts), end_is_told=False) as show:
         for part in parts:
             results.append(solve_part_reporting(part, lambda: show(next(numbers))))
-            left = len(parts) - len(results)
-            if left > 1 and (time.monotonic() - began) / len(results) * left > most_seconds:
+            left, now = len(parts) - len(results), time.monotonic()
+            if left > 1 and (now - began) / max(len(results) - 1, 1) * left > most_seconds:
                 break
+            began = min(began, now)
     return results
 
 

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 from storage.places.data_folder import DataFolder
 from storage.places.mirror import is_there, local_place, shown
+from storage.places.run_folder import RunFolder
 from tasks.servers.prefect_server import LocalServer, local_server, set_environment
 from tasks.session.folder_lock import locked_folder
 from tasks.settings.environment import default_scheduler
@@ -62,7 +63,7 @@ def command_session(
             _workers_for(name, workers, scheduler, server, settings.vehicle),
         ):
             yield folder.place
-    _log_locations(folder, settings)
+    _log_locations(folder, folder.run(settings.run_name) if name != "retrain" else None)  # it makes others
 
 
 @contextmanager
@@ -87,10 +88,9 @@ def _workers_for(
         yield
 
 
-def _log_locations(folder: DataFolder, settings: RunSettings) -> None:
-    run = folder.run(settings.run_name)
-    places = {"data": shown(run.path if is_there(run.settings) else folder.path)}
-    _LOG.info(places | ({"figures": shown(run.figures)} if is_there(run.figures) else {}))
+def _log_locations(folder: DataFolder, run: RunFolder | None) -> None:
+    places = {"data": shown(run.path if run and is_there(run.settings) else folder.path)}
+    _LOG.info(places | ({"figures": shown(run.figures)} if run and is_there(run.figures) else {}))
     uri = redacted(tracking_uri(folder))
     _LOG.info("MLflow   %s", uri if uri.startswith("http") else f"mlflow ui --backend-store-uri {uri}")
     server = redacted(os.environ.get("PREFECT_API_URL", "")).removesuffix("/api")

@@ -32,6 +32,7 @@ _STEP: Final = re.compile(r"^```sh\n(.*?)^```\n(?:\s*^```text\n(.*?)^```$)?", re
 _PICTURE: Final = re.compile(r"!\[[^\]]*\]\(pictures/([^)]+)\)")
 _OF_THIS_MACHINE: Final = (
     (re.compile(r"-?\d[\d,]*\.\d+|\d+(?= problems/s)"), "#.#"),  # times and what is made of them
+    (re.compile(r"-?\d+ \[ *-?\d+, *-?\d+\]"), "# [#, #]"),  # shares of the planning time
     (re.compile(r"-[0-9a-f]{8}\b"), "-digest"),
     (re.compile(r"^(\s*\d+\s+\d+)\s+\d+(?=\s+\d+\s+\d+ of )", re.MULTILINE), r"\1 rank"),  # by the encoder
     (re.compile(r"─+"), "─"),

@@ -76,7 +76,7 @@ def test_few_problems_are_shared_out_once_they_take_long_and_the_rows_are_the_sa
         return [parts.SOLVE.run(part).result for part in left]
 
     monkeypatch.setattr(many_module, "part_workers", lambda *_: nullcontext())
-    for seconds, expected in ((0.0, [1]), (math.inf, [])):
+    for seconds, expected in ((0.0, [2]), (math.inf, [])):
         begun.clear()
         monkeypatch.setattr(many_module, "START_SECONDS", seconds)
         out = tmp_path / f"{seconds}.parquet"
