@@ -116,7 +116,7 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "-8,6,0", "--to", "150,190"], 2, "outside the map, at (-8.0, 6.0)"),
         (["--from", "8,6,0", "--to", "150,1900"], 2, "outside the map, at (150.0, 1900.0)"),
         (["--from", "8,6,0", "--to", "150,190", "--scale", "0"], 2, "Scale is 0"),
-        (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide, at scale 1"),
+        (["--from", "8,6,0", "--to", "150,190", "--resolution", "100"], 2, "is 20,000 m wide; at scale 1"),
         (["--from", "8,6,0", "--to", "150,190", "--assist", "open"], 2, "needs --memory"),
         (["--from", "8,6,0", "--to", "150,190", "--picture", "r.txt"], 2, "r.txt is not the name of a"),
         (["--from", "8,6,0", "--to", "150,190", "--memory", "small"], 1, "of scale 0.5, expected 1"),

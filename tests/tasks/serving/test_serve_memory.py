@@ -109,7 +109,7 @@ def test_a_port_that_is_taken_is_one_line(memory: Path) -> None:
         command = [sys.executable, "-m", "flows.cli.main", "serve-memory", str(memory), "--port", port]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=100)
     assert done.returncode == 1
-    assert f"Port {port} of 127.0.0.1 cannot be used" in done.stderr
+    assert f"Port {port} on 127.0.0.1 cannot be used" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
