@@ -47,7 +47,7 @@ def main(data: str, run: str, other: str, picture: str) -> None:
             asked = f"runs={quote(json.dumps(identities))}&experiments={quote(json.dumps([experiment]))}"
             driver.get(f"{address}/#/compare-runs?{asked}")
             WebDriverWait(driver, 60).until(
-                lambda page: "4-recall/oracle" in page.find_element(By.TAG_NAME, "body").text
+                lambda page: "1-gain/sooner_s" in page.find_element(By.TAG_NAME, "body").text
             )
             driver.execute_script(ONLY_DIFFERENCES)
             time.sleep(1.0)
