@@ -4,7 +4,8 @@ Recall hands out the free plan that drives shortest, so a set of plans is worth 
 counted in the candidates' own problems, each by the plans of the others: that a plan fits its own problem
 says nothing about it, and a plan that fits no other problem is kept last. Where no plan is free, a problem
 costs what its own plan takes and ``MISSED_S`` more. So both count: to be free in many problems, and to be
-quick. A problem may have several candidates, plans of its own that compete; at most one of them is kept.
+quick. Once no plan saves driving any more, those that are free in most problems come first. A problem may
+have several candidates, plans of its own that compete; at most one of them is kept.
 
 A plan takes off only a share of what it could save, so that a new problem finds several good plans. The kept
 plans are in the order of the greedy choice, so the first of them are a good choice of fewer. (The savings are
@@ -79,12 +80,17 @@ def choose(labels: Flags, durations: Floats, without: Floats, count: int, owners
     free = np.ascontiguousarray(labels.T)
     costs = without.copy()
     bounds = np.full(plans, np.inf)
+    unmet = np.ones(len(without))  # what it is worth that one more plan is free in a problem
     eligible = np.ones(plans, np.bool_)
     order = np.empty(count, np.int32)
     for step in range(count):
-        best = order[step] = _most_useful(free, durations, costs, bounds, eligible)
+        best = _most_useful(free, durations, costs, bounds, eligible)
+        if bounds[best] <= 0.0:
+            best = int(np.argmax(np.where(eligible, free @ unmet, -1.0)))
+        order[step] = best
         saves = free[best] & (durations[best] < costs)
         costs[saves] -= (1.0 - LEFT) * (costs[saves] - durations[best])
+        unmet[free[best]] *= LEFT
         eligible[owners == owners[best]] = False
     return order
 

@@ -2,7 +2,7 @@
 
 Rows ``(w, b)`` that are near each other stand in one list, and only the lists whose centres score best for an
 embedding are searched (Sivic and Zisserman 2003; Jegou, Douze and Schmid 2011, IVF). This is approximate: a
-plan in another list may score better. docs/growth.md says when it pays, and compares libraries.
+plan in another list may score better. docs/studies/growth.md says when it pays, and compares libraries.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ def _rows(vectors: Floats32, biases: Floats32) -> Floats32:
 def _nearest(rows: Floats32, centres: Floats32) -> Indices:
     """The number ``[n]`` of the centre nearest to each row."""
     halves = 0.5 * np.square(centres).sum(1)
-    blocks = [rows[i : i + _BLOCK] @ centres.T - halves for i in range(0, len(rows), _BLOCK)]
-    return np.concatenate([np.argmax(block, axis=1) for block in blocks])
+    starts = range(0, len(rows), _BLOCK)  # all at once would take 16 GB for a million plans
+    return np.concatenate([np.argmax(rows[i : i + _BLOCK] @ centres.T - halves, axis=1) for i in starts])
 
 
 @inlined

@@ -33,14 +33,15 @@ def choice(labels, durations, without, owners, count):
 
 def brute_force(labels, durations, without, owners, count):
     """The same choice, every gain from the definition at every step."""
-    costs, order = without.copy(), []
+    costs, unmet, order = without.copy(), np.ones(len(without)), []
     for _ in range(count):
         savings = np.where(labels, np.maximum(costs[:, None] - durations, 0.0), 0.0)
-        gains = savings.sum(0)
+        gains = savings.sum(0) if savings[:, ~np.isin(owners, owners[order])].any() else unmet @ labels
         gains[np.isin(owners, owners[order])] = -1.0
         best = int(np.flatnonzero(np.isclose(gains, gains.max(), rtol=1e-12, atol=1e-12))[0])
         order.append(best)
         costs -= (1.0 - LEFT) * savings[:, best]
+        unmet[labels[:, best]] *= LEFT
     return order
 
 
@@ -69,6 +70,12 @@ def test_fewer_are_the_beginning_of_more(seed, plans, share):
 def test_of_two_plans_that_fit_alike_the_quicker_is_kept():
     labels = np.ones((10, 2), bool)
     assert choice(labels, np.array([21.0, 20.0]), np.full(10, 25.0), np.arange(2), 1) == [1]
+
+
+def test_where_no_plan_saves_driving_those_that_are_free_in_more_problems_come_first():
+    labels = np.zeros((30, 6), bool)
+    labels[:20, 4] = labels[15:, 2] = True
+    assert choice(labels, np.full(6, 30.0), np.full(30, 25.0), np.arange(6), 2) == [4, 2]
 
 
 def test_plans_that_answer_no_problem_are_kept_last():
