@@ -55,7 +55,9 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
             for planner in others
         ]
         if now["solved"] != before["solved"]:
-            sentences.append(f"Solved are {now['solved']:.1%} instead of {before['solved']:.1%}.")
+            sentences.append(
+                f"{100.0 * now['solved']:.1f} % are solved instead of {100.0 * before['solved']:.1f} %."
+            )
         answered = now["recalled"] + now["repaired"]
         sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
         if rows["problems"].max() < FEW:
@@ -102,7 +104,7 @@ def _arrival(row: Row) -> str:
     """When the robot arrives, against the same planner alone on the same problems."""
     low, high = row["sooner_low_s"], row["sooner_high_s"]
     if math.isnan(row["sooner_s"]):
-        return "was not compared on the road"
+        return "has no drive to compare"
     if abs(row["sooner_s"]) < _SAME_S:
         return f"arrives at the same time (95 %: {_sooner(low)} to {_sooner(high)})"
     if low > 0.0:

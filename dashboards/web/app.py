@@ -40,9 +40,8 @@ from storage.errors import StorageError
 from storage.fields import parse_json
 from storage.places.data_folder import DataFolder
 
-Answer = Callable[
-    [DataReader, Parameters, Any], dict[str, Any]
-]  # from the data, the address and what was sent
+# from the data, the address and what was sent
+Answer = Callable[[DataReader, Parameters, Any], dict[str, Any]]
 
 LARGEST_BODY_BYTES: Final = 1 << 20
 PAGES: Final[dict[str, PageOf]] = {

@@ -107,7 +107,7 @@ def gather(
     write(task.gathered_table(counts))
     write_files(library=out)
     if model is not None:
-        from tasks.registry.registered_library import registered_library  # late: MLflow takes seconds
+        from tasks.registry.register_library import register_library  # late: MLflow takes seconds
 
         asked = {
             "sources": " ".join(sources),
@@ -117,7 +117,7 @@ def gather(
             "seed": seed,
         }
         write_files(
-            model=registered_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
+            model=register_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
         )
     return SHORT if sum(len(each.seconds) for each in counts) < plans else 0
 

@@ -44,7 +44,7 @@ def grow(memory: Memory, plans: Sequence[Plan], problems: Sequence[Problem]) -> 
         memory: whose encoder is used; its own plans are kept only if they are among ``plans``.
         plans: N plans to store.
         problems: canonical problems to derive the readout from, each checked with all plans; some 2,000 are
-            enough (docs/growth.md).
+            enough (docs/studies/growth.md).
 
     Raises:
         ValueError: There are no problems, or no plans.

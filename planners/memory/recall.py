@@ -26,7 +26,7 @@ import numpy as np
 
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import rank_by_cells, rank_to_try
-from planners.memory.plans.free import NOBODY, ends_of, first_fitting, first_fitting_drawn
+from planners.memory.plans.free import NO_PLANS, ends_of, first_fitting, first_fitting_drawn
 from planners.memory.ranking.inverted_lists import best_listed
 from planners.memory.ranking.scores import best_plans
 from planners.world.arrays import Floats32, Integers
@@ -43,7 +43,7 @@ CHECKED_EARLY: Final = 64  # of these, the best ranked: if they are blocked, the
 WORTH_CELLS: Final = 40  # blocked cells: in no class was a plan with 30 or more free
 LIKELY_CELLS: Final = 16  # blocked cells: where a plan with more is free, one with fewer mostly is, too
 POSSIBLE_CELLS: Final = 24  # blocked cells: on curves at hard only such plans are free in 9 % of problems
-TELLING: Final = 72  # the least blocked, and at least three quarters: if none is free, no other is tried
+DECISIVE: Final = 72  # the least blocked, and at least three quarters: if none is free, no other is tried
 
 
 class Recalled(NamedTuple):
@@ -98,7 +98,7 @@ def recall(
         count  # how many of the ranked plans may be returned, and how many are tried by driving time
     )
     tries: Integers | None = None
-    telling = NOBODY
+    decisive = NO_PLANS
     if strategy == "random":
         order = pick_blindly(count, k, rng)
     elif strategy == "encoder":
@@ -115,12 +115,12 @@ def recall(
         worth = int(ends[WORTH_CELLS])
         if strategy == "mask":
             order, tries = order[: min(k, worth)], None
-        elif len(tries) > (told := max(TELLING, 3 * len(order) // 4)):
-            telling = order[:told]
+        elif len(tries) > (told := max(DECISIVE, 3 * len(order) // 4)):
+            decisive = order[:told]
     if tries is None:
         tries = shortest_first(memory, order, likely)
     view.lap("recall")
-    free, checks = first_check(memory, view, tries, as_stored, telling)
+    free, checks = first_check(memory, view, tries, as_stored, decisive)
     return Recalled(_with(free, order[: min(k, worth)].tolist(), k), free, spent + checks)
 
 
@@ -225,17 +225,17 @@ def by_cells(
 
 
 def first_check(
-    memory: Memory, view: View, order: Integers, as_stored: bool, telling: Integers = NOBODY
+    memory: Memory, view: View, order: Integers, as_stored: bool, decisive: Integers = NO_PLANS
 ) -> tuple[int, int]:
     """Find the first plan of ``order [n]`` that fits the problem (-1: none), and count the collision checks.
 
     ``as_stored`` says that the problem begins with the heading of the stored plans. These are then checked
-    from the drawing, ``telling`` first; else plans are turned, and checked in the scene.
+    from the drawing, ``decisive`` first; else plans are turned, and checked in the scene.
     """
     if not len(order):
         return -1, 0
     if as_stored:
-        asked = (order, memory.sweeps, memory.masks, view.drawing, view.problem, telling)
+        asked = (order, memory.sweeps, memory.masks, view.drawing, view.problem, decisive)
         plan, checks = first_fitting_drawn(*asked)
     else:
         plan, checks = first_fitting(order, memory.sweeps, ends_of(view.problem), view.scene)

@@ -22,7 +22,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import admissible, control_limits, load, step, store, turn_error
+from planners.world.vehicles.dynamics import control_limits, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 TRIES: Final = 6  # shares 1, 1/2 ... of a change that are tried
@@ -222,27 +222,3 @@ def descend(
                 best = steps
                 copy_drive(model.states, model.controls, steps, model.best_states, model.best_controls)
     return steps, used, best, ended
-
-
-@lean
-def drive_along(model: Model, points: Floats, goal: Floats, ahead_m: float, vehicle: Vehicle) -> int:
-    """Drive along ``points [M, 2]`` at full speed from ``model.states[0]``; how many steps.
-
-    Obstacles are ignored. Pure pursuit: towards the first point that is farther away than ``ahead_m``.
-    """
-    states = model.states
-    most_0, most_1 = control_limits(vehicle)
-    at = 0
-    last = points.shape[0] - 1
-    for k in range(model.controls.shape[0]):
-        here = load(states, k, vehicle)
-        while at < last and length(points[at, 0] - here[0], points[at, 1] - here[1]) < ahead_m:
-            at += 1
-        turn = turn_error(here, points[at, 0], points[at, 1], vehicle)
-        first, second = admissible(here, most_0, min(max(TURN_GAIN * turn, -most_1), most_1), vehicle)
-        model.controls[k, 0] = first
-        model.controls[k, 1] = second
-        store(states, k + 1, step(here, first, second, vehicle))
-        if reaches(load(states, k + 1, vehicle), goal):
-            return k + 1
-    return model.controls.shape[0]

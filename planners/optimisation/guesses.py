@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -33,16 +32,6 @@ def straight_line(problem: Problem, vehicle: Vehicle = CAR) -> Plan:
     controls = np.zeros((len(driven) - 1, 2))
     controls[:, 0] = np.diff(speeds) / vehicle.dt
     return Plan(states, controls, vehicle.dt)
-
-
-def nearest_to_free(plans: Sequence[Plan], scene: Scene, vehicle: Vehicle = CAR) -> int:
-    """Return the number of the plan with the fewest states in collision, the first of equals.
-
-    Raises ValueError if there is no plan.
-    """
-    if not plans:
-        raise ValueError("There is no plan to choose from: store some first.")
-    return int(np.argmin([count_blocked(plan.states, vehicle, scene) for plan in plans]))
 
 
 @jit

@@ -9,10 +9,8 @@ import math
 from time import perf_counter
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
-from planners.optimisation.descent import Stage, descend, drive_along, steps_to_goal
+from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
@@ -117,27 +115,6 @@ def driven_near(
 def most_iterations(problem: Problem) -> int:
     """As many iterations as are of use for a problem."""
     return ITERATIONS if problem.arrival is None else ARRIVING_ITERATIONS
-
-
-def polish_path(
-    problem: Problem,
-    points: Floats,
-    vehicle: Vehicle,
-    scene: Scene,
-    workspace: Workspace,
-    iterations: int = ITERATIONS,
-    margin_m: float = 0.0,
-    ahead_m: float = 3.0,
-) -> Polished:
-    """Find a plan along a path ``points [M, 2]`` (metres): drive along it at full speed, then polish that.
-
-    The other arguments are those of ``polish``; ``ahead_m`` says how far ahead on the path the drive aims.
-    """
-    ways = np.hypot(*np.diff(points, axis=0).T).sum() if len(points) > 1 else 0.0
-    most = 50 + math.ceil(1.5 * ways / (vehicle.max_speed * vehicle.dt))
-    model, goal = _ready(problem, most, vehicle, workspace)
-    steps = drive_along(model, np.ascontiguousarray(points[:, :2]), goal, ahead_m, vehicle)
-    return _polished(None, model, steps, goal, False, vehicle, scene, iterations, margin_m, math.inf)
 
 
 def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:

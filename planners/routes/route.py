@@ -21,7 +21,7 @@ from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.routes.manoeuvres import braking, is_free_drive
+from planners.routes.braking import braking, is_free_drive
 from planners.routes.path_ahead import LocalGoal, PathAhead
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
@@ -217,9 +217,8 @@ class Router:
         x, y, heading = state[:3].tolist()
         towards = math.atan2(goal.place[1] - y, goal.place[0] - x)
         distance = math.dist((x, y), goal.place)
-        before = 0.5 * max(
-            CANONICAL_DISTANCE - distance, 0.0
-        )  # metres from the window's start to the vehicle
+        # metres from the window's start to the vehicle
+        before = 0.5 * max(CANONICAL_DISTANCE - distance, 0.0)
         cos, sin = math.cos(towards), math.sin(towards)
         window = self._surroundings.problem(
             x - before * cos, y - before * sin, towards, f"{self._name}-route-{self._attempts}", self._name

@@ -13,7 +13,7 @@ from planners.search.guides.sampling import in_disc, uniform
 from planners.search.gust import GustSettings
 from planners.search.outcome import Outcome
 from planners.search.query import Guide, Query
-from planners.search.rrt import along_guide, towards_anywhere
+from planners.search.rrt import along_guide, growing
 from planners.search.search_loop import attempt
 from planners.search.structures.roadmap import (
     Roadmap,
@@ -208,5 +208,5 @@ def follow(query: Query, settings: FollowSettings) -> Outcome:
     def grow(tree: Tree, goal: Floats, until: int) -> None:
         _grow(tree, goal, until, roadmap, groups, lead, settings, exploring, vehicle, scene, rng)
 
-    explore, along = towards_anywhere(query), along_guide(query)
+    explore, along = growing(query), along_guide(query)
     return attempt(query, settings.gust.restart_after, prepare, grow, explore, along)

@@ -8,7 +8,7 @@ import numpy as np
 
 from planners.search.outcome import work_of
 from planners.search.query import Guide, Query
-from planners.search.rrt import RRT, towards_anywhere
+from planners.search.rrt import RRT, growing
 from planners.search.structures import tree as trees
 from planners.world.goal import goal_of
 from planners.world.problem import Plan
@@ -30,7 +30,7 @@ class GuidedSearch:
         self._query, self._dt = query, vehicle.dt
         self._tree = query.workspace.buffers(trees.allocate_tree, NODES, state_size(vehicle))
         self._goal = goal_of(problem)
-        self._grow = towards_anywhere(query, guide)
+        self._grow = growing(query, guide)
         self._prefix = len(prefix.states)
         self._restart_at, self._trial = RRT.restart_after, 0
         states = np.ascontiguousarray(prefix.states)

@@ -11,7 +11,7 @@ from numpy.random import BitGenerator
 from planners.search.guides.sampling import in_bounds, in_disc, uniform
 from planners.search.outcome import Outcome
 from planners.search.query import Guide, Query
-from planners.search.rrt import along_guide, towards_anywhere
+from planners.search.rrt import along_guide, growing
 from planners.search.search_loop import attempt
 from planners.search.structures import tree as trees
 from planners.search.structures.neighbours import nearest_for
@@ -226,5 +226,5 @@ def gust(query: Query, settings: GustSettings) -> Outcome:
     def grow(tree: trees.Tree, goal: Floats, until: int) -> None:
         grow_gust(tree, goal, until, roadmap, groups, settings, vehicle, scene, rng)
 
-    explore, along = towards_anywhere(query), along_guide(query)
+    explore, along = growing(query), along_guide(query)
     return attempt(query, settings.restart_after, prepare, grow, explore, along)

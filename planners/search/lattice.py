@@ -14,7 +14,7 @@ from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
 from planners.search.outcome import Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
-from planners.search.rrt import towards_anywhere
+from planners.search.rrt import growing
 from planners.search.search_loop import attempt
 from planners.search.structures import tree as trees
 from planners.search.structures.cost_to_go import (
@@ -126,9 +126,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return found
 
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    outcome = attempt(
-        query, settings.restart_after, prepare, grow, towards_anywhere(query), explore_from=explore_from
-    )
+    outcome = attempt(query, settings.restart_after, prepare, grow, growing(query), explore_from=explore_from)
     if joining is None:
         return outcome
     return replace(

@@ -54,7 +54,7 @@ def grow_rrt(
             return
 
 
-def towards_anywhere(query: Query, guide: Guide = NO_GUIDE, settings: RrtSettings = RRT) -> Grow:
+def growing(query: Query, guide: Guide = NO_GUIDE, settings: RrtSettings = RRT) -> Grow:
     """How RRT grows a tree: along a guide, or towards anywhere. Other planners use it for a while, too."""
     bits = query.rng.bit_generator
     return lambda tree, goal, until: grow_rrt(
@@ -65,7 +65,7 @@ def towards_anywhere(query: Query, guide: Guide = NO_GUIDE, settings: RrtSetting
 def along_guide(query: Query) -> Grow | None:
     """How a planner with a roadmap grows its tree along a guide first; None without a guide to go along."""
     guide = query.guide
-    return None if guide is None or guide.lead == 0 else towards_anywhere(query, guide)
+    return None if guide is None or guide.lead == 0 else growing(query, guide)
 
 
 def rrt(query: Query, settings: RrtSettings) -> Outcome:
@@ -75,5 +75,5 @@ def rrt(query: Query, settings: RrtSettings) -> Outcome:
         query,
         settings.restart_after,
         lambda tree, goal, trial: None,
-        towards_anywhere(query, guide, settings),
+        growing(query, guide, settings),
     )

@@ -80,7 +80,7 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
             promote(registry, version)
         elif verdict == AWAITING:
             registry.set_alias(version, CHALLENGER)
-        registry.tagged(version, {"verdict": verdict})
+        registry.set_tags(version, {"verdict": verdict})
     publish_judgements(
         run.settings.run_name, [(each.memory, each.summary, each.markdown) for each in judged_versions]
     )

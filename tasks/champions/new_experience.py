@@ -41,12 +41,10 @@ class PendingRetraining(NamedTuple):
     first_run: RunSettings | None  # a run for the memories without a champion; None if all have one
     without_champion: Sequence[str]  # names of these memories
     champions: Mapping[str, Version]  # by memory
-    gained: Mapping[
-        str, list[SearchedExperience]
-    ]  # all experiences gained on the job, for each class with a champion
-    fresh: Mapping[
-        str, list[SearchedExperience]
-    ]  # experiences that no judged version has seen; only for classes that have some
+    # all experiences gained on the job, for each class with a champion
+    gained: Mapping[str, list[SearchedExperience]]
+    # experiences that no judged version has seen; only for classes that have some
+    fresh: Mapping[str, list[SearchedExperience]]
     last_judged: Mapping[str, Version]  # by memory: the newest judged version, which may be the champion
 
 
@@ -141,7 +139,7 @@ def runs_to_make(folder: DataFolder, settings: RunSettings, registry: Registry) 
 def _note_verdict(registry: Registry, champion: Version | None) -> None:
     """Note the verdict on a champion whose promotion was interrupted before the verdict was noted."""
     if champion is not None and champion.tag("key") and not champion.tag("verdict"):
-        registry.tagged(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
+        registry.set_tags(champion, {"verdict": PROMOTED if champion.tag("previous") else FIRST})
 
 
 def _challenger_run(

@@ -43,7 +43,7 @@ def promote(registry: Registry, challenger: Version) -> None:
             f"{challenger.name} version {challenger.number} was judged against version {against}, but the "
             f"champion is {now} now and stays; the next retraining judges again."
         )
-    registry.tagged(challenger, {"previous": champion.number})
+    registry.set_tags(challenger, {"previous": champion.number})
     registry.set_alias(challenger)
 
 
@@ -72,8 +72,8 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
     changes = []
     for challenger in awaiting:
         promote(registry, challenger)
-        registry.tagged(challenger, {"verdict": PROMOTED})
-        registry.drop(challenger.name, CHALLENGER)
+        registry.set_tags(challenger, {"verdict": PROMOTED})
+        registry.remove_alias(challenger.name, CHALLENGER)
         changes.append(ChampionChange(challenger.name, int(challenger.tag("against")), challenger.number))
     return changes
 
@@ -114,10 +114,9 @@ def roll_back(data: Path, memory: str | None) -> list[ChampionChange]:
                 f"{champion.name}: version {champion.tag('previous')}, the previous champion, is no longer "
                 f"in the registry; version {champion.number} stays."
             )
-        registry.tagged(champion, {"verdict": ROLLED_BACK})
-        registry.set_alias(
-            before
-        )  # last: if the command is killed before this line, repeating it still goes back only one version
+        registry.set_tags(champion, {"verdict": ROLLED_BACK})
+        # last: if the command is killed before this line, repeating it still goes back only one version
+        registry.set_alias(before)
         changes.append(ChampionChange(champion.name, champion.number, before.number))
     return changes
 

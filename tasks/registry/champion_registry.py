@@ -123,9 +123,9 @@ class Registry:
                 )
                 version = _version(entry)
             client.update_model_version(name, str(version.number), description)
-        return self.tagged(version, tags)
+        return self.set_tags(version, tags)
 
-    def tagged(self, version: Version, tags: Mapping[str, Any]) -> Version:
+    def set_tags(self, version: Version, tags: Mapping[str, Any]) -> Version:
         """Write tags to a version; return the version with them."""
         texts = {tag: str(value) for tag, value in tags.items()}
         with self._client() as client:
@@ -138,7 +138,7 @@ class Registry:
         with self._client() as client:
             client.set_registered_model_alias(version.name, alias, str(version.number))
 
-    def drop(self, name: str, alias: str) -> None:
+    def remove_alias(self, name: str, alias: str) -> None:
         """Remove an alias."""
         with self._client() as client:
             client.delete_registered_model_alias(name, alias)

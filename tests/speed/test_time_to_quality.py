@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.text import Text
 from rich.console import Console
 
 from planners.world.authority.authority import faults
@@ -30,6 +33,7 @@ from tests.speed.time_to_quality.quality import (
     time_to_good,
     total,
 )
+from tests.speed.time_to_quality.quality_curves import quality_curves
 from tests.speed.time_to_quality.tables import headline, total_rows
 
 HORIZON = 1.0
@@ -155,3 +159,19 @@ def test_what_was_attempted_is_kept_and_not_attempted_again(tmp_path: Path) -> N
     assert len(asked) == attempts
     again(0.2)
     assert len(asked) == 2 * attempts
+
+
+def test_each_way_to_plan_is_named_beside_its_line_and_no_name_lies_over_another() -> None:
+    ways = [("GUST, alone", "alone", False), ("RRT, alone", "alone", False), ("GUST, memory", "memory", True)]
+    moments = [0.1, 1.0, 10.0]
+    rows = [
+        {"method": name, "kind": kind, "memory": memory, "ms": ms, "over": 0.2 / ms}
+        for name, kind, memory in ways
+        for ms in moments
+    ]
+    figure = quality_curves(pd.DataFrame(rows), "A class", {"alone": "#888888", "memory": "#0072B2"})
+    (axes,) = figure.axes
+    assert len(axes.lines) == len(ways)
+    assert {name for name, _, _ in ways} <= {text.get_text() for text in figure.findobj(Text)}
+    heights = sorted(cast(Any, label).xyann[1] for label in axes.texts)
+    assert min(after - before for before, after in pairwise(heights)) > 0.04

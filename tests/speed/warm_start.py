@@ -22,12 +22,12 @@ from rich.table import Table
 from scipy.stats import bootstrap
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, nearest_to_free, straight_line
+from planners.optimisation.guesses import count_blocked, straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise, refined
 from planners.search.registry import plan
 from planners.world.arrays import Floats
 from planners.world.classes.problem_classes import CLASSES, problem_class
-from planners.world.geometry.collision import scene_of
+from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
@@ -69,16 +69,21 @@ def collected(name: str) -> list[Plan]:
     return plans
 
 
+def least_blocked(plans: Sequence[Plan], scene: Scene) -> Plan:
+    """The plan with the fewest states in collision, the first of equals."""
+    return min(plans, key=lambda each: count_blocked(each.states, CAR, scene))
+
+
 def guesses_for(problem: Problem, stored: Sequence[Plan]) -> dict[str, Callable[[], Plan]]:
     """How each start comes by its guess: in the timed region."""
 
     def recalled() -> Plan:
-        return stored[nearest_to_free(stored, scene_of(problem))]
+        return least_blocked(stored, scene_of(problem))
 
     def blocked() -> Plan:
         scene = scene_of(problem)
         colliding = [each for each in stored if count_blocked(each.states, CAR, scene) > 0]
-        return colliding[nearest_to_free(colliding, scene)]
+        return least_blocked(colliding, scene)
 
     def searched() -> Plan:
         found = plan("follow", problem, generator(SEED, problem.id)).plan

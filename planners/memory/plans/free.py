@@ -27,7 +27,7 @@ from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Plan, Problem
 
 START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
-NOBODY: Final = np.empty(0, np.int32)
+NO_PLANS: Final = np.empty(0, np.int32)
 
 
 class Ends(NamedTuple):
@@ -226,7 +226,7 @@ def _first_drawn(
 @lean
 def _first_fitting_drawn(
     order: Integers,
-    telling: Integers,
+    decisive: Integers,
     sweeps: PlanSweeps,
     masks: Bits,
     drawing: Drawing,
@@ -237,9 +237,9 @@ def _first_fitting_drawn(
     ends: Ends,
 ) -> tuple[int, int]:
     plan, checks, blocking = _first_drawn(
-        telling, sweeps, masks, drawing, vertices, piece_starts, edges, bounds, ends, 0
+        decisive, sweeps, masks, drawing, vertices, piece_starts, edges, bounds, ends, 0
     )
-    if plan < 0 and telling.shape[0] > 0:
+    if plan < 0 and decisive.shape[0] > 0:
         return plan, checks
     plan, more, _ = _first_drawn(
         order, sweeps, masks, drawing, vertices, piece_starts, edges, bounds, ends, blocking
@@ -253,7 +253,7 @@ def first_fitting_drawn(
     masks: Bits,
     drawing: Drawing,
     problem: Problem,
-    telling: Integers = NOBODY,
+    decisive: Integers = NO_PLANS,
 ) -> tuple[int, int]:
     """Find the first plan that fits a problem as it is stored, from the problem's drawing.
 
@@ -265,7 +265,7 @@ def first_fitting_drawn(
         masks: ``[N, 64]`` the cells that each plan sweeps.
         drawing: of the problem.
         problem: what the plan is to fit.
-        telling: ``[m]`` plans to try before; if there are some and none of them fits, no other is tried.
+        decisive: ``[m]`` plans to try before; if there are some and none of them fits, no other is tried.
 
     Returns:
         The plan, -1 if none fits, and how many times a box was tried on an obstacle.
@@ -273,6 +273,6 @@ def first_fitting_drawn(
     vertices, piece_starts, _ = problem.obstacles
     edges = np.empty((len(vertices), 5))
     return _first_fitting_drawn(
-        *(order, telling, sweeps, masks, drawing, vertices, piece_starts, edges, problem.bounds),
+        *(order, decisive, sweeps, masks, drawing, vertices, piece_starts, edges, problem.bounds),
         ends_of(problem),
     )

@@ -12,7 +12,7 @@ from planners.search.manoeuvres.driving import (
     drive_word,
     turn_wheels,
 )
-from planners.search.manoeuvres.goal_tree import GoalTree
+from planners.search.manoeuvres.pose_tree import PoseTree
 from planners.search.query import Endings
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
@@ -26,7 +26,7 @@ from planners.world.vehicles.vehicle import Vehicle
 @lean
 def drive_to_goal(
     drive: Drive,
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     word: int,
     start: Floats,
@@ -48,9 +48,9 @@ def drive_to_goal(
 @lean
 def drive_arcs_to_goal(
     drive: Drive,
-    before: GoalTree,
+    before: PoseTree,
     links: int,
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     start: Floats,
     endings: Endings,
@@ -99,7 +99,7 @@ def _drive_known(drive: Drive, endings: Endings, part: int, vehicle: Vehicle, sc
 
 @lean
 def _drive_in(
-    drive: Drive, tree: GoalTree, node: int, endings: Endings, goal: Floats, vehicle: Vehicle, scene: Scene
+    drive: Drive, tree: PoseTree, node: int, endings: Endings, goal: Floats, vehicle: Vehicle, scene: Scene
 ) -> bool:
     """Drive on over the tree's arcs from a node to the goal."""
     while node > 0:

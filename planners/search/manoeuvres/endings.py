@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, add_known_node
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, add_known_node
 from planners.search.query import Endings
 from planners.world.arrays import Floats, Indices, Integers
 from planners.world.geometry.collision import Scene, state_is_free
@@ -86,7 +86,7 @@ def _in_frame_of_end(drive: Floats) -> Floats:
 
 
 @inlined
-def _placed(endings: Endings, i: int, tree: GoalTree, vehicle: Vehicle) -> State:
+def _placed(endings: Endings, i: int, tree: PoseTree, vehicle: Vehicle) -> State:
     """A state of an ending at the root of a tree."""
     state = load(endings.states, i, vehicle)
     sin, cos = sincos(tree.states[0, 2])
@@ -96,7 +96,7 @@ def _placed(endings: Endings, i: int, tree: GoalTree, vehicle: Vehicle) -> State
 
 
 @lean
-def add_endings(tree: GoalTree, endings: Endings, nodes: Integers, vehicle: Vehicle, scene: Scene) -> None:
+def add_endings(tree: PoseTree, endings: Endings, nodes: Integers, vehicle: Vehicle, scene: Scene) -> None:
     """Add the stops from which what is known leads freely to the goal; ``nodes [K]``: numbers, or -1."""
     for k in range(endings.follows.shape[0]):
         nodes[k] = -1

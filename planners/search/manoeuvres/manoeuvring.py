@@ -13,8 +13,8 @@ from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree, allocate_goal_tree, plant_root, pose_of
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.query import Endings, Query
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
@@ -77,9 +77,9 @@ def allocate_way_from_start() -> CostToGo:
     return allocate_cost_to_go()
 
 
-def allocate_trees(state_size: int, number: int) -> tuple[GoalTree, GoalTree]:
+def allocate_trees(state_size: int, number: int) -> tuple[PoseTree, PoseTree]:
     """Trees out of the goal and out of the start; each search has a ``number``, and buffers of its own."""
-    return allocate_goal_tree(state_size), allocate_goal_tree(state_size)
+    return allocate_pose_tree(state_size), allocate_pose_tree(state_size)
 
 
 class Manoeuvring:
@@ -161,7 +161,7 @@ class Manoeuvring:
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
 
     def _grow(self, most: int) -> tuple[bool, int]:
-        """Grow the goal tree by some expansions at most; whether there is a drive, and how many they were."""
+        """Grow the trees by some expansions at most; whether there is a drive, and how many they were."""
         level = _suited(LEVELS[self._level][1], self._vehicle)
         settings = self._goal, self._drive, level, self._vehicle, self._scene
         used = 0

@@ -6,8 +6,8 @@ from typing import Final
 
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal
 from planners.search.manoeuvres.driving import Drive
-from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree
 from planners.search.manoeuvres.joining import MOST_ARCS, arcs_are_free, close
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
 from planners.search.query import Endings
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
@@ -19,9 +19,9 @@ BENT: Final = MOST_ARCS // 2  # arcs before the meeting that are corrected, and 
 
 @lean
 def meet(
-    before: GoalTree,
+    before: PoseTree,
     last: int,
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     endings: Endings,
     goal: Floats,

@@ -12,17 +12,17 @@ from planners.search.connection.pose_table import seconds_from
 from planners.search.manoeuvres.arcs import FINE, STRIDE, stride_along, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
-from planners.search.manoeuvres.goal_tree import (
+from planners.search.manoeuvres.meeting import meet
+from planners.search.manoeuvres.pose_tree import (
     CHECKS,
     SIZE,
-    GoalTree,
+    PoseTree,
     add_node,
     cell_of,
     mark_place,
     node_near,
     seconds_after,
 )
-from planners.search.manoeuvres.meeting import meet
 from planners.search.manoeuvres.shots import FromStart, shoot
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
@@ -78,7 +78,7 @@ def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> flo
 
 @lean
 def begin_outward(
-    tree: GoalTree, known: FromStart, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
+    tree: PoseTree, known: FromStart, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
 ) -> None:
     """Let the stops of known endings wait that are free; ``nodes [K]`` is filled in with their numbers."""
     add_endings(tree, known.endings, nodes, vehicle, scene)
@@ -92,8 +92,8 @@ def begin_outward(
 
 @lean
 def open_node(
-    tree: GoalTree,
-    other: GoalTree,
+    tree: PoseTree,
+    other: PoseTree,
     node: int,
     further: bool,
     known: FromStart,
@@ -134,8 +134,8 @@ def open_node(
 
 @inlined
 def _wait(
-    tree: GoalTree,
-    other: GoalTree,
+    tree: PoseTree,
+    other: PoseTree,
     node: int,
     state: State,
     bend: float,
@@ -164,8 +164,8 @@ def _wait(
 
 @lean
 def grow_outward(
-    tree: GoalTree,
-    other: GoalTree,
+    tree: PoseTree,
+    other: PoseTree,
     most: int,
     known: FromStart,
     goal: Floats,

@@ -12,8 +12,8 @@ from planners.search.connection.words import PARTS, list_words
 from planners.search.manoeuvres.arcs import stride_along, stride_of
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goal
 from planners.search.manoeuvres.driving import Drive
-from planners.search.manoeuvres.goal_tree import CHECKS, GoalTree
 from planners.search.manoeuvres.joining import arcs_are_free, close, take_word, trailers_are_off
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
 from planners.search.query import Endings
 from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
@@ -42,7 +42,7 @@ class FromStart(NamedTuple):
 
 @lean
 def word_is_free(
-    c: Connection, number: int, top: float, vehicle: Vehicle, scene: Scene, tree: GoalTree
+    c: Connection, number: int, top: float, vehicle: Vehicle, scene: Scene, tree: PoseTree
 ) -> bool:
     """Whether the way of a word from ``c.states[0]`` is free."""
     word = c.words[number]
@@ -70,7 +70,7 @@ def word_is_free(
 
 @lean
 def _shoot_alone(
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     known: FromStart,
     goal: Floats,
@@ -101,7 +101,7 @@ def _shoot_alone(
 
 @lean
 def _shoot_with_trailers(
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     known: FromStart,
     goal: Floats,
@@ -148,7 +148,7 @@ def _shoot_with_trailers(
 
 @lean
 def shoot(
-    tree: GoalTree,
+    tree: PoseTree,
     node: int,
     known: FromStart,
     goal: Floats,

@@ -14,9 +14,9 @@ from numpy.random import BitGenerator
 
 from planners.search.guides.sampling import guided, in_bounds, uniform
 from planners.search.query import NO_GUIDE, Guide, Query
-from planners.search.structures.clearance import clearance, strip_is_free
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, nearest_k, put
 from planners.world.arrays import Floats, Indices
+from planners.world.geometry.clearance import clearance, strip_is_free
 from planners.world.geometry.collision import Scene, box_is_free
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.vehicle import Vehicle

@@ -6,9 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
 
 import pandas as pd
 import pytest
@@ -22,7 +20,6 @@ from dashboards.figures.planning_curves import (
     performance_profile,
     solved_against_time,
 )
-from dashboards.figures.quality_curves import quality_curves
 from dashboards.figures.recall_curves import retrieval_curves, training_curves
 from dashboards.figures.style import new_figure, save
 from dashboards.statistics import distributions
@@ -131,22 +128,6 @@ def test_every_planner_and_class_has_a_panel_of_curves(name: str, attempt_rows: 
 def test_the_figure_says_what_counts_as_planning_time(attempt_rows: pd.DataFrame) -> None:
     words = " ".join(texts(planning_times(summarise(attempt_rows, resamples=10)))).replace("\n", " ")
     assert PLANNING_TIME in words
-
-
-def test_each_way_to_plan_is_named_beside_its_line_and_no_name_lies_over_another() -> None:
-    ways = [("GUST, alone", "alone", False), ("RRT, alone", "alone", False), ("GUST, memory", "memory", True)]
-    moments = [0.1, 1.0, 10.0]
-    rows = [
-        {"method": name, "kind": kind, "memory": memory, "ms": ms, "over": 0.2 / ms}
-        for name, kind, memory in ways
-        for ms in moments
-    ]
-    figure = quality_curves(pd.DataFrame(rows), "A class", {"alone": "#888888", "memory": "#0072B2"})
-    (axes,) = figure.axes
-    assert len(axes.lines) == len(ways)
-    assert {name for name, _, _ in ways} <= set(texts(figure))
-    heights = sorted(cast(Any, label).xyann[1] for label in axes.texts)
-    assert min(after - before for before, after in pairwise(heights)) > 0.04
 
 
 @pytest.mark.parametrize("chart", [

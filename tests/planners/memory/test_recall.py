@@ -128,7 +128,7 @@ def test_where_most_plans_seem_free_others_are_tried_only_if_one_of_the_least_bl
     problem = problem_in(seed, count)
     least = rank_by_cells(memory.masks, View(problem).bits).order[: 3 * PLANS // 4]
     all_tried = recalled_by(memory, problem, "exhaustive", k)
-    with mock.patch("planners.memory.recall.TELLING", 1):
+    with mock.patch("planners.memory.recall.DECISIVE", 1):
         found = recalled_by(memory, problem, "exhaustive", k)
     if free_in(memory, problem)[least].any():
         assert found.free == all_tried.free

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planners.optimisation.clearance_field import least_clearance
-from planners.optimisation.guesses import count_blocked, nearest_to_free, resampled, straight_line
+from planners.optimisation.guesses import count_blocked, resampled, straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Ending, Optimised, optimise, refined
 from planners.optimisation.transcription import CostWeights
 from planners.search.registry import plan
@@ -18,7 +18,7 @@ from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, VEHICLES, Vehicle
-from tests.worlds import box, problem_of, strewn
+from tests.worlds import box, problem_of
 
 NEAR = (12.0, 12.0)  # a goal so near that an optimisation takes a fraction of a second
 
@@ -157,18 +157,6 @@ def test_a_differential_drives_guess_is_taken_for_its_own() -> None:
 def test_settings_without_sense_are_refused() -> None:
     with pytest.raises(ValueError, match="0 iterations"):
         optimise(world(), searched(), DEFAULT_SETTINGS._replace(iterations=0))
-
-
-def test_the_least_blocked_plan_is_chosen() -> None:
-    problem = strewn(5, 40)
-    plans = [straight_line(problem), *(plan("rrt", strewn(5, 40), generator(i)).plan for i in (1, 2))]
-    scene = scene_of(problem)
-    assert all(each is not None for each in plans)
-    chosen = nearest_to_free(plans, scene)
-    counts = [sum(count_free_prefix(state[None], CAR, scene) == 0 for state in each.states) for each in plans]
-    assert chosen == int(np.argmin(counts)) > 0
-    with pytest.raises(ValueError, match="no plan"):
-        nearest_to_free([], scene)
 
 
 def test_resampling_keeps_ends_and_duration() -> None:

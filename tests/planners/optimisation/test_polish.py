@@ -10,7 +10,7 @@ import pytest
 
 from planners.optimisation.guesses import count_blocked
 from planners.optimisation.optimise import optimise
-from planners.optimisation.polish import Polished, polish, polish_path
+from planners.optimisation.polish import Polished, polish
 from planners.search.registry import plan
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import count_free_prefix, scene_of
@@ -103,13 +103,6 @@ def test_a_start_in_the_goal_stays_as_it_is() -> None:
     problem = replace(problem_of([]), goal=(1.0, 0.0))
     rest = Plan(np.array([[*problem.start, 0.0, 0.0]]), np.empty((0, 2)))
     assert polished(problem, rest) == (rest, 0)
-
-
-def test_a_path_of_points_becomes_a_plan() -> None:
-    problem = problem_of([box(25.0, 25.0, 0.0, 4.0, 4.0)])
-    points = np.array([[0.0, 0.0], [15.0, 15.0], [32.0, 18.0], [50.0, 50.0]])
-    found = polish_path(problem, points, CAR, scene_of(problem), WORKSPACE)
-    assert assert_is_a_plan(problem, found.plan).duration_s < 19.5
 
 
 def test_a_margin_keeps_away_from_obstacles() -> None:

@@ -16,7 +16,7 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
-from planners.routes.manoeuvres import braking, is_free_drive
+from planners.routes.braking import braking, is_free_drive
 from planners.routes.path_ahead import PathAhead
 from planners.routes.route import Route, Router, Stuck
 from planners.solve import solve

@@ -20,7 +20,6 @@ import pandas as pd
 from rich.console import Console
 
 from dashboards.cells import markdown_table
-from dashboards.figures.quality_curves import quality_curves
 from dashboards.figures.style import save
 from dashboards.palette import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
 from storage.archives.memories import load_memory
@@ -34,6 +33,7 @@ from tasks.settings.run_settings import RunSettings
 from tests.speed.time_to_quality.measuring import measured
 from tests.speed.time_to_quality.methods import KINDS, methods
 from tests.speed.time_to_quality.quality import BUDGETS, Quality, over_best, quality_of
+from tests.speed.time_to_quality.quality_curves import quality_curves
 from tests.speed.time_to_quality.tables import (
     TOTAL_HEADINGS,
     good_table,

@@ -140,7 +140,7 @@ def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_ag
         return wrapped
 
     with monkeypatch.context() as patch:
-        for name in ("set_alias", "tagged"):
+        for name in ("set_alias", "set_tags"):
             patch.setattr(Registry, name, killed_after_one(getattr(Registry, name)))
         with pytest.raises(KeyboardInterrupt):
             roll_back(registered.data, None)

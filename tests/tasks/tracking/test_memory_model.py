@@ -34,7 +34,7 @@ from storage.exchange.problems import fields_of, problem_of
 from storage.places.data_folder import open_data_folder
 from storage.tables.shards import write_table
 from tasks.registry.model_uris import load_from
-from tasks.registry.registered_library import registered_library
+from tasks.registry.register_library import register_library
 from tasks.settings.errors import RunError
 from tests import worlds
 from tests.storage.samples import a_memory
@@ -113,7 +113,7 @@ def test_a_library_is_registered_once_and_loaded_by_its_address(
     save_library(folder, library)
     monkeypatch.setenv("MOTION_MEMORY_DATA", str(tmp_path / "data"))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
-    named = [registered_library("docks", folder, CAR, {"sources": "random"}, {"plans": 12}) for _ in range(2)]
+    named = [register_library("docks", folder, CAR, {"sources": "random"}, {"plans": 12}) for _ in range(2)]
     assert named == ["models:/docks/1", "models:/docks/1"]
     loaded = load_from(named[0], CAR)
     assert isinstance(loaded, PlanLibrary)

@@ -7,7 +7,6 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from planners.search.guides.guidance import published_guidance
-from planners.search.structures.clearance import clearance, strip_is_free
 from planners.search.structures.roadmap import (
     ANYWHERE,
     BLOCKED,
@@ -21,6 +20,7 @@ from planners.search.structures.roadmap import (
     build_roadmap,
     resample_path,
 )
+from planners.world.geometry.clearance import clearance, strip_is_free
 from planners.world.geometry.collision import scene_of
 from planners.world.goal import goal_of
 from planners.world.randomness import generator

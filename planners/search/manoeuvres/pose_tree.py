@@ -23,11 +23,11 @@ PLACE_HEADINGS: Final = 48  # ... and how many headings are told apart there
 _FIBONACCI: Final = 0x9E3779B1
 HITCH_CELLS: Final = 5.0  # a radian
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
-# indices into GoalTree.counts
+# indices into PoseTree.counts
 SIZE, CHECKS = range(2)
 
 
-class GoalTree(NamedTuple):
+class PoseTree(NamedTuple):
     """Poses at rest, each joined by an arc to the one that it was reached from; the first is the goal."""
 
     states: Floats  # [NODES, S]
@@ -42,9 +42,9 @@ class GoalTree(NamedTuple):
     counts: Indices  # [2]
 
 
-def allocate_goal_tree(state_size: int) -> GoalTree:
+def allocate_pose_tree(state_size: int) -> PoseTree:
     """Buffers for states of ``state_size`` numbers."""
-    return GoalTree(
+    return PoseTree(
         np.zeros((NODES, state_size)),
         np.zeros(NODES, np.int64),
         np.zeros(NODES),
@@ -67,7 +67,7 @@ def pose_of(goal: Floats, size: int) -> Floats:
 
 
 @lean
-def plant_root(tree: GoalTree, root: Floats) -> None:
+def plant_root(tree: PoseTree, root: Floats) -> None:
     """Begin a tree at a state ``[S]``."""
     clear_frontier(tree.frontier)
     tree.places.fill(-1)
@@ -89,7 +89,7 @@ def _run_seconds(metres: float, vehicle: Vehicle) -> float:
 
 
 @inlined
-def seconds_after(tree: GoalTree, node: int, bend: float, metres: float, vehicle: Vehicle) -> float:
+def seconds_after(tree: PoseTree, node: int, bend: float, metres: float, vehicle: Vehicle) -> float:
     """The time to the goal from the end of an arc out of a node, in seconds; ``metres`` as in the tree."""
     turning = abs(bend - tree.bends[node]) / bend_rate(vehicle.max_speed, vehicle)
     seconds = tree.seconds[node]
@@ -102,7 +102,7 @@ def seconds_after(tree: GoalTree, node: int, bend: float, metres: float, vehicle
 
 
 @inlined
-def add_node(tree: GoalTree, parent: int, state: State, bend: float, metres: float, seconds: float) -> int:
+def add_node(tree: PoseTree, parent: int, state: State, bend: float, metres: float, seconds: float) -> int:
     """Add the end of an arc out of a node, and return its number. The tree must have room."""
     new = tree.counts[SIZE]
     tree.counts[SIZE] += 1
@@ -121,7 +121,7 @@ def add_node(tree: GoalTree, parent: int, state: State, bend: float, metres: flo
 
 @inlined
 def add_known_node(
-    tree: GoalTree, parent: int, state: State, bend: float, metres: float, seconds: float, part: int
+    tree: PoseTree, parent: int, state: State, bend: float, metres: float, seconds: float, part: int
 ) -> int:
     """Add the beginning of a part of the known endings, as ``add_node`` does."""
     new = add_node(tree, parent, state, bend, metres, seconds)
@@ -130,7 +130,7 @@ def add_known_node(
 
 
 @inlined
-def cell_of(state: State, gear: float, tree: GoalTree, cell: float, headings: int, vehicle: Vehicle) -> int:
+def cell_of(state: State, gear: float, tree: PoseTree, cell: float, headings: int, vehicle: Vehicle) -> int:
     """The cell of a pose that is left in a gear, seen from the goal; with its hitches."""
     row = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
     column = math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF
@@ -160,7 +160,7 @@ def slot_of(place: int) -> int:
 
 
 @inlined
-def mark_place(tree: GoalTree, node: int, origin: Floats, vehicle: Vehicle) -> None:
+def mark_place(tree: PoseTree, node: int, origin: Floats, vehicle: Vehicle) -> None:
     """Remember a node for its place, unless there is one."""
     place = place_of(load(tree.states, node, vehicle), origin, vehicle)
     slot = slot_of(place)
@@ -170,7 +170,7 @@ def mark_place(tree: GoalTree, node: int, origin: Floats, vehicle: Vehicle) -> N
 
 
 @inlined
-def node_near(tree: GoalTree, state: State, origin: Floats, vehicle: Vehicle) -> int:
+def node_near(tree: PoseTree, state: State, origin: Floats, vehicle: Vehicle) -> int:
     """A node in the place of a state; -1 if none is known."""
     place = place_of(state, origin, vehicle)
     node = tree.places[slot_of(place)]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planners.routes.manoeuvres import braking
+from planners.routes.braking import braking
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of
 from planners.world.problem import start_state

@@ -17,7 +17,7 @@ from tasks.tracking.mlflow_runs import MEMORY_TAG, MODEL_TAG, tracker
 STAGE: Final = "gather"
 
 
-def registered_library(
+def register_library(
     name: str, folder: Path, vehicle: Vehicle, parameters: Mapping[str, Any], metrics: Mapping[str, float]
 ) -> str:
     """Log a library in MLflow and register it; the same library always becomes the same version.
