@@ -163,7 +163,9 @@ def _stack(axes: Axes, rows: pd.DataFrame, names: list[str]) -> None:
 
 def _tick(configuration: Configuration) -> str:
     """The label of a configuration, a word a line; that the encoder recalled goes without saying."""
-    label = configuration.label.removesuffix(" encoder").replace("exhaustive", "exh.")
+    label = configuration.label.removesuffix(" encoder")
+    for long, short in (("exhaustive", "exh."), ("published", "publ.")):
+        label = label.replace(long, short)
     return re.sub("[ -]", "\n", label)
 
 
