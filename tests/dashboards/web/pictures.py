@@ -31,7 +31,7 @@ def main(data: str, run: str, other: str, out: str) -> None:
                 WebDriverWait(driver, 30).until(
                     lambda d: not d.find_elements(By.CSS_SELECTOR, "[data-load]:not([data-loaded])")
                 )
-                if name == "try":
+                if "/try" in place:
                     WebDriverWait(driver, 30).until(
                         lambda d: d.find_element(By.ID, "editor").get_attribute("data-planned")
                     )
@@ -56,6 +56,7 @@ def pages(run: str, other: str, rows: pd.DataFrame) -> dict[str, str]:
         "problem": f"{base}/problem?{asked}", "memory": f"{base}/memory?memory={row['memory']}",
         "neighbours": f"{base}/memory?memory={row['memory']}&problem={row['problem_id']}",
         "try": f"{base}/try?problem={row['problem_id']}&class={row['problem_class']}",
+        "manoeuvre": f"{base}/try?class=parallel&seed=3",
         "progress": "/progress", "compare": f"/compare?first={run}&other={other}",
     }  # fmt: skip
 
