@@ -31,8 +31,9 @@ COUNT = 10  # problems to solve
 IMPATIENT = {"MLFLOW_HTTP_REQUEST_MAX_RETRIES": "0"}
 PARTS_OF_ONE = """
 from flows.cli.main import main
-from tasks.requests import problem_parts
+from tasks.requests import problem_parts, solve_many
 problem_parts.PART_PROBLEMS = 1
+solve_many.FEW_PROBLEMS = 0  # even so few are left to workers
 main()
 """
 
