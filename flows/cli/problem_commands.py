@@ -68,7 +68,7 @@ def plan(
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
-        learn: Data folder that remembers the plan if it is new.
+        learn: Data folder that remembers the plan if it is new, from rest, and to a place 50√2 m ahead.
         options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant, plan_one
@@ -83,7 +83,7 @@ def plan(
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
         lines.append(f"{attempt.source}, {times}{changes}")
     write_answer(*lines, **answer)
-    write_files(plan=written, picture=picture)
+    write_files(plan=written, picture=picture, learned=_learned(learn))
     if failure is not None:
         raise RunError(failure)
 
@@ -147,7 +147,7 @@ def solve(
         improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
-        learn: Data folder that remembers the newly solved problems.
+        learn: Data folder that remembers new plans, those from rest to a place 50√2 m ahead.
         workers: Worker processes; default one for each core. A few problems are solved without.
         options: How the problems are solved.
     """
@@ -156,8 +156,15 @@ def solve(
     settings = options.settings(assist, improve_seconds, problems)
     solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
     _write_summary(solved)
-    write_files(rows=out, plans=plans, learned=learn)
+    write_files(rows=out, plans=plans, learned=_learned(learn))
     write(*(f"watched  {line}" for line in solved.drift))
+
+
+def _learned(data: Path | None) -> Path | str | None:
+    """Where plans for --learn lie, or why there are none."""
+    if data is None or (data / "learned").exists():
+        return data
+    return "nothing: only searched plans from rest to a place 50√2 m ahead are kept; `gather` keeps others"
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

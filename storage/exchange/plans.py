@@ -68,6 +68,15 @@ def plan_fields(record: PlanRecord) -> dict[str, Any]:
     }
 
 
+def is_plan_file(path: Path) -> bool:
+    """Whether the file at ``path`` holds a plan, or why there is none."""
+    try:
+        fields = read_json(path)
+    except StorageError:
+        return False
+    return isinstance(fields, dict) and set(fields) <= set(FIELDS) and "states" in fields
+
+
 def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
     """The plan for a ``vehicle`` in the file at ``path``, in its problem's units, and where it came from.
 

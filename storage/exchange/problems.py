@@ -29,6 +29,10 @@ from storage.vehicles.stated_vehicle import as_text, refuse_another_driver, stat
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
 UNKNOWN_CLASS: Final = "unknown"
+_MIXED: Final = (
+    "names its vehicle where the first problem names none, or the other way round; put problems for "
+    "different vehicles into different files"
+)
 _REQUIRED: Final = ("start", "goal", "bounds", "obstacles")
 
 
@@ -71,6 +75,7 @@ def _checked(
     path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle
 ) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
+    first = None  # whether the first problem states its vehicle
     for number, fields in raw:
         where = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
         identity = fields.get("id") if isinstance(fields, Mapping) else None
@@ -78,6 +83,10 @@ def _checked(
         try:
             name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
             problem = problem_of(fields, name, vehicle)
+            stated = isinstance(fields, Mapping) and stated_vehicle(fields) is not None
+            first = stated if first is None else first
+            if stated != first:
+                raise ValueError(_MIXED)
         except ValueError as error:
             yield with_id, str(error)
             continue

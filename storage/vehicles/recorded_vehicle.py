@@ -42,7 +42,7 @@ def refuse_another(where: object, made_for: object, wanted: Vehicle) -> None:
         advice = f"use --vehicle {name if is_built_in(recorded) else 'with the file of that vehicle'}"
         raise StorageError(
             f"{where} was made for vehicle {name}, expected {name_of(wanted)}: {difference}; {advice}, "
-            "or make one for the expected vehicle."
+            "or make one for the expected vehicle (`motion-memory adapt` does so of a memory or library)."
         )
 
 

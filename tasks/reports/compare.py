@@ -77,7 +77,8 @@ def compare(
         if tables[name].empty:
             raise StorageError(
                 f"{name} and {names[0]} have no attempt at the same problem in common; benchmark both with "
-                "the same classes, difficulty and seed."
+                "the same classes, difficulty and seed, or add --measure, which measures both memories on "
+                "the same new problems."
             )
     how = IN_TURN if measure else BY_COUNTS
     if out is not None:

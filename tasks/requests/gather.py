@@ -102,6 +102,8 @@ def gather(
     if not 0.0 <= poses <= 1.0:
         raise UsageError(f"--poses is {poses:g}: give a share from 0 to 1.")
     check_known("difficulty", [difficulty], DIFFICULTIES)
+    if difficulty != "standard" and not any(map(is_drawn, sources)):
+        raise UsageError("--difficulty is of classes and families, and none is among the sources.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
     refuse_foreign(out, is_library, "library")
     request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
@@ -118,8 +120,8 @@ def gather(
             )
         if len(kept) < plans:
             _LOG.warning(
-                "Only %d of the %d questions were answered, fewer than the %d plans wanted: the library "
-                "holds these plans; give more sources to get more.",
+                "Questions answered: %d of %d, fewer than the %d plans wanted. The library holds these "
+                "plans; give more sources to get more.",
                 *(len(kept), tried.total(), plans),
             )
         _save(request, kept)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from storage.errors import StorageError
+from storage.exchange.plans import is_plan_file
 from storage.fields import nearest
 from storage.vehicles.vehicle_files import text_of_vehicle
 from tasks.settings.errors import UsageError
@@ -67,9 +68,13 @@ def check_picture(path: Path | None) -> None:
 
 
 def check_plan_file(path: Path | None) -> None:
-    """Refuse a path that does not end like the file of a plan."""
-    if path is not None and path.suffix != ".json":
+    """Refuse a path that does not end like the file of a plan, or a file there that is none."""
+    if path is None:
+        return
+    if path.suffix != ".json":
         raise UsageError(f"{path} is not the name of a plan's file, which ends in .json.")
+    if path.is_file() and not is_plan_file(path):
+        raise UsageError(f"{path} exists and holds no plan of ours; give another name, or remove it.")
 
 
 def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> None:

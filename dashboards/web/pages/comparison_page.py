@@ -47,7 +47,7 @@ def comparison(data: DataReader, params: Parameters) -> Page:
         if table.empty:
             values["verdict"] = (
                 f"{other} and {first} have no attempt at the same problem in common; benchmark both with the "
-                "same classes, difficulty and seed."
+                "same classes, difficulty and seed, or use `motion-memory compare --measure`."
             )
         else:
             charts = [_chart(table, first, other)]

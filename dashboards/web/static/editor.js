@@ -21,7 +21,7 @@ const vehicleItem = () => things.length, goalItem = () => things.length + 1;
 const isPose = () => world.goal.length === 3;
 const fields = () => {
   const { groups, ...rest } = world;
-  const made = { ...rest, obstacles: things.flat().map((polygon) => polygon.map(([x, y]) => [round(x), round(y)])) };
+  const made = { ...rest, obstacles: things.flat() };
   if (things.some((thing) => thing.length > 1)) made.groups = things.map((thing) => thing.length);
   return made;
 };
@@ -34,7 +34,7 @@ const pivot = (item) => (item < things.length ? centre(things[item]) : item === 
 const around = (item) => (item < things.length ? things[item] : item === vehicleItem() ? outline : outlineAtGoal());
 const turns = (item) => item !== NONE && (item < goalItem() || isPose());
 const change = (item, dx, dy, angle) => {
-  if (item < things.length) things[item] = moved(turned(things[item], angle, centre(things[item])), dx, dy);
+  if (item < things.length) things[item] = rounded(moved(turned(things[item], angle, centre(things[item])), dx, dy));
   else if (item === goalItem()) world = { ...world, goal: placed(world.goal, dx, dy, angle) };
   else {
     outline = moved(turned(outline, angle, world.start), dx, dy);
@@ -112,7 +112,10 @@ const tell = (where, answer) => {
   }
 };
 
-const compared = (faster, sooner) => {
+const compared = (alone, withMemory) => {
+  const faster = alone.ms / withMemory.ms, sooner = alone.duration_s - withMemory.duration_s;
+  const same = alone.ended === withMemory.ended && alone.nodes === withMemory.nodes && alone.length_m === withMemory.length_m;
+  if (same) return "The memory has no plan that helps here: both searched, and times differ by chance.";
   const planned = Math.max(faster, 1 / faster).toFixed(1), driven = Math.abs(sooner).toFixed(1);
   const time = planned === "1.0" ? "Planned as fast with memory" : `Planned ${planned} times as ${faster > 1 ? "fast" : "long"} with memory`;
   return driven === "0.0" ? `${time}.` : `${time}; the drive is ${driven} s ${sooner > 0 ? "shorter" : "longer"}.`;
@@ -134,8 +137,8 @@ const plan = async () => {
     tell("alone", alone);
     tell("with", withMemory);
     if (withMemory?.solved && alone.solved) {
-      say(compared(alone.ms / withMemory.ms, alone.duration_s - withMemory.duration_s));
-    } else say(withMemory?.solved ? "Only with memory is a plan found." : alone.solved ? "A plan is found without memory." : "No plan is found in time.");
+      say(compared(alone, withMemory));
+    } else say(withMemory?.solved ? "Only with memory is a plan found." : alone.solved ? "A plan is found without memory." : "No plan is found within the limits of this page.");
   } catch (error) {
     if (mine !== requests) return;
     answers = [];
@@ -224,7 +227,7 @@ for (const button of document.querySelectorAll("[data-add]")) {
     const corners = +button.dataset.add, [xMin, yMin, xMax, yMax] = world.bounds;
     const cx = (xMin + xMax) / 2 + 4 * ((things.length % 3) - 1), cy = (yMin + yMax) / 2 + 4 * ((things.length % 2) - 0.5);
     const turn = Math.PI / corners;
-    things.push([Array.from({ length: corners }, (_, i) => [cx + 3 * Math.cos(turn + (2 * Math.PI * i) / corners), cy + 3 * Math.sin(turn + (2 * Math.PI * i) / corners)])]);
+    things.push(rounded([Array.from({ length: corners }, (_, i) => [cx + 3 * Math.cos(turn + (2 * Math.PI * i) / corners), cy + 3 * Math.sin(turn + (2 * Math.PI * i) / corners)])]));
     chosen = things.length - 1;
     changed();
   });

@@ -8,6 +8,7 @@ const make = (name, attributes, parent) => {
 };
 const written = (points) => points.map(([x, y]) => `${x},${y}`).join(" ");
 const round = (value) => Math.round(value * 1000) / 1000;
+const rounded = (thing) => thing.map((polygon) => polygon.map(([x, y]) => [round(x), round(y)]));
 const centre = (thing) => {
   const every = thing.flat();
   return [0, 1].map((i) => (Math.min(...every.map((point) => point[i])) + Math.max(...every.map((point) => point[i]))) / 2);

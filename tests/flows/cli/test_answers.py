@@ -125,14 +125,24 @@ def test_without_a_plan_an_older_one_is_kept(
     command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     older = place / "older.json"
-    older.write_text("the plan of yesterday")
+    older.write_text('{"states": [], "controls": []}')
     told = _told(f"{command} --out older.json", place, monkeypatch, capsys, code=1)
-    assert older.read_text() == "the plan of yesterday"
+    assert older.read_text() == '{"states": [], "controls": []}'
     assert told["files"] == {}
     assert "older.json" in told["error"]
     (place / "newer.json").unlink(missing_ok=True)
     _told(f"{command} --out newer.json", place, monkeypatch, capsys, code=1)
     assert json.loads((place / "newer.json").read_text())["status"] != "solved"
+
+
+@pytest.mark.parametrize("notes", ['{"my": "notes"}', "no JSON"])
+def test_a_file_that_is_no_plan_is_never_replaced_by_one(
+    notes: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "notes.json").write_text(notes)
+    told = _told("plan one.json --out notes.json", place, monkeypatch, capsys, code=2)
+    assert "notes.json" in told["error"]
+    assert (place / "notes.json").read_text() == notes
 
 
 @pytest.mark.parametrize(

@@ -16,12 +16,12 @@ from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle, name_of
 from storage.archives.libraries import save_library
 from storage.errors import StorageError
-from storage.exchange.problems import read_problems, vehicle_of_problems, write_problems
+from storage.exchange.problems import fields_of, read_problems, vehicle_of_problems, write_problems
 from storage.vehicles.definitions import definition_of
 from storage.vehicles.vehicle_files import read_vehicle
 from tasks.registry.settled_vehicle import settled_vehicle
 from tests.tasks.served import write_memory
-from tests.worlds import problem_of
+from tests.worlds import problem_of, strewn
 
 BUS = read_vehicle(Path(__file__).parents[3] / "docs" / "vehicles" / "bus.yaml")
 
@@ -79,3 +79,12 @@ def test_who_names_no_vehicle_gets_that_of_the_problem_or_of_the_memory(
     assert settled_vehicle(None, Path("any.json"), "theirs") == "car-1-trailer"
     assert settled_vehicle(None, Path("own.json"), "theirs") == "differential-drive"
     assert settled_vehicle("car", Path("own.json"), "theirs") == "car"
+
+
+def test_a_file_names_the_vehicle_of_all_its_problems_or_of_none(tmp_path: Path) -> None:
+    stated = json.dumps(fields_of(strewn(1, 5)) | {"vehicle": "car"})
+    silent = json.dumps(fields_of(strewn(2, 5)))
+    for lines in ((stated, silent), (silent, stated)):
+        (tmp_path / "mixed.jsonl").write_text("\n".join(lines))
+        with pytest.raises(StorageError, match="line 2"):
+            read_problems(tmp_path / "mixed.jsonl")

@@ -47,7 +47,7 @@ def test_the_questions_of_a_file_are_asked_as_they_stand(
     assert library.questions == ("strewn-1-10", "strewn-2-10")
     assert call([*asked, "--plans", "3"]) == 3  # there are no more
     told = capsys.readouterr().err
-    assert "2 of the 3 questions" in told
+    assert "2 of 3" in told
     assert "3 plans" in told
     assert load_library(tmp_path / "library").questions == ("strewn-1-10", "strewn-2-10")
 
@@ -127,6 +127,15 @@ def test_the_difficulty_of_drawn_questions_can_be_chosen(tmp_path: Path) -> None
         assert easy is not None
         assert hard is not None
         assert easy.obstacles.vertices.tolist() != hard.obstacles.vertices.tolist()
+
+
+def test_a_difficulty_that_no_source_has_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_problems(tmp_path / "asked.jsonl", [strewn(1, 10)])
+    asked = ["gather", str(tmp_path / "asked.jsonl"), "--out", str(tmp_path / "library")]
+    assert call([*asked, "--difficulty", "hard"]) == 2
+    assert "--difficulty" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
