@@ -23,7 +23,7 @@ def stride_of(gear: float, vehicle: Vehicle) -> float:
 @inlined
 def at_pace(state: State, speed: float, bend: float, vehicle: Vehicle) -> State:
     """The same pose, with a speed (m/s) and a bend."""
-    return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle)) + state[5:]  # noqa: RUF005
+    return (state[0], state[1], state[2], speed, turn_in(bend, speed, vehicle), *state[5:])
 
 
 @inlined

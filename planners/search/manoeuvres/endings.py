@@ -92,7 +92,7 @@ def _placed(endings: Endings, i: int, tree: PoseTree, vehicle: Vehicle) -> State
     sin, cos = sincos(tree.states[0, 2])
     x = tree.states[0, 0] + cos * state[0] - sin * state[1]
     y = tree.states[0, 1] + sin * state[0] + cos * state[1]
-    return (x, y, state[2] + tree.states[0, 2]) + state[3:]  # noqa: RUF005
+    return (x, y, state[2] + tree.states[0, 2], *state[3:])
 
 
 @lean

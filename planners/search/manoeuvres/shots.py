@@ -51,7 +51,7 @@ def word_is_free(
     x, y, heading = first_pose(state, top, vehicle)
     if not outline_is_free(word, radius, x, y, heading, vehicle, scene):
         return False
-    state = (x, y, heading) + state[3:]  # noqa: RUF005
+    state = (x, y, heading) + state[3:]  # noqa: RUF005 Numba fails where the variable changes later
     bend_limit = tightest_bend(top, vehicle)
     for k in range(PARTS):
         metres = radius * abs(word[PARTS + k])
