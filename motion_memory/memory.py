@@ -160,7 +160,7 @@ class Memory:
             return ranked_plans(self.stored, self._read(problem), k, workspace)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
-        """Judge a plan with code that shares nothing with the planners: simulate it again, check it with FCL.
+        """Judge a plan with code of its own, apart from the planners': simulate it again, check it with FCL.
 
         Args:
             problem: as for ``plan``.
@@ -258,9 +258,8 @@ def load(
     if top_k < 1:
         raise UsageError(f"top_k is {top_k}: give 1 or more.")
     with memory_at(str(memory)) as folder:
-        archive = load_memory_or_library(
-            folder, named or vehicle_of(folder)
-        )  # mapped files stay readable after they are deleted
+        # mapped files stay readable after they are deleted
+        archive = load_memory_or_library(folder, named or vehicle_of(folder))
     if isinstance(archive, PlanLibrary):
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready

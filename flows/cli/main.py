@@ -29,7 +29,7 @@ from tasks.settings.redaction import redacted
 FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
-SERVERS: Final = (["dashboard"], ["serve"], ["serve-memory"], ["servers"])  # which run until Ctrl-C
+SERVERS: Final = {"dashboard", "serve", "serve-memory", "servers"}  # commands that run until Ctrl-C
 GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and stop the workers
 
 
@@ -150,8 +150,8 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
     forced_exit.daemon = True
     forced_exit.start()
-    told = "Repeat the command to continue where it stopped (`plan` and `route` start over)."
-    print("Stopped." if sys.argv[1:2] in SERVERS else f"Interrupted. {told}", file=sys.stderr)
+    told = "Interrupted. Repeat the command to continue where it stopped (`plan` and `route` start over)."
+    print("Stopped." if SERVERS.intersection(sys.argv[1:2]) else told, file=sys.stderr)
     raise KeyboardInterrupt
 
 

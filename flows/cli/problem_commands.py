@@ -83,7 +83,8 @@ def plan(
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
         lines.append(f"{attempt.source}, {times}{changes}")
     write_answer(*lines, **answer)
-    write_files(plan=written, picture=picture, learned=_learned(learn))
+    write_files(plan=written, picture=picture)
+    _write_learned(learn)
     if failure is not None:
         raise RunError(failure)
 
@@ -156,15 +157,22 @@ def solve(
     settings = options.settings(assist, improve_seconds, problems)
     solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
     _write_summary(solved)
-    write_files(rows=out, plans=plans, learned=_learned(learn))
+    write_files(rows=out, plans=plans)
+    _write_learned(learn)
     write(*(f"watched  {line}" for line in solved.drift))
 
 
-def _learned(data: Path | None) -> Path | str | None:
-    """Where plans for --learn lie, or why there are none."""
-    if data is None or (data / "learned").exists():
-        return data
-    return "nothing: only searched plans from rest to a place 50√2 m ahead are kept; `gather` keeps others"
+def _write_learned(data: Path | None) -> None:
+    """Write where the plans for --learn lie, or why there are none."""
+    from storage.places.data_folder import DataFolder
+    from storage.places.mirror import local_place
+
+    if data is None or DataFolder(local_place(data)).gained_folders():
+        write_files(learned=data)
+    else:
+        write(
+            "learned  nothing: only searched plans from rest to a place 50√2 m ahead; `gather` keeps others"
+        )
 
 
 def _solve_parts(request: SolveRequest) -> list[PartResult]:

@@ -166,8 +166,8 @@ def fetch_folder(path: Path) -> Path:
 def folders_here(place: str, name: str) -> Path:
     """The path of a ``place``, after fetching what was published there as folders.
 
-    In object storage, that is everything in its folder ``name``, or else the place itself. Raises
-    StorageError if there is neither.
+    In object storage, everything in the folder ``name`` of the place is fetched. If that folder is empty, the
+    place itself is fetched. Raises StorageError if there is nothing to fetch.
     """
     if not is_remote(place):
         return Path(place)

@@ -154,10 +154,8 @@ WATCHED: Final = _schema(
         ("benchmark_mean_ms", pa.float64()),
         ("p_value", pa.float64()),  # of so few hits by chance
         ("has_fallen", pa.bool_()),
-        (
-            "total_s",
-            pa.float64(),
-        ),  # mean of planning and driving where solved; null: not known
+        # mean of planning and driving where solved; null: not known
+        ("total_s", pa.float64()),
         ("benchmark_total_s", pa.float64()),
         ("later_p_value", pa.float64()),  # of so long total times by chance
         ("is_later", pa.bool_()),

@@ -119,9 +119,8 @@ def _check_encryption(address: str) -> None:
 
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
-    logging.getLogger("distributed").setLevel(
-        logging.CRITICAL
-    )  # Prefect would show everything that Dask logs
+    # or Prefect would show everything that Dask logs
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with scratch_folder() as scratch, dask.config.set({**_settings(), "temporary-directory": str(scratch)}):
         try:
             local = LocalCluster(
@@ -161,9 +160,8 @@ def _settings() -> dict[str, Any]:
 def _kill(local: Any) -> None:
     for nanny in local.workers.values():
         nanny.close_gracefully()  # keeps it from being restarted
-        with suppress(
-            AttributeError, ProcessLookupError
-        ):  # while a worker is being replaced there is no process
+        # while a worker is being replaced there is no process
+        with suppress(AttributeError, ProcessLookupError):
             nanny.process.process.kill()
 
 
@@ -262,9 +260,8 @@ def _state(future: Any) -> Any:
     """
     if future.status == "finished":
         try:
-            return (
-                future.result()
-            )  # the result holds the error of a failed chunk; only a lost connection raises here
+            # the result holds the error of a failed chunk; only a lost connection raises here
+            return future.result()
         except OSError:
             return GONE
     return GONE if future.status in LOST else None

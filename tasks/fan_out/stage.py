@@ -51,9 +51,8 @@ class Job(Generic[AnyPiece, Result]):
     result: type[Any] = NoneType  # what ``do`` returns: a named tuple of JSON values, or nothing
     units: Callable[[AnyPiece], int]  # how many units of the progress bar a piece has
     unit: str = ""  # name of these units, unless they are problems or plans
-    units_done: Callable[[AnyPiece], int] = lambda piece: (
-        0
-    )  # how many of them are done in a piece that a worker is doing
+    # how many of them are done in a piece that a worker is doing
+    units_done: Callable[[AnyPiece], int] = lambda piece: 0
 
     @property
     def title(self) -> str:
@@ -84,9 +83,8 @@ class Job(Generic[AnyPiece, Result]):
 class Stage(Job[Chunk, Result]):
     """A stage of a run: the work on each of its classes or memories."""
 
-    cut: Callable[
-        [str, RunSettings, str], Cut
-    ]  # how the work on a class is split, from data folder, settings and class
+    # how the work on a class is split, from data folder, settings and class
+    cut: Callable[[str, RunSettings, str], Cut]
     units: Callable[[Chunk], int] = lambda chunk: chunk.last - chunk.first
     classes: Callable[[RunSettings], Sequence[str]] = attrgetter("class_names")
 

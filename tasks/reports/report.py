@@ -71,9 +71,8 @@ class Report(NamedTuple):
     summary: pd.DataFrame  # ``dashboards.statistics.panels.summarise``
     retrieval: pd.DataFrame  # ``dashboards.statistics.retrieval_rates.summarise_retrieval``
     claims: list[Claim]
-    others: list[
-        Claim
-    ]  # the claims by the other method: the paper's, or the product's; empty if not measured
+    # the claims by the other method: the paper's, or the product's; empty if not measured
+    others: list[Claim]
 
 
 def report_run(data: str, settings: RunSettings) -> Report:

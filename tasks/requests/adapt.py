@@ -59,8 +59,8 @@ def adapt(
 ) -> Kept:
     """Drive the plans of a memory or a library with another vehicle, and write those that pass.
 
-    The same arguments give the same bytes, whatever the number of workers. After a kill, the command drives
-    only the plans that it had not driven before.
+    With the same arguments, the written files are the same to the byte for any number of workers. If the
+    command was killed, it drives only the remaining plans when it is repeated.
 
     Args:
         memory: the address of a memory or a library: a folder, a run, or a model in MLflow.

@@ -31,21 +31,13 @@ from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
 from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
-from tasks.settings.checks import (
-    check_known,
-    check_outputs,
-    check_picture,
-    check_plan_file,
-    check_seed,
-    checked_vehicle,
-)
+from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
-WARM_EXPANSIONS: Final = (
-    1000  # of an improver after its first polish: enough for one free and one guided search
-)
+# of an improver after its first polish: enough for one free and one guided search
+WARM_EXPANSIONS: Final = 1000
 
 
 class AssistantSettings(NamedTuple):
@@ -95,9 +87,8 @@ class Assistant:
             raise UsageError(f"--improve-seconds is {improve_seconds}: give 0 or more.")
         self.settings, self.vehicle = settings, said_vehicle(vehicle)
         self._address = None if assist in WITHOUT_MEMORY else _local_address(str(memory))
-        self.files = (
-            [] if memory is None else [Path(memory)]
-        )  # files that it may read, which must not be overwritten
+        # files that it may read, which must not be overwritten
+        self.files = [] if memory is None else [Path(memory)]
         self._memories: dict[str, Memory | PlanLibrary] = {}
         self.warm_classes: set[str] = set()  # of problems for which everything is ready
         self._workspace = Workspace()
@@ -209,9 +200,7 @@ def plan_one(
         UsageError: the name of an output has a wrong ending, or an output would be written over an input.
         RunError: the file does not hold exactly one problem.
     """
-    check_plan_file(out)
-    check_picture(drawing)
-    check_outputs([problem, *assistant.files], [out, drawing])
+    check_plan_outputs([problem, *assistant.files], out, drawing)
     problems = read_problems(problem, assistant.vehicle)
     if len(problems) != 1:
         raise RunError(
@@ -243,10 +232,8 @@ def plan_one(
 
 
 def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
-    from tasks.requests.explain import (
-        log_explanation,
-        log_without_memory,
-    )  # late: tables cost a tenth of a second
+    # late: tables cost a tenth of a second
+    from tasks.requests.explain import log_explanation, log_without_memory
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)

@@ -22,14 +22,7 @@ from storage.exchange.plans import PlanRecord, read_plan
 from storage.exchange.problems import read_problems
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
-from tasks.settings.checks import (
-    check_known,
-    check_outputs,
-    check_picture,
-    check_plan_file,
-    check_seed,
-    checked_vehicle,
-)
+from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
 STRAIGHT: Final = "straight-line"  # the planner's name in the plan file if the guess was a straight line
@@ -129,9 +122,7 @@ def optimise_one(
             would be written over an input.
         RunError: the file does not hold exactly one problem, or the optimisation does not converge.
     """
-    check_plan_file(out)
-    check_picture(drawing)
-    check_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], [out, drawing])
+    check_plan_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], out, drawing)
     if not 0.0 <= clearance_weight < float("inf"):
         raise UsageError(f"Clearance weight {clearance_weight}: give 0 or more.")
     problems = read_problems(problem_file, initial.vehicle)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from planners.maps.questions import question_in
-from planners.world.classes.families import FAMILIES, family
-from planners.world.classes.problem_classes import CLASSES, problem_class
+from planners.world.classes.families import FAMILIES, class_or_family
+from planners.world.classes.problem_classes import CLASSES
 from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.exchange.problems import read_problems
@@ -51,12 +52,10 @@ def question_source(
     """
     vehicle = settings.vehicle
     seed = OWN_SEEDS + settings.seed
-    if is_drawn(name) and name in FAMILIES:
-        manoeuvres = family(name, difficulty, vehicle)
-        return QuestionSource(lambda number: manoeuvres.draw(seed, number))
     if is_drawn(name):
-        drawn = problem_class(name, difficulty, vehicle)
-        return _asked_in(lambda number: drawn.draw(seed, number), poses, settings)
+        drawn = class_or_family(name, difficulty, vehicle)
+        draw = partial(drawn.draw, seed)
+        return QuestionSource(draw) if name in FAMILIES else _asked_in(draw, poses, settings)
     if not Path(name).exists():
         known = [*CLASSES, *FAMILIES]
         raise StorageError(

@@ -7,17 +7,14 @@ from collections import Counter
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from planners.world.authority.authority import faults
-from planners.world.problem import GOAL_RADIUS, Obstacles, Plan, Problem
+from planners.world.problem import GOAL_RADIUS, Plan, Problem, obstacles_of
 from storage.archives.libraries import HEADERS, load_memory_or_library, vehicle_of
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, local_place
 from tasks.servers.prefect_server import set_environment
 from tasks.settings.errors import RunError, UsageError
 
-_EMPTY: Final = Obstacles(np.empty((0, 2)), np.zeros(1, np.int32), np.zeros(1, np.int32))
 _ROOM_M: Final = 1e6  # around a plan that is judged by itself
 _MOST_FAULTS_TOLD: Final = 20
 _LOG = logging.getLogger(__name__)
@@ -36,7 +33,7 @@ def verify(folder: Path, sample: float, workers: int) -> Counter[str]:
 
     Raises:
         UsageError: the sample is not a share.
-        RunError: the folder is none of these, or something in it is wrong.
+        RunError: the folder is not a data folder, a memory or a library, or it has a fault.
         StorageError: the memory or library is damaged.
     """
     if not 0.0 <= sample <= 1.0:
@@ -75,4 +72,6 @@ def _by_itself(plan: Plan) -> Problem:
     goal = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
     bounds = (-_ROOM_M, -_ROOM_M, _ROOM_M, _ROOM_M)
     start = (x, y, heading)
-    return Problem("stored", "stored", start, goal, GOAL_RADIUS, bounds, _EMPTY, start_motion=tuple(motion))
+    return Problem(
+        "stored", "stored", start, goal, GOAL_RADIUS, bounds, obstacles_of([]), start_motion=tuple(motion)
+    )

@@ -194,9 +194,8 @@ def _start(server: LocalServer, listener: socket.socket) -> None:
             | {
                 "PREFECT_SERVER_API_AUTH_STRING": server.secret,
                 "PREFECT_SERVER_REGISTER_BLOCKS_ON_START": "false",  # unused; 1 s each start
-                "PYTHONPATH": os.pathsep.join(
-                    path or os.getcwd() for path in sys.path
-                ),  # the same modules as here
+                # the same modules as here
+                "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path),
             },
             stdin=subprocess.DEVNULL,
             stdout=sink,

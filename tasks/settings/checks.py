@@ -97,6 +97,13 @@ def check_outputs(inputs: Iterable[Path], outputs: Iterable[Path | None]) -> Non
                 )
 
 
+def check_plan_outputs(inputs: Iterable[Path], plan: Path | None, picture: Path | None) -> None:
+    """Check the files that a plan and its picture are to be written to, against the files that are read."""
+    check_plan_file(plan)
+    check_picture(picture)
+    check_outputs(inputs, [plan, picture])
+
+
 def _is_one_file(one: Path, other: Path) -> bool:
     try:
         return one.samefile(other)

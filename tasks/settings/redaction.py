@@ -17,9 +17,8 @@ _IN_ADDRESS: Final = re.compile(r"(?<=://)[^/\s\"']*@")  # scheme://user:passwor
 def redacted(text: str) -> str:
     """The text, with ``***`` for passwords in addresses and for values of secret environment variables."""
     text = _IN_ADDRESS.sub(f"{HIDDEN}@", text)
-    for secret in sorted(
-        set(_secrets()), key=len, reverse=True
-    ):  # a secret before another that is part of it
+    # a secret before another that is part of it
+    for secret in sorted(set(_secrets()), key=len, reverse=True):
         text = text.replace(secret, HIDDEN)
     return text
 

@@ -20,9 +20,8 @@ from tasks.inputs.skipped_worlds import summed_up
 from tasks.settings.errors import RunError
 from tasks.settings.run_settings import world_class
 
-CUT_FROM_MAP: Final = (
-    2  # problems to collect from for each wanted solved problem, because some are not solved
-)
+# problems to collect from for each wanted solved problem, because some are not solved
+CUT_FROM_MAP: Final = 2
 
 _LOG = logging.getLogger(__name__)
 
