@@ -164,10 +164,9 @@ def solve(
 
 def _write_learned(data: Path | None) -> None:
     """Write where the plans for --learn lie, or why there are none."""
-    from storage.places.data_folder import DataFolder
-    from storage.places.mirror import local_place
+    from tasks.inputs.gained_on_the_job import has_gained
 
-    if data is None or DataFolder(local_place(data)).gained_folders():
+    if data is None or has_gained(data):
         write_files(learned=data)
     else:
         write(

@@ -11,7 +11,8 @@ from planners.attempt import Attempt
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Problem, is_canonical
 from planners.world.vehicles.vehicle import Vehicle
-from storage.places.data_folder import open_data_folder
+from storage.places.data_folder import DataFolder, open_data_folder
+from storage.places.mirror import local_place
 from storage.places.run_folder import checked_name
 from storage.tables.gained_experiences import add_gained, take_snapshot
 from storage.vehicles.vehicle_files import label_of, said_vehicle
@@ -53,6 +54,11 @@ def remember(data: Path, attempts: Sequence[Solved], vehicle: Vehicle) -> int:
             vehicle=vehicle,
         )
     return len(new)
+
+
+def has_gained(data: Path) -> bool:
+    """Whether a data folder holds plans gained on the job."""
+    return bool(DataFolder(local_place(data)).gained_folders())
 
 
 def with_gained(settings: RunSettings, data: Path, name: str) -> RunSettings:
