@@ -10,13 +10,13 @@ import numpy as np
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, radius_at
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import at_pace, stride_of
+from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
 from planners.search.manoeuvres.joining import Join, allocate_join
 from planners.search.manoeuvres.pace import fill_pace
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import SLACK
-from planners.world.jit import lean
+from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import (
     admissible,
     control_limits,
@@ -31,7 +31,9 @@ from planners.world.vehicles.dynamics import (
 from planners.world.vehicles.vehicle import Vehicle
 
 STEPS: Final = 1 << 13  # of a drive at most
-TOPS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.04)  # shares of full speed
+TOPS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.04)  # shares of full speed, and at last ...
+CREEP: Final = 0.5  # ... this share of the pace at which a tree looks where it is narrow
+PACES: Final = len(TOPS) + 1
 NEAR_M: Final = 2e-3  # how exactly a word leads to a node, in metres and radians
 STRIDES: Final = 1 << 10  # of an arc at most
 ROUNDING: Final = 1e-9
@@ -44,7 +46,7 @@ class Drive(NamedTuple):
     states: Floats  # [STEPS + 1, S]
     controls: Floats  # [STEPS, 2]
     counts: Indices  # [3] steps; looks at obstacles; parts of known endings
-    levels: Indices  # [STRIDES + 1] which of the ``TOPS`` is free at each stride of an arc
+    levels: Indices  # [STRIDES + 1] which of the ``PACES`` is free at each stride of an arc
     limits: Floats  # [STRIDES + 1] and the speed that this allows, in m/s
     target: Floats  # [7] as of ``goal_of``: the node
     connection: Connection
@@ -118,19 +120,28 @@ def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
     return steps
 
 
+@inlined
+def _pace(level: int, gear: float, top: float, vehicle: Vehicle) -> float:
+    """The speed (m/s) of a level, of which level 0 is the quickest, where ``top`` is full speed."""
+    if level < len(TOPS):
+        return TOPS[level] * top
+    return min(TOPS[-1] * top, CREEP * stride_of(gear, vehicle) / (FINE * vehicle.dt))
+
+
 @lean
 def _list_limits(
     drive: Drive, gear: float, bend: float, metres: float, top: float, vehicle: Vehicle, scene: Scene
 ) -> int:
-    """Find the largest of the ``TOPS`` that is free at each stride of an arc. Returns the strides."""
+    """Find the quickest of the ``PACES`` that is free at each stride of an arc. Returns the strides."""
     state = load(drive.states, drive.counts[0], vehicle)
     count = min(max(math.ceil(metres / stride_of(gear, vehicle)), 1), drive.levels.shape[0] - 1)
     speed = gear * metres / (count * vehicle.dt)
     for i in range(count + 1):
         level = 0
-        while level < len(TOPS) - 1:
+        while level < PACES - 1:
             drive.counts[1] += 1
-            if state_is_free(at_pace(state, gear * TOPS[level] * top, bend, vehicle), vehicle, scene):
+            speed_there = gear * _pace(level, gear, top, vehicle)
+            if state_is_free(at_pace(state, speed_there, bend, vehicle), vehicle, scene):
                 break
             level += 1
         drive.levels[i] = level
@@ -151,14 +162,14 @@ def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Ve
         top = min(top, turn_limit(vehicle) / curvature)
         acceleration = min(limit_1, limit_2 / curvature)
     count = _list_limits(drive, gear, bend, metres, top, vehicle, scene)
-    for slower in range(len(TOPS)):
+    for slower in range(PACES):
         for i in range(count + 1):
             level = drive.levels[i]
             if i > 0:
                 level = max(level, drive.levels[i - 1])
             if i < count:
                 level = max(level, drive.levels[i + 1])
-            drive.limits[i] = TOPS[min(level + slower, len(TOPS) - 1)] * top
+            drive.limits[i] = _pace(min(level + slower, PACES - 1), gear, top, vehicle)
         steps = fill_pace(c.speeds, drive.limits, count, metres, gear, acceleration, vehicle.dt)
         if steps < 0 or turning + steps > c.controls.shape[0]:
             return False

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
-from planners.search.manoeuvres.arcs import FINE, STRIDE, stride_along, stride_of
+from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
@@ -27,7 +27,7 @@ from planners.search.manoeuvres.shots import FromStart, shoot
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
 from planners.world.arrays import Floats, Integers
-from planners.world.geometry.collision import Scene
+from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import State, load, tightest_bend
 from planners.world.vehicles.vehicle import Vehicle
@@ -113,6 +113,9 @@ def open_node(
             if node > 0 and bend == tree.bends[node] and (gear * tree.metres[node] < 0.0 or not further):
                 continue  # back where it came from, or on where its parent has been
             state = load(tree.states, node, vehicle)
+            tree.counts[CHECKS] += 1
+            if not state_is_free(at_pace(state, 0.0, bend, vehicle), vehicle, scene):
+                continue  # where the wheels cannot be turned
             metres = 0.0
             before = 0.0
             mark = 0

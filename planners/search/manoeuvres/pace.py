@@ -8,7 +8,8 @@ from typing import Final
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
 
-SLOWEST: Final = 0.5  # a speed below this share of what one step changes is rest
+ROUNDING: Final = 1e-9
+SLOWEST: Final = 0.5  # of what one step changes: who may not drive faster than that is about to arrive
 
 
 @inlined
@@ -25,8 +26,8 @@ def fill_pace(
 ) -> int:
     """Fill in speeds that lead exactly ``metres`` far, as quickly as limits of speed allow, nearly.
 
-    The speeds are chosen step by step, so that they can be braked in time. They lead a little too far, which
-    a factor below 1 on all of them puts right.
+    The speeds are chosen step by step, so that they can be braked in time. What is missing at the end is
+    driven as slowly as that place demands, which leaves all before it where it was.
 
     Args:
         speeds: ``[C]`` m/s, to fill in; negative backwards.
@@ -42,24 +43,24 @@ def fill_pace(
         How many steps that takes; -1 if there is no room for them.
     """
     stride = metres / count
-    limits[count] = 0.0
     for i in range(count - 1, -1, -1):
         limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * acceleration * stride))
     change = acceleration * dt
+    spare = 0.125 * change * dt  # by which whole steps of braking may lead farther than one brake in between
     speeds[0] = 0.0
     speed = 0.0
     way = 0.0
     steps = 0
     most = speeds.shape[0] - 1
     while steps < most:
-        after = speed + change
+        room = metres - way - 0.5 * dt * speed - spare
+        after = math.sqrt(max(0.25 * change * change + 2.0 * acceleration * room, 0.0)) - 0.5 * change
+        if after < SLOWEST * change:
+            break
+        after = min(after, speed + change)
         for _ in range(2):
             after = min(after, _limit_at(way + 0.5 * dt * (speed + after), limits, count, stride))
         after = max(after, speed - change, 0.0)
-        if after < SLOWEST * change and way > 0.5 * metres:
-            break
-        if after <= 0.0:
-            return -1
         steps += 1
         speeds[steps] = after
         way += 0.5 * dt * (speed + after)
@@ -70,19 +71,21 @@ def fill_pace(
         speeds[steps] = after
         way += 0.5 * dt * (speed + after)
         speed = after
-    peak = 0
-    for i in range(steps + 1):
-        if speeds[i] > speeds[peak]:
-            peak = i
-    while way < metres:
-        if steps == most or peak == 0:
-            return -1
-        steps += 1
-        for i in range(steps, peak, -1):
-            speeds[i] = speeds[i - 1]
-        way += dt * speeds[peak]
-    if speed > 0.0:
+    if steps == 0:
+        steps = 1  # from rest to rest, with what is missing in between
+        speeds[1] = 0.0
+    more = math.ceil((metres - way) / (dt * min(limits[count], change)) - ROUNDING)
+    if steps + more > most or speed > 0.0:
         return -1
+    if more > 0:
+        slow = (metres - way) / (dt * more)
+        at = steps
+        while at > 0 and speeds[at] < slow:
+            speeds[at + more] = speeds[at]
+            at -= 1
+        for i in range(at + 1, at + more + 1):
+            speeds[i] = slow
+        steps += more
     for i in range(steps + 1):
-        speeds[i] *= gear * metres / way
+        speeds[i] *= gear
     return steps

@@ -1,0 +1,54 @@
+"""What a tree grows out of a goal can be driven into it, however tight it is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planners.search.connection.pose_table import seconds_to_pose
+from planners.search.manoeuvres.driving import allocate_drive, begin, drive_arc
+from planners.search.manoeuvres.endings import no_endings
+from planners.search.manoeuvres.manoeuvring import word_radius
+from planners.search.manoeuvres.outward import Outward, open_node
+from planners.search.manoeuvres.pose_tree import SIZE, allocate_pose_tree, plant_root, pose_of
+from planners.search.manoeuvres.shots import FromStart
+from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go
+from planners.world.alignment import to_canonical
+from planners.world.classes.families import family
+from planners.world.geometry.collision import scene_of
+from planners.world.geometry.occupancy import drawing_of, window_of
+from planners.world.goal import goal_of
+from planners.world.problem import start_state
+from planners.world.vehicles.vehicle import CAR, state_size
+from planners.world.workspace import Workspace
+
+
+@pytest.mark.parametrize("name", ["parallel", "perpendicular", "lot"])
+def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
+    size = state_size(CAR)
+    tree, drive, go = allocate_pose_tree(size), allocate_drive(size), allocate_cost_to_go()
+    failed = arcs = 0
+    for number in range(4):
+        problem = to_canonical(family(name, "hard").draw(3, number))[0]
+        scene, goal = scene_of(problem), goal_of(problem)
+        occupied = drawing_of(problem, Workspace()).occupied
+        fill_cost_to_go(occupied, *problem.start[:2], 0.1, window_of(problem), go)
+        known = FromStart(
+            *(start_state(problem)[np.newaxis], go, seconds_to_pose(CAR), no_endings(size)),
+            *(word_radius(CAR), goal[:2], True),
+        )
+        plant_root(tree, pose_of(goal, size))
+        for node in range(60):
+            if node < tree.counts[SIZE]:
+                open_node(tree, tree, node, False, known, Outward(), CAR, scene)
+        for node in range(1, min(int(tree.counts[SIZE]), 500)):
+            metres, parent = float(tree.metres[node]), int(tree.parents[node])
+            begin(drive, tree.states[node][np.newaxis])
+            arcs += 1
+            if drive_arc(drive, -np.sign(metres), tree.bends[node], abs(metres), CAR, scene):
+                end = drive.states[drive.counts[0]]
+                assert np.allclose(end[:4], tree.states[parent, :4], atol=1e-5)
+            else:
+                failed += 1
+    assert arcs > 1000
+    assert failed <= 0.01 * arcs
