@@ -125,7 +125,7 @@ def solve(
     memory = None if assist in WITHOUT_MEMORY else memory
     use = assist.removeprefix("random-")
     endings: Endings | None = None
-    recalled, parts = Recalled((), -1, 0), SubPlanAnswer(None, 0.0, False, 0)
+    recalled, parts = Recalled((), -1, 0), SubPlanAnswer(None, 0.0, False, 0, False)
     if memory is not None:
         if memory.vehicle != vehicle:
             raise ValueError(
@@ -183,6 +183,7 @@ def solve(
             occupied=view.drawn,
             beside=beside if helps else None,
             endings=endings,
+            knows_way=parts.knows_way,
         )
         if use == "fresh":
             query = replace(query, guide=fresh_guide(query, view.bits))

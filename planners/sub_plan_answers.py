@@ -1,28 +1,38 @@
 """Answers a question by parts of stored plans: here sub-plans meet ways over the grid and connections.
 
-For a place one sub-plan, or several one after another along the shortest way over the grid, are driven again
-from the true start state. For a pose, or a speed at the goal, they lead near it; a connection does the rest.
+For a place one sub-plan, or several one after another, are driven again from the true start state. For a
+pose, or a speed at the goal, they lead near it; a connection does the rest.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.library.chains import recall_chain
+from planners.memory.library.chains import allocate_chains, recall_chain
+from planners.memory.library.onward import Ground
 from planners.memory.library.plan_library import PlanLibrary
-from planners.memory.library.recalling import CHECKED, STEPS, Recalling, allocate_recalling
+from planners.memory.library.recalling import (
+    CHECKED,
+    STEPS,
+    Cells,
+    Recalling,
+    allocate_recalling,
+    recall_one,
+)
 from planners.search.connection.candidates import list_connections, next_word
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
 from planners.search.connection.outline import outline_is_free
-from planners.search.guides.detour import seconds_along
-from planners.search.guides.grid_path import grid_path
+from planners.search.guides.detour import is_long, seconds_for
+from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go
+from planners.search.structures.time_to_go import ahead_of, way_from
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.geometry.occupancy import window_of
-from planners.world.goal import asks_for_more, goal_of, place
+from planners.world.goal import RADIUS, asks_for_more, goal_of, place
 from planners.world.jit import lean
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import load, store
@@ -30,12 +40,14 @@ from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.view import View
 
 NEAR_M: Final = 6.0  # from a pose: so near sub-plans lead
-LONGER: Final = 1.3  # times the estimate: sub-plans that take longer are given up
+AT_ONCE: Final = 2.0  # times the estimate straight ahead: a single sub-plan takes no longer
+LOOKS_AT_ONCE: Final = 100  # for a single sub-plan from the start to the goal
+LONGER: Final = 2.0  # times the estimate: several sub-plans take no longer
+MOSTLY: Final = 2  # an answer of whose steps more than one in so many is stored was recalled
 ROWS: Final = 6  # states from which the rest is closed ...
 APART: Final = 6  # ... so many steps apart, and the start
 OUTLINES: Final = 8  # words of a connection that are glanced at ...
 WORDS: Final = 2  # ... and driven, at most
-NO_WAY = np.empty((0, 2))
 
 
 class SubPlanAnswer(NamedTuple):
@@ -43,8 +55,11 @@ class SubPlanAnswer(NamedTuple):
 
     plan: Plan | None
     seconds: float  # what a good plan is estimated to take
-    recalled: bool  # whether a part of the plan was stored; else a connection leads all the way
+    recalled: (
+        bool  # whether most of the plan was stored; else generic drives or a connection lead most of the way
+    )
     checks: int  # collision checks that this took
+    knows_way: bool  # whether the workspace holds the distances to the goal now
 
 
 @lean
@@ -124,24 +139,40 @@ def sub_plan_answer(
     """
     problem, subs = view.problem, library.sub_plans
     r = view.workspace.buffers(allocate_recalling, state_size(vehicle))
-    r.states[0] = start_state(problem, vehicle)
+    start = start_state(problem, vehicle)
+    r.states[0] = start
+    r.work.fill(0)
     goal = goal_of(problem)
     exact = asks_for_more(goal)
     near = place(*problem.goal, max(NEAR_M, problem.goal_radius)) if exact else goal
-    way = grid_path(
-        *(view.bits, problem.start[:2], problem.goal, float(near[2]), view.workspace, window_of(problem))
-    )
-    way = NO_WAY if way is None else way
-    seconds = seconds_along(way, r.states[0], vehicle)
-    view.lap("guide")
     offset = 0 if blindly is None else int(blindly.integers(1, len(subs.begins)))
-    scene = view.scene
-    within = min(LONGER * seconds / vehicle.dt, STEPS)
-    steps = int(recall_chain(subs, near, way, within, offset, r, vehicle, scene))
-    stored = steps
+    cells, scene = Cells(view.bits, window_of(problem)), view.scene
+    x, y = problem.goal[0] - start[0], problem.goal[1] - start[1]
+    metres, turn = (
+        max(math.hypot(x, y) - float(near[RADIUS]), 0.0),
+        1.0 - math.cos(math.atan2(y, x) - start[2]),
+    )
+    seconds = seconds_for(metres, turn, start[3], vehicle)
+    within = AT_ONCE * seconds / vehicle.dt
+    steps = stored = int(recall_one(subs, 0, near, within, LOOKS_AT_ONCE, offset, cells, r, vehicle, scene))
+    view.lap("check")
+    knows_way = steps == 0 or is_long(steps * vehicle.dt, seconds)
+    if knows_way:
+        go = view.workspace.buffers(allocate_cost_to_go)
+        fill_cost_to_go(cells.occupied, *problem.goal, float(goal[RADIUS]), cells.window, go)
+        seconds = seconds_for(*way_from(r.states, go, vehicle), start[3], vehicle)
+        view.lap("guide")
+        if steps == 0:
+            chains = view.workspace.buffers(allocate_chains, state_size(vehicle))
+            ground = Ground(cells, ahead_of(goal, go, vehicle))
+            within = min(LONGER * seconds, STEPS * vehicle.dt)
+            steps, stored = recall_chain(
+                *(subs, library.stretches, near, within, offset, ground, chains, r, vehicle, scene)
+            )
     if exact:
         connection = view.workspace.buffers(allocate_connection, state_size(vehicle))
-        steps, stored = _close(steps, goal, connection, r, vehicle, scene)
+        steps, kept = _close(steps, goal, connection, r, vehicle, scene)
+        stored = min(stored, kept)
     view.lap("check")
     plan = Plan(r.states[: steps + 1].copy(), r.controls[:steps].copy(), vehicle.dt) if steps else None
-    return SubPlanAnswer(plan, seconds, stored > 0, int(r.work[CHECKED]))
+    return SubPlanAnswer(plan, seconds, MOSTLY * stored > steps, int(r.work[CHECKED]), knows_way)

@@ -80,7 +80,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             occupied = query.occupied
             if occupied is None:
                 occupied = drawing_of(query.problem, query.workspace).occupied
-            fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+            if not query.knows_way:
+                fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
             if suits(goal, vehicle):
                 manoeuvring = Manoeuvring(query, goal, occupied)
                 if query.endings is not None:

@@ -58,7 +58,7 @@ class Lattice(NamedTuple):
 
 
 @inlined
-def _controls(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> tuple[float, float]:
+def controls_of(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -> tuple[float, float]:
     """The controls that lead towards a primitive's speed and steering."""
     share = SPEEDS[motion // len(SHARES)]
     speed = share * vehicle.max_speed if share > 0.0 else -share * vehicle.min_speed
@@ -93,7 +93,7 @@ def open_vertex(
     for motion in range(len(SHARES) * lattice.speeds):
         state = load(tree.states, vertex, vehicle)
         for _ in range(lattice.steps):
-            control_1, control_2 = _controls(state, motion, lattice, vehicle)
+            control_1, control_2 = controls_of(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
         if not was_reached(frontier, _key(state, ahead.go, lattice, vehicle)):
             spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
@@ -122,7 +122,7 @@ def drive_primitive(
     state = load(tree.states, vertex, vehicle)
     parent = vertex
     for _ in range(lattice.steps):
-        control_1, control_2 = _controls(state, motion, lattice, vehicle)
+        control_1, control_2 = controls_of(state, motion, lattice, vehicle)
         state = step(state, control_1, control_2, vehicle)
         depth = tree.depths[parent] + 1
         if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:

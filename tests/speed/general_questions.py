@@ -1,19 +1,21 @@
 """How fast the planners answer general questions, from scratch or with a library of plans, cold, on one core.
 
 ``python -m tests.speed.general_questions [--questions 200] [--poses] [--vehicle car] [--planners lattice …]
-[--memory LIBRARY]``
+[--memory LIBRARY] [--keep FILE]``
 draws questions in the classes and, where they lie beside the repository, in windows of four city maps: start
 and goal over the free space, speeds from 0 to the largest, 2 to 70 m apart. It prints for each world and
 planner the solved share, of all and of what any planner solves, planning times and driving times. With a
 library (``motion-memory gather``) the lattice also recalls from it, and blindly; GUST has a fresh guide.
+With ``--keep`` each question is written down as soon as it is answered, and the same command goes on there.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -59,26 +61,70 @@ def questions_of(name: str, count: int, vehicle: Vehicle, pose: bool) -> Iterato
             yield to_canonical(asked)[0]
 
 
+class Answer(NamedTuple):
+    """What came of one attempt."""
+
+    solved: bool
+    recalled: bool
+    seconds: float  # of planning
+    driving_s: float
+    faults: int  # that the authority found
+
+
+Rows = dict[str, list[Answer]]  # for each question, those of all planners and assists
+
+
+def read_kept(kept: Path | None, settings: str) -> Rows:
+    """Read what was answered before; its first line are the settings, which have to be the same."""
+    if kept is None or not kept.exists():
+        if kept is not None:
+            kept.write_text(settings + "\n")
+        return {}
+    first, *lines = kept.read_text().split("\n")
+    if first != settings:
+        raise SystemExit(f"{kept} is of other settings, {first}: give another file")
+    rows = [json.loads(line) for line in lines[:-1]]  # the last line is empty or was cut off
+    kept.write_text("\n".join((first, *lines[:-1], "")))
+    return {name: [Answer(*answer) for answer in answers] for name, answers in rows}
+
+
 def measured(
-    questions: list[Problem], ways: list[tuple[str, str]], vehicle: Vehicle, library: PlanLibrary | None
-) -> dict[tuple[str, str], list[Attempt]]:
-    """Attempts by planner and assist, cold: other data fill the caches before each."""
+    questions: list[Problem],
+    ways: list[tuple[str, str]],
+    vehicle: Vehicle,
+    library: PlanLibrary | None,
+    done: Rows,
+    kept: Path | None,
+) -> list[list[Answer]]:
+    """Answers by question, then planner and assist, cold: other data fill the caches before each attempt."""
     workspace, other_work = Workspace(), OtherWork()
 
     def attempt(way: tuple[str, str], question: Problem, seed: int) -> Attempt:
         return solve(question, *way, 1, library, seed, vehicle=vehicle, workspace=workspace)
 
-    rows: dict[tuple[str, str], list[Attempt]] = {way: [] for way in ways}
     for way in ways:
         for question in questions[:5]:
             attempt(way, question, SEED + 1)  # compiles
     with no_garbage_collection():
         for number, question in enumerate(questions):
+            if question.id in done:
+                continue
             at = number % len(ways)
+            attempts: dict[tuple[str, str], Attempt] = {}
             for way in ways[at:] + ways[:at]:
                 other_work()
-                rows[way].append(attempt(way, question, SEED))
-    return rows
+                attempts[way] = attempt(way, question, SEED)
+            done[question.id] = [
+                Answer(
+                    *(each.solved, each.source == "recalled", each.planning_seconds, each.duration_s or 0.0),
+                    0 if each.plan is None else len(faults(question, each.plan, vehicle)),
+                )
+                for each in (attempts[way] for way in ways)
+            ]
+            if kept is not None:
+                with kept.open("a") as file:
+                    file.write(json.dumps([question.id, done[question.id]]) + "\n")
+    return [done[question.id] for question in questions]
 
 
 def report(console: Console, asked: argparse.Namespace) -> None:
@@ -93,32 +139,28 @@ def report(console: Console, asked: argparse.Namespace) -> None:
         table.add_column(column)
     for column in ("solved", "of any", "recalled", "median ms", "mean", "99 %", "driving s", "faulty"):
         table.add_column(column, justify="right")
+    settings = json.dumps([asked.vehicle, kind, ways, str(asked.memory), SEED])
+    done = read_kept(asked.keep, settings)
     for name in asked.worlds:
         questions = list(questions_of(name, asked.questions, vehicle, asked.poses))
-        rows = measured(questions, ways, vehicle, library)
-        solved = {way: np.array([each.solved for each in rows[way]]) for way in ways}
-        anyone = np.any(list(solved.values()), axis=0)
-        everyone = np.all(list(solved.values()), axis=0)
-        for way, attempts in rows.items():
-            ms = 1e3 * np.array([each.planning_seconds for each in attempts])[anyone]
-            driving = [each.duration_s for each, all_do in zip(attempts, everyone, strict=True) if all_do]
-            faulty = sum(
-                bool(faults(question, each.plan, vehicle))
-                for question, each in zip(questions, attempts, strict=True)
-                if each.plan is not None
-            )
+        rows = measured(questions, ways, vehicle, library, done, asked.keep)
+        solved = np.array([[answer.solved for answer in row] for row in rows])
+        anyone, everyone = solved.any(axis=1), solved.all(axis=1)
+        for k, way in enumerate(ways):
+            answers = [row[k] for row in rows]
+            ms = 1e3 * np.array([answer.seconds for answer in answers])[anyone]
+            driving = np.array([answer.driving_s for answer in answers])[everyone]
             table.add_row(
                 *(name, str(len(questions)), *way),
-                *(f"{solved[way].mean():.1%}", f"{solved[way][anyone].mean():.1%}"),
-                f"{np.mean([each.source == 'recalled' for each in attempts]):.1%}",
+                *(f"{solved[:, k].mean():.1%}", f"{solved[anyone, k].mean():.1%}"),
+                f"{np.mean([answer.recalled for answer in answers]):.1%}",
                 *(f"{np.median(ms):.2f}", f"{ms.mean():.2f}", f"{np.quantile(ms, 0.99):.1f}"),
-                *(f"{np.mean(driving):.1f}" if driving else "-", str(faulty)),
+                *(f"{driving.mean():.2f}" if len(driving) else "-",),
+                str(sum(answer.faults > 0 for answer in answers)),
             )
             if asked.failures:
                 failed = [
-                    q.id
-                    for q, a, any_ in zip(questions, attempts, anyone, strict=True)
-                    if any_ and not a.solved
+                    q.id for q, any_, own in zip(questions, anyone, solved[:, k], strict=True) if any_ > own
                 ]
                 console.print(name, *way, failed[:20])
         table.add_section()
@@ -133,6 +175,7 @@ def main() -> None:
     parser.add_argument("--vehicle", choices=VEHICLES, default="car")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=list(PLANNERS))
     parser.add_argument("--memory", type=Path, help="a library")
+    parser.add_argument("--keep", type=Path, help="a file of the answers so far, from which to go on")
     parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS))
     parser.add_argument("--failures", action="store_true", help="name questions that only others solve")
     report(Console(width=120), parser.parse_args())

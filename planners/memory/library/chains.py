@@ -1,85 +1,239 @@
-"""Recalls sub-plans one after another along a way, where no single one is free."""
+"""Recalls sub-plans one after another, where no single one leads to the goal: the best way first.
+
+Ways grow from the start like a tree. Its nodes are the ends of sub-plans, and the one from which the goal
+is nearest by time is the next to go on. Where no sub-plan is free, short generic drives go on.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
-from planners.memory.library.recalling import AT, GLANCED, LEFT, MOST_LEGS, ROW, Recalling, recall_one
+import numpy as np
+
+from planners.memory.library.driving import ARRIVED, BLOCKED, drive_again
+from planners.memory.library.onward import GREED, LISTED, Ground, list_stretches, seconds_left
+from planners.memory.library.recalling import (
+    CHECKED,
+    LONGER,
+    LOOKS,
+    STEPS,
+    Recalling,
+    glances_are_free,
+    keep_tried,
+    recall_one,
+)
+from planners.memory.library.stretches import MOST_STEPS, Stretches
 from planners.memory.library.sub_plans import SubPlans
-from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene
-from planners.world.goal import X, Y
-from planners.world.jit import lean
+from planners.search.primitives import SHARES, Lattice, controls_of
+from planners.search.structures.cost_to_go import metres_to_go
+from planners.world.arrays import Floats, Integers
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import RADIUS, X, Y
+from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
+from planners.world.vehicles.dynamics import load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
-FIRST: Final = 500  # states to glance at for one sub-plan from the start to the goal
-EACH: Final = 200  # for each other one
-ALL: Final = 2_500  # for all together
-BEYOND: Final = 5  # steps that it is free to go on
-LEAST_LEFT: Final = 3  # points of the way, for a sub-plan on it
-ONWARD: Final = 6  # points, over which the direction of the way is taken
+NODES: Final = 24
+ROOM: Final = MOST_STEPS + LONGER  # steps to a node from the one before
+BRANCHES: Final = 2  # stretches that lead on from a node, at most
+CUT: Final = 5  # steps at the end of a sub-plan, behind which a wall may stand
+ALL: Final = 1_000  # looks for all together
+EACH: Final = 25  # looks from a node for a sub-plan to the goal
+NEAR: Final = (
+    1.3,
+    4.0,
+)  # it is looked for if the way there is at most so much longer than straight ahead, in m
+GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads on ...
+GENERICS: Final = 3  # ... of which so many are kept, the best
+PARENT, DRIVEN, ROW, STORED, IS_OPEN = range(5)  # columns of Chains.nodes
+
+
+class Chains(NamedTuple):
+    """Buffers for one question at a time: ways as a tree, whose node 0 is the start."""
+
+    states: Floats  # [NODES, ROOM + 1, S] behind each node's parent
+    controls: Floats  # [NODES, ROOM, 2]
+    estimates: Floats  # [NODES] of the time to the goal
+    nodes: Integers  # [NODES, 5] parent, steps from there; steps from the start, of these stored; 1 if open
+    listed: Integers  # [LISTED] stretches, the best first; of mirrored ones -1 - number
+    listed_estimates: Floats  # [LISTED]
+
+
+def allocate_chains(state_size: int) -> Chains:
+    """Buffers for states of ``state_size`` numbers."""
+    return Chains(
+        np.zeros((NODES, ROOM + 1, state_size)),
+        np.zeros((NODES, ROOM, 2)),
+        np.zeros(NODES),
+        np.zeros((NODES, 5), np.int32),
+        np.zeros(LISTED, np.int32),
+        np.zeros(LISTED),
+    )
+
+
+@inlined
+def _put_node(
+    node: int,
+    parent: int,
+    driven: int,
+    stored: int,
+    estimate: float,
+    chains: Chains,
+    r: Recalling,
+    vehicle: Vehicle,
+) -> None:
+    """Make the drive that was tried from ``parent`` a node."""
+    nodes = chains.nodes
+    nodes[node, PARENT] = parent
+    nodes[node, DRIVEN] = driven
+    nodes[node, ROW] = nodes[parent, ROW] + driven
+    nodes[node, STORED] = nodes[parent, STORED] + stored
+    nodes[node, IS_OPEN] = 1
+    chains.estimates[node] = estimate
+    for i in range(driven):
+        chains.controls[node, i, 0] = r.tried_controls[i, 0]
+        chains.controls[node, i, 1] = r.tried_controls[i, 1]
+        store(chains.states[node], i + 1, load(r.tried_states, i + 1, vehicle))
+
+
+@lean
+def _drive_generic(
+    parent: int, count: int, ground: Ground, chains: Chains, r: Recalling, vehicle: Vehicle, scene: Scene
+) -> int:
+    """Add the best free generic drives from a node. Returns how many nodes there are then."""
+    first = count
+    for motion in range(len(SHARES) * GENERIC.speeds):
+        state = load(r.tried_states, 0, vehicle)
+        free = True
+        for i in range(GENERIC.steps):
+            control_1, control_2 = controls_of(state, motion, GENERIC, vehicle)
+            state = step(state, control_1, control_2, vehicle)
+            r.work[CHECKED] += 1
+            r.work[LOOKS] += 1
+            free = state_is_free(state, vehicle, scene)
+            if not free:
+                break
+            r.tried_controls[i, 0] = control_1
+            r.tried_controls[i, 1] = control_2
+            store(r.tried_states, i + 1, state)
+        if not free:
+            continue
+        spent = (chains.nodes[parent, ROW] + GENERIC.steps) * vehicle.dt
+        estimate = spent + GREED * seconds_left(state, ground, vehicle)
+        node = count
+        if count == min(first + GENERICS, NODES):
+            node = first
+            for other in range(first + 1, count):
+                if chains.estimates[other] > chains.estimates[node]:
+                    node = other
+            if chains.estimates[node] <= estimate:
+                continue
+        _put_node(node, parent, GENERIC.steps, 0, estimate, chains, r, vehicle)
+        count = max(count, node + 1)
+    return count
+
+
+@inlined
+def _write_way(node: int, chains: Chains, r: Recalling, vehicle: Vehicle) -> None:
+    """Write the way to a node into the answer."""
+    row = chains.nodes[node, ROW]
+    while node > 0:
+        driven = chains.nodes[node, DRIVEN]
+        row -= driven
+        for i in range(driven):
+            r.controls[row + i, 0] = chains.controls[node, i, 0]
+            r.controls[row + i, 1] = chains.controls[node, i, 1]
+            store(r.states, row + i + 1, load(chains.states[node], i + 1, vehicle))
+        node = chains.nodes[node, PARENT]
+
+
+@inlined
+def _next_node(count: int, chains: Chains) -> int:
+    """The open node with the least estimate, -1 if none is open."""
+    best = -1
+    for node in range(count):
+        if chains.nodes[node, IS_OPEN] and (best < 0 or chains.estimates[node] < chains.estimates[best]):
+            best = node
+    return best
 
 
 @lean
 def recall_chain(
     subs: SubPlans,
+    stretches: Stretches,
     goal: Floats,
-    way: Floats,
     within: float,
     blindly: int,
+    ground: Ground,
+    chains: Chains,
     r: Recalling,
     vehicle: Vehicle,
     scene: Scene,
-) -> int:
-    """Find sub-plans, one after another, from ``r.states[0]`` to a goal.
+) -> tuple[int, int]:
+    """Find sub-plans, one after another, from ``r.states[0]`` to a goal, in ``within`` seconds.
 
-    Where none leads to the goal, one is sought to the point that ends two thirds of the ``way [M, 2]`` (in
-    metres) that is left, or two thirds of those, and so on; then the goal is tried again from there. Who gets
-    no farther, or will need more than ``within`` steps, goes back to where he began last, and tries a shorter
-    one. Returns all steps, 0 for no answer.
+    From a node a sub-plan to the goal is sought if the way there is nearly straight, then stretches that lead
+    on; if none is free, generic drives lead on. Returns all steps, 0 for no answer, and how many are stored.
     """
-    r.work.fill(0)
-    r.legs[0, ROW] = 0
-    r.legs[0, AT] = 0
-    r.legs[0, LEFT] = way.shape[0] - 1
-    metres = 0.0
-    for k in range(1, way.shape[0]):
-        metres += length(way[k, X] - way[k - 1, X], way[k, Y] - way[k - 1, Y])
-    a_point = metres / max(way.shape[0] - 1, 1) / (vehicle.max_speed * vehicle.dt)  # steps
-    leg = 0
-    fresh = True
-    while r.work[GLANCED] < ALL:
-        row = r.legs[leg, ROW]
-        at = r.legs[leg, AT]
-        if fresh:
-            most = FIRST if leg == 0 else EACH
-            driven = recall_one(subs, row, goal, 0, within - row, most, blindly, r, vehicle, scene)
+    r.work[LOOKS] = 0
+    chains.nodes[0].fill(0)
+    chains.nodes[0, IS_OPEN] = 1
+    count = 1
+    while r.work[LOOKS] < ALL:
+        node = _next_node(count, chains)
+        if node < 0:
+            break
+        chains.nodes[node, IS_OPEN] = 0
+        _write_way(node, chains, r, vehicle)
+        row, stored = chains.nodes[node, ROW], chains.nodes[node, STORED]
+        start = load(r.states, row, vehicle)
+        metres = metres_to_go(start[0], start[1], ground.ahead.go)
+        straight = length(goal[X] - start[0], goal[Y] - start[1]) - ground.ahead.goal[RADIUS]
+        if node > 0 and metres < NEAR[0] * straight + NEAR[1]:
+            most = within / vehicle.dt - row
+            driven = recall_one(subs, row, goal, most, EACH, blindly, ground.cells, r, vehicle, scene)
             if driven > 0:
-                return int(row + driven)
-            fresh = False
-        left = r.legs[leg, LEFT] * 2 // 3
-        r.legs[leg, LEFT] = left
-        if left < LEAST_LEFT:
-            leg -= 1
-            if leg < 0:
-                return 0
-            continue
-        to = at + left
-        after = min(to + ONWARD, way.shape[0] - 1)
-        dx = way[after, X] - way[to - 1, X]
-        dy = way[after, Y] - way[to - 1, Y]
-        apart = length(dx, dy)
-        r.onward[X] = dx / apart
-        r.onward[Y] = dy / apart
-        r.via[X] = way[to, X]
-        r.via[Y] = way[to, Y]
-        in_time = within - row - (way.shape[0] - 1 - to) * a_point
-        driven = recall_one(subs, row, r.via, BEYOND, in_time, EACH, blindly, r, vehicle, scene)
-        if driven > 0 and leg + 1 < MOST_LEGS:
-            leg += 1
-            r.legs[leg, ROW] = row + driven
-            r.legs[leg, AT] = to
-            r.legs[leg, LEFT] = way.shape[0] - 1 - to
-            fresh = True
-    return 0
+                return int(row + driven), int(stored + driven)
+        store(r.tried_states, 0, start)
+        before = count
+        listed = list_stretches(
+            *(
+                stretches,
+                start,
+                row * vehicle.dt,
+                within,
+                ground,
+                chains.listed,
+                chains.listed_estimates,
+                vehicle,
+            )
+        )
+        for c in range(listed):
+            if count == NODES or count == before + BRANCHES or r.work[LOOKS] >= ALL:
+                break
+            k = chains.listed[c]
+            side = 1.0 if k >= 0 else -1.0
+            k = ((k if k >= 0 else -1 - k) + blindly) % stretches.begins.shape[0]
+            begin, steps = stretches.begins[k], stretches.steps[k]
+            placing = start[0], start[1], start[2], side
+            if row + ROOM > STEPS or not glances_are_free(subs, begin, steps, placing, r, vehicle, scene):
+                continue
+            driven, ended = drive_again(
+                *(subs, begin, begin + steps, placing, goal, steps + LONGER, r.pose),
+                *(r.tried_states, r.tried_controls, vehicle, scene),
+            )
+            r.work[CHECKED] += driven
+            if ended == ARRIVED:
+                keep_tried(row, driven, r, vehicle)
+                return int(row + driven), int(stored + driven)
+            if ended == BLOCKED or driven <= CUT:
+                continue
+            driven -= CUT
+            left = seconds_left(load(r.tried_states, driven, vehicle), ground, vehicle)
+            estimate = (row + driven) * vehicle.dt + GREED * left
+            _put_node(count, node, driven, driven, estimate, chains, r, vehicle)
+            count += 1
+        if count == before and count < NODES and row + ROOM <= STEPS:
+            count = _drive_generic(node, count, ground, chains, r, vehicle, scene)
+    return 0, 0

@@ -26,6 +26,7 @@ from planners.world.vehicles.vehicle import Vehicle
 Placing = tuple[float, float, float, float]  # where a sub-plan begins: x, y, heading; -1 if it is mirrored
 NEAR_M: Final = 1.5  # on about this way a gap beside the sub-plan is closed
 SLACK_M: Final = 0.2  # who is farther behind or ahead of the sub-plan waits for it or skips a state
+BLOCKED, ENDED, ARRIVED = range(3)  # how a drive along a sub-plan ended
 SMALL: Final = 0.05  # a bend at which curvature is proportional to it
 
 
@@ -62,10 +63,10 @@ def put(subs: SubPlans, begin: int, at: int, placing: Placing, pose: Floats) -> 
 def drive_again(
     subs: SubPlans,
     begin: int,
+    last: int,
     placing: Placing,
     goal: Floats,
     most: int,
-    beyond: int,
     pose: Floats,
     states: Floats,
     controls: Floats,
@@ -74,17 +75,15 @@ def drive_again(
 ) -> tuple[int, int]:
     """Drive along a placed sub-plan from ``states[0]``, and check every state.
 
-    The stored controls are corrected by what closes the gap to the sub-plan. The drive goes on along the plan
-    until it reaches the goal, and is free for ``beyond`` steps more; a state is blocked; ``most`` steps are
-    driven; or the plan ends. ``states`` and ``controls`` are filled in up to the goal. Returns the steps to
-    the goal, 0 if it is not reached, and how many states were checked.
+    The stored controls are corrected by what closes the gap to the sub-plan. The drive goes on along the
+    plan until it reaches the goal (``ARRIVED``), a state is blocked (``BLOCKED``), or state ``last`` of the
+    plan is reached or ``most`` steps are driven (``ENDED``). Fills in ``states`` and ``controls``. Returns
+    the steps, with the blocked one, and how the drive ended.
     """
-    last = subs.lasts[begin]
     limit_1, limit_2 = control_limits(vehicle)
     bend = SMALL / curvature_of(SMALL, vehicle)  # for each unit of curvature
     state = load(states, 0, vehicle)
     at = begin
-    arrived = 0
     for i in range(most):
         put(subs, begin, at, placing, pose)
         sin, cos = sincos(pose[0, 2])
@@ -101,19 +100,18 @@ def drive_again(
         first, second = admissible(state, first, second, vehicle)
         state = step(state, first, second, vehicle)
         if not state_is_free(state, vehicle, scene):
-            return 0, i + 1
-        if arrived == 0:
-            controls[i, 0] = first
-            controls[i, 1] = second
-            store(states, i + 1, state)
-            if reaches(state, goal):
-                arrived = i + 1
-        if after == last or (arrived > 0 and i + 1 >= arrived + beyond):
-            return arrived, i + 1
+            return i + 1, BLOCKED
+        controls[i, 0] = first
+        controls[i, 1] = second
+        store(states, i + 1, state)
+        if reaches(state, goal):
+            return i + 1, ARRIVED
+        if after == last:
+            return i + 1, ENDED
         sin, cos = sincos(wanted[2])
         ahead = gear * (cos * (state[0] - wanted[0]) + sin * (state[1] - wanted[1]))
         if ahead > SLACK_M:
             at = min(at + 2, last)
         elif ahead > -SLACK_M:
             at = after
-    return arrived, most
+    return most, ENDED

@@ -6,6 +6,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from planners.memory.library.stretches import Stretches, stretches_of
 from planners.memory.library.sub_plans import SubPlans, index_of
 from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.search.manoeuvres.endings import endings_of
@@ -38,6 +39,11 @@ class PlanLibrary:
     def sub_plans(self) -> SubPlans:
         """The parts of the plans, and what finds them."""
         return index_of(self.plans, self.vehicle)
+
+    @functools.cached_property
+    def stretches(self) -> Stretches:
+        """The few parts that lead onward from each kind of motion."""
+        return stretches_of(self.sub_plans, self.vehicle)
 
     @functools.cached_property
     def endings(self) -> Endings:

@@ -1,6 +1,7 @@
 """Recalls a sub-plan from a state to a goal: candidates by cell, the quickest first, glanced at, then driven.
 
 Candidates that drive alike are mostly blocked alike. So after a few of one shape others are tried first.
+Those that pass through cells that are not free are left out: some bits tell that sooner than a glance.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.memory.library.driving import drive_again, placing_for, put
+from planners.memory.library.driving import ARRIVED, Placing, drive_again, placing_for, put
 from planners.memory.library.sub_plans import (
     SECTORS,
     SHAPE_CELLS,
@@ -23,9 +24,10 @@ from planners.memory.library.sub_plans import (
 )
 from planners.world.arrays import Floats, Integers
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.goal import X, Y, place
-from planners.world.jit import lean
-from planners.world.trigonometry import length, sincos, wrapped
+from planners.world.geometry.occupancy import Bits, Window, is_crossed
+from planners.world.goal import X, Y
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import length, wrapped
 from planners.world.vehicles.dynamics import State, load, store
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -37,11 +39,14 @@ GLANCES: Final = 8  # states of a candidate that are tried before it is driven
 SPREAD: Final = 5  # of so many states, one after another, so that the first glances lie far apart
 PER_SHAPE: Final = 2  # candidates of a shape, before others are tried
 CHOICES: Final = 3  # free candidates, of which the best is taken
-TURNED: Final = 10.0  # steps for each unit of 1 - cos of the angle between arrival and the way on
-CHECKED, GLANCED = range(2)  # indices into Recalling.work
-ROW, AT, LEFT = range(3)  # columns of Recalling.legs
-MOST_LEGS: Final = 12
-VIA_M: Final = 2.0  # a sub-plan on the way ends within this distance of a point of it
+CHECKED, LOOKS = range(2)  # indices into Recalling.work
+
+
+class Cells(NamedTuple):
+    """The cells of a window that are not free. Who passes through one is mostly blocked."""
+
+    occupied: Bits  # [64]
+    window: Window
 
 
 class Recalling(NamedTuple):
@@ -56,10 +61,7 @@ class Recalling(NamedTuple):
     order: Integers  # [CANDIDATES] the same, the quickest first
     ends: Integers  # [STEPS + 1] where in the order those of so many steps end
     seen: Integers  # [SHAPE_CELLS] candidates of each shape so far
-    work: Integers  # [2] states checked; of these only glanced at
-    via: Floats  # [7] a place on the way, as a goal
-    onward: Floats  # [2] the direction of the way behind the via, a unit vector
-    legs: Integers  # [MOST_LEGS, 3] from which row, from which point of the way, how many points are left
+    work: Integers  # [2] states checked; looks taken: at the cells of a candidate, at a state of it
 
 
 def allocate_recalling(state_size: int) -> Recalling:
@@ -75,9 +77,6 @@ def allocate_recalling(state_size: int) -> Recalling:
         np.zeros(STEPS + 1, np.int32),
         np.zeros(SHAPE_CELLS, np.int32),
         np.zeros(2, np.int64),
-        place(0.0, 0.0, VIA_M),
-        np.zeros(2),
-        np.zeros((MOST_LEGS, 3), np.int64),
     )
 
 
@@ -125,28 +124,62 @@ def _list_candidates(
     return count
 
 
+@inlined
+def keep_tried(row: int, steps: int, r: Recalling, vehicle: Vehicle) -> None:
+    """Let the first steps of the drive that was tried follow on a row of the answer."""
+    for i in range(steps):
+        r.controls[row + i, 0] = r.tried_controls[i, 0]
+        r.controls[row + i, 1] = r.tried_controls[i, 1]
+        store(r.states, row + i + 1, load(r.tried_states, i + 1, vehicle))
+
+
+@inlined
+def glances_are_free(
+    subs: SubPlans, begin: int, steps: int, placing: Placing, r: Recalling, vehicle: Vehicle, scene: Scene
+) -> bool:
+    """Whether some states of a placed sub-plan are free."""
+    for glance in range(GLANCES):
+        at = begin + (glance * SPREAD % GLANCES + 1) * steps // GLANCES
+        put(subs, begin, at, placing, r.pose)
+        r.work[CHECKED] += 1
+        r.work[LOOKS] += 1
+        if not state_is_free(load(r.pose, 0, vehicle), vehicle, scene):
+            return False
+    return True
+
+
+@inlined
+def _is_crossed(subs: SubPlans, begin: int, steps: int, placing: Placing, cells: Cells, r: Recalling) -> bool:
+    """Whether a placed sub-plan passes through a cell that is not free, as far as some places tell."""
+    r.work[LOOKS] += 1
+    for glance in range(1, GLANCES):
+        put(subs, begin, begin + glance * SPREAD % GLANCES * steps // GLANCES, placing, r.pose)
+        if is_crossed(r.pose[0, 0], r.pose[0, 1], cells.occupied, cells.window):
+            return True
+    return False
+
+
 @lean
 def recall_one(
     subs: SubPlans,
     row: int,
     goal: Floats,
-    beyond: int,
     within: float,
     most: int,
     blindly: int,
+    cells: Cells,
     r: Recalling,
     vehicle: Vehicle,
     scene: Scene,
 ) -> int:
     """Find a sub-plan from ``r.states[row]`` to a goal, and fill in its drive behind that row.
 
-    Of the first free ones the quickest is taken; if the drive is to go on (``beyond`` steps are free) the one
-    that is soonest on the way there. It has less than ``within`` steps. At most ``most`` states are glanced
-    at. Returns the steps, 0 for none.
+    Of the first free ones the quickest is taken. It has less than ``within`` steps. At most ``most`` looks
+    are taken. Returns the steps, 0 for none.
     """
     start = load(r.states, row, vehicle)
     store(r.tried_states, 0, start)
-    until = r.work[GLANCED] + most
+    until = r.work[LOOKS] + most
     least = within
     found = 0
     choices = CHOICES
@@ -162,43 +195,29 @@ def recall_one(
                 steps = subs.steps[entry]
                 if row + steps + LONGER > STEPS or steps > least:
                     continue
+                if r.work[LOOKS] >= until:
+                    return found
+                begin = subs.begins[entry]
+                placing = placing_for(subs, begin, begin + steps, side, start, goal)
+                if _is_crossed(subs, begin, steps, placing, cells, r):
+                    continue
                 shape = subs.shapes[entry] if side > 0.0 else SHAPE_CELLS - 1 - subs.shapes[entry]
                 r.seen[shape] += 1
                 if (r.seen[shape] > PER_SHAPE) == (again == 0):
                     continue
-                if r.work[GLANCED] >= until:
-                    return found
-                begin = subs.begins[entry]
-                placing = placing_for(subs, begin, begin + steps, side, start, goal)
-                free = True
-                for glance in range(GLANCES):
-                    at = begin + (glance * SPREAD % GLANCES + 1) * steps // GLANCES
-                    put(subs, begin, at, placing, r.pose)
-                    r.work[CHECKED] += 1
-                    r.work[GLANCED] += 1
-                    if not state_is_free(load(r.pose, 0, vehicle), vehicle, scene):
-                        free = False
-                        break
-                if not free:
+                if not glances_are_free(subs, begin, steps, placing, r, vehicle, scene):
                     continue
-                driven, checked = drive_again(
-                    *(subs, begin, placing, goal, steps + LONGER, beyond, r.pose),
+                driven, ended = drive_again(
+                    *(subs, begin, subs.lasts[begin], placing, goal, steps + LONGER, r.pose),
                     *(r.tried_states, r.tried_controls, vehicle, scene),
                 )
-                r.work[CHECKED] += checked
-                if driven == 0:
+                r.work[CHECKED] += driven
+                if ended != ARRIVED:
                     continue
-                late = float(driven)
-                if beyond > 0:
-                    sin, cos = sincos(r.tried_states[driven, 2])
-                    late += TURNED * (1.0 - cos * r.onward[0] - sin * r.onward[1])
-                if late < least:
-                    least = late
+                if driven < least:
+                    least = driven
                     found = driven
-                    for i in range(driven):
-                        r.controls[row + i, 0] = r.tried_controls[i, 0]
-                        r.controls[row + i, 1] = r.tried_controls[i, 1]
-                        store(r.states, row + i + 1, load(r.tried_states, i + 1, vehicle))
+                    keep_tried(row, driven, r, vehicle)
                 choices -= 1
                 if choices == 0:
                     return found

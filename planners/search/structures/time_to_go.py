@@ -11,9 +11,9 @@ from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.structures.cost_to_go import CostToGo, metres_to_go
 from planners.world.arrays import Floats
 from planners.world.goal import HEADING, HEADING_TOLERANCE, MOST_SPEED, RADIUS, X, Y
-from planners.world.jit import inlined
+from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
-from planners.world.vehicles.dynamics import State, control_limits
+from planners.world.vehicles.dynamics import State, control_limits, load
 from planners.world.vehicles.vehicle import Vehicle
 
 LOOK_AHEAD_M: Final = 2.0  # from here to there the distance to go tells whether the heading is right
@@ -55,6 +55,21 @@ def _seconds_to_stop(
 
 
 @inlined
+def way_to_go(state: State, go: CostToGo) -> tuple[float, float]:
+    """The metres to go, and 1 - cos of the angle to turn by before the way goes straight ahead."""
+    metres = metres_to_go(state[0], state[1], go)
+    sin, cos = sincos(state[2])
+    after = metres_to_go(state[0] + LOOK_AHEAD_M * cos, state[1] + LOOK_AHEAD_M * sin, go)
+    return metres, min(max(1.0 - (metres - after) / LOOK_AHEAD_M, 0.0), 2.0)
+
+
+@lean
+def way_from(states: Floats, go: CostToGo, vehicle: Vehicle) -> tuple[float, float]:
+    """The same for ``states[0]``, for Python."""
+    return way_to_go(load(states, 0, vehicle), go)
+
+
+@inlined
 def seconds_to_go(state: State, ahead: Ahead, turn_s: float, late_s: float, vehicle: Vehicle) -> float:
     """The estimated driving time to the goal, in seconds.
 
@@ -66,10 +81,7 @@ def seconds_to_go(state: State, ahead: Ahead, turn_s: float, late_s: float, vehi
         vehicle: what is driven.
     """
     goal, go = ahead.goal, ahead.go
-    metres = metres_to_go(state[0], state[1], go)
-    sin, cos = sincos(state[2])
-    after = metres_to_go(state[0] + LOOK_AHEAD_M * cos, state[1] + LOOK_AHEAD_M * sin, go)
-    turn = min(max(1.0 - (metres - after) / LOOK_AHEAD_M, 0.0), 2.0)  # 1 - cos of the angle to turn by
+    metres, turn = way_to_go(state, go)
     missing = vehicle.max_speed - state[3]
     acceleration = control_limits(vehicle)[0]
     slow = missing * missing / (2.0 * acceleration * vehicle.max_speed)

@@ -164,6 +164,16 @@ def draw_occupancy(vertices: Floats, piece_starts: Integers, bounds: Floats) -> 
     return grid
 
 
+@inlined
+def is_crossed(x: float, y: float, occupied: Bits, window: Window) -> bool:
+    """Whether an obstacle meets the cell of a point (metres). Outside the window none is known."""
+    column = math.floor((x - window.left) / window.cell_m)
+    row = math.floor((y - window.bottom) / window.cell_m)
+    if column < 0 or column >= GRID or row < 0 or row >= GRID:
+        return False
+    return bool((occupied[row] >> np.uint64(column)) & _ONE)
+
+
 def window_of(problem: Problem) -> Window:
     """Lay a window around start and goal: the canonical one if they lie as in canonical problems.
 

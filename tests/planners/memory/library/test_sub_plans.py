@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from planners.attempt import SUB_PLANS
 from planners.maps.questions import question_in
-from planners.memory.library.driving import drive_again
+from planners.memory.library.driving import ARRIVED, drive_again
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.library.recalling import allocate_recalling
 from planners.memory.library.sub_plans import (
@@ -106,10 +107,10 @@ def test_a_sub_plan_is_driven_again_exactly_from_where_it_began(library: PlanLib
             continue
         goal = place(*ends, 1e-6)
         placing = (20.0, 25.0, 0.3, side)
-        driven, _ = drive_again(
-            *(subs, begin, placing, goal, last - begin, 0, r.pose, r.states, r.controls, CAR, scene)
+        driven, ended = drive_again(
+            *(subs, begin, last, placing, goal, last - begin, r.pose, r.states, r.controls, CAR, scene)
         )
-        assert driven == last - begin
+        assert (driven, ended) == (last - begin, ARRIVED)
         assert np.allclose(r.states[: driven + 1, :2], ways + ORIGIN, atol=1e-6)
         assert np.allclose(r.states[: driven + 1, 3:], states[:, 3:], atol=1e-6)
 
@@ -141,7 +142,7 @@ def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time()
     empty = problem_of([])
     x, y = states[-1, :2]
     asked = Problem(
-        "q", "q", (0.0, 0.0, math.pi / 4), (x, y), 0.05, empty.bounds, empty.obstacles, 1.0, (1.0,)
+        "q", "q", (0.0, 0.0, math.pi / 4), (x, y), 0.3, empty.bounds, empty.obstacles, 1.0, (1.0,)
     )
     asked = to_canonical(asked)[0]
     durations: list[float] = []
@@ -154,3 +155,32 @@ def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time()
         assert answer.plan is not None
         assert faults(each, answer.plan, CAR) == []
     assert durations[0] == durations[1]
+
+
+def test_stretches_are_sub_plans_seen_from_where_they_begin(library: PlanLibrary) -> None:
+    subs, stretches = library.sub_plans, library.stretches
+    assert stretches.cells[-1] == len(stretches.begins)
+    for k in range(0, len(stretches.begins), 7):
+        begin, steps = int(stretches.begins[k]), int(stretches.steps[k])
+        first, states = subs.states[begin], subs.states[begin : begin + steps + 1]
+        assert begin + steps <= subs.lasts[begin]
+        cell = int(np.searchsorted(stretches.cells, k, side="right")) - 1
+        assert cell == speed_cell(first[3], CAR) * TURNS + turn_cell(first[4], CAR)
+        way = (states[:, 0] - first[0] + 1j * (states[:, 1] - first[1])) * np.exp(-1j * first[2])
+        assert np.allclose(stretches.ends[k, :2], [way[-1].real, way[-1].imag])
+        assert np.isclose(math.remainder(stretches.ends[k, 2] + first[2] - states[-1, 2], 2.0 * math.pi), 0.0)
+        assert stretches.ends[k, 3] == states[-1, 3]
+        middles = stretches.middles[k] @ [1.0, 1.0j]
+        assert np.abs(middles[:, None] - way[None, :]).min(axis=1).max() < 1e-9
+
+
+def test_around_a_wall_sub_plans_are_joined(library: PlanLibrary) -> None:
+    """The goal lies behind a wall twelve metres wide, and the vehicle faces away from it."""
+    wall = np.array([[20.0, 14.0], [22.0, 14.0], [22.0, 36.0], [20.0, 36.0]])
+    world = problem_of([wall])
+    asked = replace(world, start=(12.0, 25.0, math.pi), goal=(32.0, 25.0), start_motion=(2.0, 0.0))
+    answer = solve(asked, "lattice", "closed", memory=library)
+    assert answer.plan is not None
+    assert faults(asked, answer.plan, CAR) == []
+    assert answer.source == "recalled"
+    assert answer.expansions == 0
