@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -47,16 +48,22 @@ def test_a_plan_of_the_wheel_is_a_plan_by_our_rules() -> None:
     assert faults(problem(), answer.plan) == []
 
 
+@pytest.mark.parametrize("motion", [(), (2.0, 0.1)], ids=["from rest", "moving"])
+@pytest.mark.parametrize("turns", [0.0, math.tau], ids=["heading within pi", "a turn more"])
 @pytest.mark.parametrize("name", ["kpiece1", "rrt"])
-def test_a_plan_of_the_native_program_is_a_plan_by_our_rules(native: Native, name: str) -> None:
+def test_a_plan_of_the_native_program_is_a_plan_by_our_rules(
+    native: Native, name: str, turns: float, motion: tuple[float, ...]
+) -> None:
+    x, y, heading = problem().start
+    asked = replace(problem(), id=f"{turns} {motion}", start=(x, y, heading + turns), start_motion=motion)
     for seed in range(1, 6):
         answer = (
-            native.kpiece1(problem(), seed, LIMIT_S, KPIECE1)
+            native.kpiece1(asked, seed, LIMIT_S, KPIECE1)
             if name == "kpiece1"
-            else native.rrt(problem(), seed, LIMIT_S, RRT)
+            else native.rrt(asked, seed, LIMIT_S, RRT)
         )
         assert answer.plan is not None
-        assert faults(problem(), answer.plan) == []
+        assert faults(asked, answer.plan) == []
 
 
 def test_the_same_seed_gives_the_same_native_plan(native: Native) -> None:

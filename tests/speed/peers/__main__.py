@@ -1,4 +1,7 @@
-"""``python -m tests.speed.peers`` compares; with ``--tune`` it prints the sweep behind OMPL's settings."""
+"""``python -m tests.speed.peers`` compares our planners with OMPL's.
+
+With ``--general`` it asks general questions, with ``--tune`` it prints the sweep behind OMPL's settings.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ def main() -> None:
     """Compare or tune."""
     parser = argparse.ArgumentParser(prog="python -m tests.speed.peers", description=__doc__)
     parser.add_argument("--tune", action="store_true", help="sweep OMPL's settings instead")
+    parser.add_argument("--general", action="store_true", help="ask general questions, to discs")
     parser.add_argument("--problems", type=int, help="problems a set")
     parser.add_argument("--seeds", type=int, default=1, help="attempts of each planner at each problem")
     parser.add_argument("--worlds", type=Path, default=WORLDS, help="folder of the real worlds")
@@ -27,7 +31,9 @@ def main() -> None:
         except MissingError as missing:
             raise SystemExit(str(missing)) from None
     else:
-        comparison.report(console, given.problems or comparison.COUNT, given.seeds, given.worlds)
+        comparison.report(
+            console, given.problems or comparison.COUNT, given.seeds, given.worlds, given.general
+        )
 
 
 if __name__ == "__main__":

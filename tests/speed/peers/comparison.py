@@ -23,7 +23,7 @@ from planners.world.randomness import generator
 from planners.world.workspace import Workspace
 from tests.speed.peers.answer import Answer, MissingError
 from tests.speed.peers.native import Native
-from tests.speed.peers.problems import WORLDS, problem_sets
+from tests.speed.peers.problems import WORLDS, problem_sets, question_sets
 from tests.speed.peers.settings import KPIECE1, RRT, Kpiece1, Rrt
 from tests.speed.statistics import RESAMPLES, with_interval
 
@@ -211,8 +211,18 @@ def verdicts_of(name: str, times: dict[str, Times]) -> list[str]:
     return lines
 
 
-def report(console: Console, count: int = COUNT, seeds: int = 1, worlds: Path = WORLDS) -> None:
-    """Measure all planners on all problem sets and print a table of each; then, a line a set, the ratio."""
+def report(
+    console: Console, count: int = COUNT, seeds: int = 1, worlds: Path = WORLDS, general: bool = False
+) -> None:
+    """Measure all planners on all problem sets and print a table of each; then, a line a set, the ratio.
+
+    Args:
+        console: where to print.
+        count: problems of each set.
+        seeds: attempts of each planner at each problem.
+        worlds: folder of the real worlds.
+        general: ask general questions instead of the canonical one.
+    """
     try:
         native = Native()
     except MissingError as missing:
@@ -223,7 +233,8 @@ def report(console: Console, count: int = COUNT, seeds: int = 1, worlds: Path = 
         peers = peers_here(console, count, native)
         for peer in peers.values():
             peer.run(problem_class(CLASSES[0], "easy").draw(SEED, 0), 1)  # compiled now, not on the clock
-        for name, problems in problem_sets(console, SEED, PART, count, worlds):
+        sets = question_sets(count) if general else problem_sets(console, SEED, PART, count, worlds)
+        for name, problems in sets:
             times = measure(peers, problems, seeds, name)
             console.print(table_of(name, times))
             verdicts += verdicts_of(name, times) if MARK in times else []

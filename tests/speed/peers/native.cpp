@@ -33,7 +33,8 @@ namespace ob = ompl::base;
 namespace oc = ompl::control;
 
 constexpr double CELL_M = 1.0;    // measured: with 2 m as fast, with 0.5 m slower
-constexpr double REACH_M = 1.75;  // as planners/world/collision.py: largest half-diagonal of an inflated footprint
+constexpr double REACH_M = 1.75;  // as planners/world/geometry/collision.py: largest half-diagonal of a box
+constexpr double SPARE = 1.0 + 1.0 / 32.0;  // as interface.py: of half a step is covered
 
 struct Car {
     double front, rear, width, wheelbase, max_steering, min_speed, max_speed, max_acceleration, max_steering_rate, dt;
@@ -108,14 +109,21 @@ State step(const State &s, double acceleration, double steering_rate, const Car 
             std::min(std::max(end_steering, -car.max_steering), car.max_steering)};
 }
 
-// Half of the farthest way that a body point goes in an admissible step into or out of a state.
-double step_margin(const State &s, const Car &car) {
+struct Margins {
+    double along, across;
+};
+
+// How far a body point gets along the body and across it in half a step into or out of a state: interface.py's
+// half_step_ways.
+Margins half_step_ways(const State &s, const Car &car) {
     const double fastest =
         std::min(std::abs(s.speed) + car.max_acceleration * car.dt, std::max(car.max_speed, -car.min_speed));
     const double sharpest = std::min(std::abs(s.steering) + car.max_steering_rate * car.dt, car.max_steering);
     const double turn = fastest * tangent(sharpest) / car.wheelbase;
-    const double along = fastest + 0.5 * car.width * turn, across = std::max(car.front, car.rear) * turn;
-    return 0.5 * car.dt * std::sqrt(along * along + across * across);
+    const double half = 0.5 * SPARE * car.dt;
+    const double ahead = fastest + 0.5 * car.width * turn, across = std::max(car.front, car.rear) * turn;
+    const double turned = 0.5 * half * turn;  // the mean angle by which the two mix
+    return {half * (ahead + turned * across), half * (across + turned * ahead)};
 }
 
 struct Corner {
@@ -181,11 +189,11 @@ class Scene {
 
     // Whether the car's footprint, inflated for the steps into and out of this state, is free.
     bool state_is_free(const State &s, const Car &car) const {
-        const double margin = step_margin(s, car);
+        const auto [along, across] = half_step_ways(s, car);
         const auto [sin, cos] = direction(s.heading);
         const double ahead = 0.5 * (car.front - car.rear);
-        return box_is_free(s.x + ahead * cos, s.y + ahead * sin, cos, sin, 0.5 * (car.front + car.rear) + margin,
-                           0.5 * car.width + margin);
+        return box_is_free(s.x + ahead * cos, s.y + ahead * sin, cos, sin, 0.5 * (car.front + car.rear) + along,
+                           0.5 * car.width + across);
     }
 
   private:
@@ -339,8 +347,7 @@ State read_state() {
 Problem read_problem() {
     Problem problem;
     for (double &bound : problem.bounds) bound = read<double>();
-    problem.start = {0.0, 0.0, 0.0, 0.0, 0.0};
-    problem.start.x = read<double>(), problem.start.y = read<double>(), problem.start.heading = read<double>();
+    problem.start = read_state();
     problem.goal_x = read<double>(), problem.goal_y = read<double>(), problem.goal_radius = read<double>();
     problem.piece_starts = {0};
     for (int pieces = read<int>(); pieces > 0; --pieces) {
@@ -394,6 +401,7 @@ void plan(const std::vector<Problem> &problems, const Car &car) {
     const auto definition = std::make_shared<ob::ProblemDefinition>(si);
     ob::ScopedState<> start(space);
     values(start.get()) = problem.start;
+    values(start.get()).heading = std::remainder(problem.start.heading, 2.0 * M_PI);  // or it is out of bounds
     definition->addStartState(start);
     definition->setGoal(std::make_shared<GoalDisc>(si, problem));
     ob::PlannerPtr planner;

@@ -13,13 +13,14 @@ from typing import Self
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.problem import Problem
+from planners.world.problem import Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Car
 from tests.speed.peers.answer import Answer, MissingError, replay
 from tests.speed.peers.settings import Kpiece1, Rrt
 
 SOURCE = Path(__file__).with_name("native.cpp")
 BUILD = Path(__file__).with_name("build")  # git ignores it
+NUMBERS = 10  # that the program has of a car: from its front to its time step
 INCLUDES = ("/usr/include", "/usr/local/include")
 # Debian's libompl keeps Eigen's alignment of plain x86: what crosses the border must have the same
 FLAGS = ("-std=c++17", "-O3", "-march=native", "-DEIGEN_MAX_ALIGN_BYTES=16")
@@ -61,7 +62,7 @@ class Native:
         self._process = subprocess.Popen(
             [compile_native()], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self._ask("car", *vehicle)
+        self._ask("car", *vehicle[:NUMBERS])
 
     def __enter__(self) -> Self:
         return self
@@ -115,9 +116,9 @@ class Native:
         if problem.id not in self._numbers:
             pieces = problem.obstacles.pieces()
             corners = [word for piece in pieces for word in (len(piece), *piece.ravel().tolist())]
-            goal = (*problem.goal, problem.goal_radius)
+            start, goal = start_state(problem, self._vehicle).tolist(), (*problem.goal, problem.goal_radius)
             self._numbers[problem.id] = int(
-                self._ask("problem", *problem.bounds, *problem.start, *goal, len(pieces), *corners)
+                self._ask("problem", *problem.bounds, *start, *goal, len(pieces), *corners)
             )
         return self._numbers[problem.id]
 

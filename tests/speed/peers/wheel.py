@@ -116,6 +116,7 @@ class Wheel:
         si.setMinMaxControlDuration(*steps)
         start = space.allocState()
         start[0:5] = start_state(problem).tolist()
+        start[2] = math.remainder(start[2], math.tau)  # or it is out of bounds
         setup.addStartState(start)
         setup.setGoal(GoalDisc(si, problem, util.RNG()))
         planner = getattr(control, planner_name)(si)

@@ -30,7 +30,8 @@ KINDS: Final = (
     ALONE, FRESH, ANYTIME, FRESH_ANYTIME, OPTIMISED, PEER, MEMORY, MEMORY_ANYTIME, MEMORY_POLISHED,
 )  # fmt: skip
 WITH_MEMORY: Final = (MEMORY, MEMORY_ANYTIME, MEMORY_POLISHED)
-BEST_PLANNER: Final = "gust"  # which goes on from a guide or a memory
+GUIDED: Final = "gust"  # goes on from a fresh guide, at which the lattice does not look
+RECALLING: Final = ("gust", "lattice")  # the planner of the literature, and ours
 TOP_K: Final = 5
 
 
@@ -121,11 +122,11 @@ def methods(memory: Memory | None, vehicle: Vehicle, seed: int) -> Iterator[Meth
         yield Method(ALONE, planner, one_shot(planner, "none"))
         yield Method(FRESH, planner, one_shot(planner, "fresh"))
         yield Method(ANYTIME, planner, going_on(planner))
-    yield Method(FRESH_ANYTIME, BEST_PLANNER, going_on(BEST_PLANNER, one_shot(BEST_PLANNER, "fresh")))
+    yield Method(FRESH_ANYTIME, GUIDED, going_on(GUIDED, one_shot(GUIDED, "fresh")))
     for planner in PLANNERS:
         yield Method(OPTIMISED, planner, polished(one_shot(planner, "fresh")))
-    if memory is not None:
-        recalling = one_shot(BEST_PLANNER, "repair", TOP_K)
-        yield Method(MEMORY, BEST_PLANNER, recalling)
-        yield Method(MEMORY_ANYTIME, BEST_PLANNER, going_on(BEST_PLANNER, recalling))
-        yield Method(MEMORY_POLISHED, BEST_PLANNER, polished(recalling))
+    for planner in RECALLING if memory is not None else ():
+        recalling = one_shot(planner, "repair", TOP_K)
+        yield Method(MEMORY, planner, recalling)
+        yield Method(MEMORY_ANYTIME, planner, going_on(planner, recalling))
+        yield Method(MEMORY_POLISHED, planner, polished(recalling))
