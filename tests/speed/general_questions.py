@@ -50,7 +50,9 @@ def worlds_of(name: str, count: int, vehicle: Vehicle) -> list[Problem]:
         source = problem_class(name, vehicle=vehicle)
         return [source.draw(SEED, index) for index in range(count)]
     city = source_at(SHARED / "maps" / f"{name}.map")
-    return list(import_part(city, "test", ImportSettings(count=count, seed=SEED, vehicle=vehicle)).problems)
+    size = vehicle.scale  # a city for a vehicle half as large is half as large
+    settings = ImportSettings(vehicle, count=count, seed=SEED, scale=size, resolution=size)
+    return list(import_part(city, "test", settings).problems)
 
 
 def questions_of(name: str, count: int, vehicle: Vehicle, pose: bool) -> Iterator[Problem]:
