@@ -99,19 +99,24 @@ def improve(
     spent = searches = checks = nodes = 0
     budget, slack = float(FIRST_EXPANSIONS), FIRST_SLACK
 
-    def consider(plan: Plan) -> bool:
-        """Polish a plan and keep it if it is the best; say whether it is."""
-        nonlocal best, spent
-        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
-        left = seconds - (perf_counter() - began)
-        better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
-        spent += EXPANSIONS_AN_ITERATION * better.iterations
-        plan = better.plan or plan
+    def keep(plan: Plan) -> bool:
+        """Keep a plan if it is the best; say whether it is."""
+        nonlocal best
         if best is not None and plan.duration_s >= best.duration_s:
             return False
         best = plan
         history.append(Improvement(perf_counter() - began, spent, plan.duration_s))
         return True
+
+    def consider(plan: Plan) -> bool:
+        """Keep a plan if it is the best, as it is or polished; say whether it is."""
+        nonlocal spent
+        kept = keep(plan)  # at once: polishing takes milliseconds
+        iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
+        left = seconds - (perf_counter() - began)
+        better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
+        spent += EXPANSIONS_AN_ITERATION * better.iterations
+        return keep(better.plan or plan) or kept
 
     if given is not None:
         consider(given)

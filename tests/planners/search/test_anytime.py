@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from planners.search import anytime
 from planners.search.anytime import improve
+from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.world.authority.authority import faults
 from planners.world.randomness import generator
@@ -40,6 +41,16 @@ def test_the_same_seed_improves_alike(name):
     first, again = (improve(name, strewn(3, 30), expansions=3_000, seed=4) for _ in range(2))
     np.testing.assert_array_equal(first.plan.states, again.plan.states)
     assert [each[1:] for each in first.history] == [each[1:] for each in again.history]
+
+
+@EVERY
+def test_a_first_plan_counts_before_it_is_polished(name):
+    problem = strewn(1, 30)
+    rng = generator(4, "improve", problem.id, name, 0)
+    found = plan(name, problem, rng, limits=Limits(expansions=anytime.FIRST_EXPANSIONS))
+    assert found.plan is not None
+    first = improve(name, problem, expansions=3_000, seed=4).history[0]
+    assert (first.expansions, first.duration_s) == (max(found.expansions, 1), found.plan.duration_s)
 
 
 def test_more_work_gives_shorter_drives():
