@@ -7,7 +7,16 @@ from typing import Final
 
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
-from planners.world.goal import HEADING, HEADING_TOLERANCE, HITCHES, RADIUS, X, Y
+from planners.world.goal import (
+    HEADING,
+    HEADING_TOLERANCE,
+    HITCHES,
+    LEAST_SPEED,
+    MOST_SPEED,
+    RADIUS,
+    X,
+    Y,
+)
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length, wrapped
 
@@ -21,15 +30,14 @@ def _edge(tolerance: float) -> float:
 
 
 @inlined
-def _bend(tolerance: float) -> float:
+def bend_of_error(tolerance: float) -> float:
     """What it costs to be one metre or radian off the aim, twice."""
     return OFF / (_edge(tolerance) * _edge(tolerance))
 
 
 @lean
-def aim_at(model: Model, steps: int, goal: Floats) -> None:
-    """Aim at the end of ``model.best_states``, or at what is next to it well inside of what is asked."""
-    aim, end = model.vectors[5], model.best_states[steps]
+def aim_near(end: Floats, goal: Floats, aim: Floats) -> None:
+    """Aim at a last state ``[S]``, or at what is next to it well inside of what is asked."""
     for c in range(aim.shape[0]):
         aim[c] = end[c]
     dx = end[0] - goal[X]
@@ -39,11 +47,19 @@ def aim_at(model: Model, steps: int, goal: Floats) -> None:
     aim[1] = goal[Y] + inside * dy
     if goal[HEADING_TOLERANCE] < math.inf:
         inside = goal[HEADING_TOLERANCE] - _edge(goal[HEADING_TOLERANCE])
-        aim[2] = goal[HEADING] + min(max(wrapped(end[2] - goal[HEADING]), -inside), inside)
+        off = wrapped(end[2] - goal[HEADING])
+        aim[2] = end[2] - off + min(max(off, -inside), inside)
+    aim[3] = min(max(end[3], goal[LEAST_SPEED]), goal[MOST_SPEED])
     for k in range((goal.shape[0] - HITCHES) // 2):
         inside = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1])
         off = end[5 + k] - goal[HITCHES + 2 * k]
         aim[5 + k] = goal[HITCHES + 2 * k] + min(max(off, -inside), inside)
+
+
+@lean
+def aim_at(model: Model, steps: int, goal: Floats) -> None:
+    """Aim at the end of ``model.best_states``, as ``aim_near`` does."""
+    aim_near(model.best_states[steps], goal, model.vectors[5])
 
 
 @inlined
@@ -51,13 +67,13 @@ def error_cost(states: Floats, i: int, aim: Floats, goal: Floats) -> float:
     """What it costs that a state is not the aim."""
     dx = states[i, 0] - aim[0]
     dy = states[i, 1] - aim[1]
-    cost = 0.5 * _bend(goal[RADIUS]) * (dx * dx + dy * dy)
+    cost = 0.5 * bend_of_error(goal[RADIUS]) * (dx * dx + dy * dy)
     if goal[HEADING_TOLERANCE] < math.inf:
         off = wrapped(states[i, 2] - aim[2])
-        cost += 0.5 * _bend(goal[HEADING_TOLERANCE]) * off * off
+        cost += 0.5 * bend_of_error(goal[HEADING_TOLERANCE]) * off * off
     for k in range((goal.shape[0] - HITCHES) // 2):
         off = states[i, 5 + k] - aim[5 + k]
-        cost += 0.5 * _bend(goal[HITCHES + 2 * k + 1]) * off * off
+        cost += 0.5 * bend_of_error(goal[HITCHES + 2 * k + 1]) * off * off
     return float(cost)
 
 
@@ -67,12 +83,12 @@ def pull_to_aim(model: Model, steps: int, goal: Floats) -> None:
     gradient, curvature = model.gradient[steps], model.curvature[steps]
     last, aim = model.states[steps], model.vectors[5]
     for c in range(2):
-        gradient[c] += _bend(goal[RADIUS]) * (last[c] - aim[c])
-        curvature[c, c] += _bend(goal[RADIUS])
+        gradient[c] += bend_of_error(goal[RADIUS]) * (last[c] - aim[c])
+        curvature[c, c] += bend_of_error(goal[RADIUS])
     if goal[HEADING_TOLERANCE] < math.inf:
-        gradient[2] += _bend(goal[HEADING_TOLERANCE]) * wrapped(last[2] - aim[2])
-        curvature[2, 2] += _bend(goal[HEADING_TOLERANCE])
+        gradient[2] += bend_of_error(goal[HEADING_TOLERANCE]) * wrapped(last[2] - aim[2])
+        curvature[2, 2] += bend_of_error(goal[HEADING_TOLERANCE])
     for k in range((goal.shape[0] - HITCHES) // 2):
-        bend = _bend(goal[HITCHES + 2 * k + 1])
+        bend = bend_of_error(goal[HITCHES + 2 * k + 1])
         gradient[5 + k] += bend * (last[5 + k] - aim[5 + k])
         curvature[5 + k, 5 + k] += bend

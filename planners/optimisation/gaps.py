@@ -22,14 +22,15 @@ class Barrier(NamedTuple):
 
     A gap below the range costs ``strength (gap / range - 1 - log(gap / range))``.
 
-    Where it is smaller than ``strength`` metres the parabola that fits there goes on, so that a blocked
-    state has a cost, too.
+    Where it is smaller than ``contact`` the parabola that fits there goes on, so that a blocked state has a
+    cost, too.
     """
 
     strength: float  # metres of driving
     range_m: float
     margin_m: float  # taken off every gap
     widest_hitch: float  # radians
+    contact: float  # metres
 
 
 @inlined
@@ -161,11 +162,13 @@ def widest_gap(box: Box, first: int, last: int, edges: Floats, enough: float) ->
 
 
 @inlined
-def nearness(gap: float, strength: float, range_m: float) -> tuple[float, float, float]:
+def nearness(gap: float, barrier: Barrier) -> tuple[float, float, float]:
     """What a gap (metres, or radians) costs, with its first and second derivative; see ``Barrier``."""
+    strength = barrier.strength
+    range_m = barrier.range_m
     if gap >= range_m:
         return 0.0, 0.0, 0.0
-    at = max(gap, strength)
+    at = max(gap, barrier.contact)
     value = strength * (at / range_m - 1.0 - math.log(at / range_m))
     slope = strength * (1.0 / range_m - 1.0 / at)
     curvature = strength / (at * at)

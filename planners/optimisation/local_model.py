@@ -15,8 +15,7 @@ from planners.world.vehicles.dynamics import load, step, swept_bodies
 from planners.world.vehicles.vehicle import Vehicle
 
 NUDGE: Final = 1e-6  # of a state or control, for derivatives by differences
-HITCH_STRENGTH: Final = 0.01
-HITCH_RANGE: Final = 0.2  # radians
+HITCH: Final = Barrier(0.01, 0.2, 0.0, 0.0, 0.01)  # radians instead of metres
 
 
 class Model(NamedTuple):
@@ -109,16 +108,16 @@ def nearness_cost(
         if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
             for k in range(4):
                 gap = gap_along(wall(k, bounds), box) - barrier.margin_m
-                cost += nearness(gap, barrier.strength, barrier.range_m)[0]
+                cost += nearness(gap, barrier)[0]
         for p in range(circles.shape[0]):
             dx = x - circles[p, 0]
             dy = y - circles[p, 1]
             near = reach + circles[p, 2]
             if dx * dx + dy * dy < near * near:
                 gap, _ = widest_gap(box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far)
-                cost += nearness(gap - barrier.margin_m, barrier.strength, barrier.range_m)[0]
+                cost += nearness(gap - barrier.margin_m, barrier)[0]
     for h in range(5, states.shape[1]):
-        cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH_STRENGTH, HITCH_RANGE)[0]
+        cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH)[0]
     return cost
 
 
@@ -156,7 +155,7 @@ def differentiate_nearness(
                 _add_gap(model, i, body, axis, gap, vehicle, barrier)
     for h in range(5, size):
         hitch = states[i, h]
-        _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH_STRENGTH, HITCH_RANGE)
+        _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
         gradient[h] += -slope if hitch > 0.0 else slope
         curvature[h, h] += bend
 
@@ -166,7 +165,7 @@ def _add_gap(
     model: Model, i: int, body: int, axis: Axis, gap: float, vehicle: Vehicle, barrier: Barrier
 ) -> None:
     """Add what the gap (metres) of a body along an axis contributes."""
-    _, slope, bend = nearness(gap - barrier.margin_m, barrier.strength, barrier.range_m)
+    _, slope, bend = nearness(gap - barrier.margin_m, barrier)
     if bend == 0.0:
         return
     size = model.states.shape[1]

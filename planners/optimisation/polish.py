@@ -12,6 +12,8 @@ from typing import Final, NamedTuple
 from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
+from planners.optimisation.interior.buffers import allocate_interior
+from planners.optimisation.interior.quickest import quickest
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
@@ -19,7 +21,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import Car, Vehicle, state_size, trailers_of
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
@@ -67,12 +69,34 @@ def polish(
         The quickest free plan that was found and arrives as asked, never a longer one than was given.
     """
     iterations = most_iterations(problem) if iterations is None else iterations
-    model, goal = _ready(problem, len(plan.controls) + ROOM, vehicle, workspace)
+    until = perf_counter() + seconds
     steps = len(plan.controls)
-    model.controls[:steps] = plan.controls
-    model.states[: steps + 1] = simulate(start_state(problem, vehicle), plan.controls, vehicle)
+    model, goal = _ready(problem, steps + ROOM, vehicle, workspace)
+    states = simulate(start_state(problem, vehicle), plan.controls, vehicle)
+    arrived = int(steps_to_goal(states, steps, goal, vehicle))
+    if arrived == 0:
+        return Polished(plan, 0)
+    steps = arrived if arrived > 0 else steps
+    states = states[: steps + 1]
+    best = steps if arrived > 0 and count_free_prefix(states, vehicle, scene) == steps + 1 else NEVER
+    barrier = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle), 0.0)
     arriving = problem.arrival not in (None, Arrival())
-    return _polished(plan, model, steps, goal, arriving, vehicle, scene, iterations, margin_m, seconds)
+    used = 0
+    if arriving and isinstance(vehicle, Car) and not vehicle.first_order:
+        interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
+        found, used = quickest(states, model, interior, goal, vehicle, scene, barrier, iterations, until)
+        if found is not None and len(found.controls) < best:
+            return Polished(found, used)
+        if found is not None:
+            return Polished(plan, used)
+    model.states[: steps + 1] = model.best_states[: steps + 1] = states
+    model.controls[:steps] = model.best_controls[:steps] = plan.controls[:steps]
+    descended = _shortened if arriving else _descended
+    best, more = descended(model, steps, best, goal, barrier, vehicle, scene, iterations - used, until)
+    if best == NEVER:
+        return Polished(None, used + more)
+    found = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
+    return Polished(found, used + more)
 
 
 def driven_near(
@@ -100,7 +124,7 @@ def driven_near(
     for share in MORE_TIME:
         more = math.ceil(share * steps)
         for way in WAYS:
-            barrier = Barrier(way.strength, RANGE_M, 0.0, widest)
+            barrier = Barrier(way.strength, RANGE_M, 0.0, widest, way.strength)
             tries, done = shorten(
                 *(model, steps, -more, way, MOST_TRIES, goal, barrier, vehicle, scene, circles)
             )
@@ -129,39 +153,6 @@ def _widest_hitch(vehicle: Vehicle) -> float:
     return min((trailer.max_hitch for trailer in trailers_of(vehicle)), default=math.inf)
 
 
-def _polished(
-    given: Plan | None,
-    model: Model,
-    steps: int,
-    goal: Floats,
-    arriving: bool,
-    vehicle: Vehicle,
-    scene: Scene,
-    iterations: int,
-    margin_m: float,
-    seconds: float,
-) -> Polished:
-    """Descend from the drive in ``model``; ``arriving`` says that more than a place is asked at its end."""
-    until = perf_counter() + seconds
-    arrived = int(steps_to_goal(model.states, steps, goal, vehicle))
-    if arrived == 0:
-        return Polished(given, 0)
-    best = NEVER
-    if arrived > 0:
-        steps = arrived
-        if count_free_prefix(model.states[: steps + 1], vehicle, scene) == steps + 1:
-            best = steps
-            model.best_states[: steps + 1] = model.states[: steps + 1]
-            model.best_controls[:steps] = model.controls[:steps]
-    nowhere = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle))
-    descended = _shortened if arriving else _descended
-    best, used = descended(model, steps, best, goal, nowhere, vehicle, scene, iterations, until)
-    if best == NEVER:
-        return Polished(None, used)
-    plan = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
-    return Polished(plan, used)
-
-
 def _descended(
     model: Model,
     steps: int,
@@ -177,7 +168,7 @@ def _descended(
     circles = circles_around(scene)
     used = 0
     for strength, range_m, least_gain in STAGES:
-        stage = Stage(barrier._replace(strength=strength, range_m=range_m), least_gain)
+        stage = Stage(barrier._replace(strength=strength, range_m=range_m, contact=strength), least_gain)
         ended = False
         while not ended and used < iterations and perf_counter() < until:
             most = min(SLICE, iterations - used)
@@ -201,17 +192,12 @@ def _shortened(
 ) -> tuple[int, int]:
     """Press the drive in all ways until none helps; as ``_descended``."""
     circles = circles_around(scene)
-    if best == NEVER:
-        model.best_states[: steps + 1] = model.states[: steps + 1]
-        model.best_controls[:steps] = model.controls[:steps]
-    else:
-        steps = best
     leaps = LEAPS if best < NEVER else (0,)
     fewer, growing = leaps[0], True
     used = in_vain = number = 0
     while used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and perf_counter() < until:
         way = WAYS[number]
-        pushed = barrier._replace(strength=way.strength, range_m=RANGE_M)
+        pushed = barrier._replace(strength=way.strength, range_m=RANGE_M, contact=way.strength)
         most = min(MOST_TRIES, iterations - used)
         more, done = shorten(model, steps, fewer, way, most, goal, pushed, vehicle, scene, circles)
         used += more

@@ -1,0 +1,196 @@
+"""Makes a drive that must arrive as asked as quick as it can be, by moving all states and controls at once.
+
+First the length of a step is free, and time counts. Then the drive is divided into whole steps of the vehicle
+again, and only its gaps are closed. What its controls lead to is the answer if it is free and arrives.
+"""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+from typing import Final, NamedTuple
+
+from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.gaps import Barrier, circles_around
+from planners.optimisation.guesses import resampled
+from planners.optimisation.interior.buffers import (
+    Interior,
+    accept_change,
+    begin_inside,
+)
+from planners.optimisation.interior.costs import try_change
+from planners.optimisation.interior.newton import direction
+from planners.optimisation.interior.retiming import retimed
+from planners.optimisation.local_model import Model
+from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.goal import LEAST_SPEED, MOST_SPEED
+from planners.world.problem import Plan
+from planners.world.vehicles.dynamics import control_limits, simulate
+from planners.world.vehicles.vehicle import Vehicle
+
+FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
+WEAKER: Final = 0.1  # ... times this when little is left to gain ...
+LAST_STRENGTH: Final = 1e-4  # ... down to this
+LAST_STEPS_STRENGTH: Final = 1e-3  # while only gaps are closed
+STRENGTH, RANGE_M, CONTACT_M = 0.01, 0.3, 0.003  # of obstacles, as of ``Barrier``
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-6, 1e3  # metres
+TRIES: Final = 8  # shares of a change that are tried
+IN_VAIN: Final = 5  # changes one after another after which there is no hope
+LITTLE_S: Final = 0.05  # seconds to gain, with which a stage ends
+SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radians and more
+NO_GAPS: Final = 1e-6  # and when the last one does
+MOST_FIRST: Final = 60  # iterations while time counts
+MOST_LAST: Final = 15  # and of each attempt to close gaps
+MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
+LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
+
+
+class _Drive(NamedTuple):
+    """What stays the same while a drive is optimised."""
+
+    model: Model
+    interior: Interior
+    goal: Floats
+    scene: Scene
+    circles: Floats
+    barrier: Barrier
+    until: float  # of the clock
+
+
+def quickest(
+    way: Floats,
+    model: Model,
+    interior: Interior,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+    barrier: Barrier,
+    iterations: int,
+    until: float,
+) -> tuple[Plan | None, int]:
+    """Find the quickest drive near the way of another one.
+
+    Args:
+        way: the states ``[T, S]`` of a drive, which may be blocked.
+        model: buffers with room for as many steps and some more.
+        interior: buffers of the same size.
+        goal: that of ``goal_of``.
+        vehicle: what is driven.
+        scene: what must not be met.
+        barrier: its margin and hitch count.
+        iterations: at most.
+        until: when to end, by ``perf_counter``.
+
+    Returns:
+        A free drive that arrives as asked, if one was found, and the iterations used.
+    """
+    pushing = barrier._replace(strength=STRENGTH, range_m=RANGE_M, contact=CONTACT_M)
+    drive = _Drive(model, interior, goal, scene, circles_around(scene), pushing, until)
+    start = way[0]
+    states, controls = retimed(way, vehicle)
+    steps = len(controls)
+    if steps == 0 or steps + MORE_STEPS[-1] > len(model.controls):
+        return None, 0
+    _fill(drive, states, controls, start)
+    dt, used, _ = _descend(drive, steps, vehicle, True, min(MOST_FIRST, iterations))
+    guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
+    least = max(math.ceil(guess.duration_s / vehicle.dt - LITTLE_LONGER), 1)
+    for more in MORE_STEPS:
+        if least + more > len(model.controls) or used >= iterations or perf_counter() > until:
+            break
+        again = resampled(guess, least + more)
+        _fill(drive, again.states, again.controls, start)
+        most = min(MOST_LAST, iterations - used)
+        _, spent, found = _descend(drive, least + more, vehicle, False, most)
+        used += spent
+        if found is not None:
+            return found, used
+    return None, used
+
+
+def _fill(drive: _Drive, states: Floats, controls: Floats, start: Floats) -> None:
+    drive.model.states[: len(states)] = states
+    drive.model.states[0] = start
+    drive.model.controls[: len(controls)] = controls
+
+
+def _descend(
+    drive: _Drive, steps: int, vehicle: Vehicle, time_counts: bool, iterations: int
+) -> tuple[float, int, Plan | None]:
+    """Change the drive in ``drive.model`` until little is left to gain, or it can be driven.
+
+    Returns the length of a step, the iterations used, and a drive where time does not count and one is found.
+    """
+    model, interior = drive.model, drive.interior
+    around = drive.scene, drive.circles, drive.barrier
+    counts = 1.0 if time_counts else 0.0
+    strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
+    damping, price, in_vain = FIRST_DAMPING, 1.0, 0
+    tried, cost_tried, gaps_tried = vehicle, math.inf, math.inf
+    begin_inside(model, interior, steps, strength, vehicle)
+    for iteration in range(iterations):
+        if perf_counter() > drive.until:
+            return vehicle.dt, iteration, None
+        longer = vehicle._replace(dt=vehicle.dt * (1.0 + LITTLE_LONGER))
+        damping, longer_s, share, cost, slope, gaps, dearest = direction(
+            *(model, interior, steps, drive.goal, strength, counts, damping, vehicle, longer, *around)
+        )
+        price = max(min(price, 10.0 * dearest), dearest)
+        gained = False
+        for _ in range(TRIES):
+            if share == 0.0:
+                break
+            tried = vehicle._replace(dt=vehicle.dt + share * longer_s)
+            cost_tried, gaps_tried = try_change(
+                *(model, interior, steps, share, drive.goal, strength, counts, tried, *around)
+            )
+            expected = 1e-4 * share * min(slope - price * gaps, 0.0)
+            if cost_tried + price * gaps_tried <= cost + price * gaps + expected + 1e-9:
+                gained = True
+                break
+            share *= 0.5
+        if not gained:
+            in_vain += 1
+            damping = 10.0 * max(damping, LEAST_DAMPING)
+            if in_vain == IN_VAIN:
+                return vehicle.dt, iteration + 1, None
+            continue
+        in_vain = 0
+        vehicle = tried
+        accept_change(model, interior, steps, strength, vehicle)
+        if not time_counts and gaps_tried < NO_GAPS:
+            found = _driven(drive, steps, vehicle)
+            if found is not None:
+                return vehicle.dt, iteration + 1, found
+        if share > 0.5:
+            damping = max(0.25 * damping, LEAST_DAMPING)
+        elif share < 0.1:
+            damping = min(3.0 * damping, MOST_DAMPING)
+        little = LITTLE_S * vehicle.max_speed + 10.0 * strength
+        if share > 0.3 and abs(slope) < little and gaps_tried < 1e-3 * steps * vehicle.dt:
+            if time_counts and strength <= LAST_STRENGTH and gaps_tried < SMALL_GAPS:
+                return vehicle.dt, iteration + 1, None
+            strength = max(WEAKER * strength, LAST_STRENGTH)
+    return vehicle.dt, iterations, None
+
+
+def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
+    """The drive that the controls in ``drive.model`` lead to, if it is free and arrives as asked."""
+    start = drive.model.states[0].copy()
+    controls = drive.model.controls[:steps].copy()
+    states = simulate(start, controls, vehicle)
+    most = control_limits(vehicle)[0]
+    asked = min(max(states[-1, 3], drive.goal[LEAST_SPEED]), drive.goal[MOST_SPEED])
+    missing = (asked - states[-1, 3]) / vehicle.dt
+    for k in range(steps - 1, -1, -1):  # rounding leaves a little speed, which the last steps take away
+        before = controls[k, 0]
+        controls[k, 0] = min(max(before + missing, -most), most)
+        missing -= controls[k, 0] - before
+        if missing == 0.0:
+            break
+    states = simulate(start, controls, vehicle)
+    arrives = steps_to_goal(states[-1:], 0, drive.goal, vehicle) == 0
+    if not arrives or count_free_prefix(states, vehicle, drive.scene) <= steps:
+        return None
+    return Plan(states, controls, vehicle.dt)

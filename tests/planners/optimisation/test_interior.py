@@ -1,0 +1,185 @@
+"""Moving all states at once: the direction is Newton's, and drives become as quick as they can be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners.optimisation.gaps import Barrier, circles_around
+from planners.optimisation.interior.buffers import allocate_interior, begin_inside
+from planners.optimisation.interior.newton import direction
+from planners.optimisation.interior.retiming import retimed
+from planners.optimisation.local_model import allocate_model
+from planners.optimisation.polish import polish
+from planners.world.arrays import Floats
+from planners.world.authority.authority import faults
+from planners.world.geometry.collision import scene_of
+from planners.world.goal import goal_of
+from planners.world.problem import Arrival, Plan, Problem, start_state
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR
+from planners.world.workspace import Workspace
+from tests.worlds import box, problem_of
+
+WORKSPACE = Workspace()
+STRENGTH = 3e-3
+BARRIER = Barrier(0.01, 0.3, 0.0, math.inf, 0.003)
+
+
+def driven(controls: Floats, *obstacles: np.ndarray) -> tuple[Problem, Plan]:
+    """A drive from the middle of the map, and the problem to arrive where it ends, at rest."""
+    empty = replace(problem_of(list(obstacles)), start=(25.0, 25.0, 0.0))
+    states = simulate(start_state(empty), controls, CAR)
+    arrival = Arrival(float(states[-1, 2]), 0.05, 0.0, 0.0)
+    problem = replace(empty, goal=(states[-1, 0], states[-1, 1]), goal_radius=0.1, arrival=arrival)
+    return problem, Plan(states, controls)
+
+
+def manoeuvre(turns: int) -> Floats:
+    """Forwards, stop, wheels turned at rest, backwards, stop, and forwards again."""
+    steer = [(0.0, 1.4)] * turns
+    ahead, back = [(1.5, 0.0)] * 8 + [(-1.5, 0.0)] * 8, [(-1.0, 0.0)] * 6 + [(1.0, 0.0)] * 6
+    away = [(0.0, -1.4)] * (2 * turns)
+    return np.array([*steer, *ahead, *away, *back, *steer, *ahead])
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), time_counts=st.sampled_from([0.0, 1.0]))
+def test_the_direction_solves_newtons_equations(seed: int, time_counts: float) -> None:
+    rng = np.random.default_rng(seed)
+    steps, size = 6, 5
+    problem, plan = driven(rng.uniform(-1.0, 1.0, (steps, 2)), box(27.0, 26.2, 0.3, 0.5, 0.4))
+    goal, scene = goal_of(problem), scene_of(problem)
+    model, interior = allocate_model(steps, size), allocate_interior(steps, size)
+    model.states[:] = plan.states + rng.normal(0.0, 0.05, plan.states.shape)
+    model.controls[:] = plan.controls
+    begin_inside(model, interior, steps, STRENGTH, CAR)
+    longer = CAR._replace(dt=CAR.dt * (1.0 + 1e-6))
+    damping, longer_s, _, _, slope, gaps, _ = direction(
+        *(model, interior, steps, goal, STRENGTH, time_counts, 0.1, CAR, longer, scene),
+        *(circles_around(scene), BARRIER),
+    )
+    change = np.concatenate(
+        [interior.change[1:].ravel(), interior.change_controls.ravel(), np.array([longer_s])]
+    )
+    # the gaps are closed to first order, whatever the cost
+    for k in range(steps):
+        led_to = model.by_state[k] @ interior.change[k] + model.by_control[k] @ interior.change_controls[k]
+        led_to += interior.by_time[k] * longer_s + model.gaps[k]
+        np.testing.assert_allclose(interior.change[k + 1], led_to, atol=1e-9)
+    assert gaps == pytest.approx(np.abs(model.gaps).sum())
+    if time_counts == 0.0:
+        assert longer_s == 0.0
+    # and no other change that closes them has a smaller cost: the cost's slope vanishes along all of them
+    hessian, gradient = cost_model(model, interior, goal, damping, time_counts)
+    keeps = closing(model, interior, time_counts)
+    at_least = keeps.T @ (gradient + hessian @ change)
+    np.testing.assert_allclose(at_least, 0.0, atol=1e-6 * max(1.0, np.abs(gradient).max()))
+    assert slope == pytest.approx(gradient @ change, rel=1e-6, abs=1e-9)
+
+
+def cost_model(model, interior, goal, damping, time_counts) -> tuple[Floats, Floats]:
+    """Hessian and gradient of the cost by all states after the first, all controls, and a step's length."""
+    steps, size = len(model.controls), model.states.shape[1]
+    number = steps * (size + 2) + 1
+    hessian, gradient = np.zeros((number, number)), np.zeros(number)
+    limits = np.array([CAR.max_acceleration, CAR.max_steering_rate])
+    bends = np.array([100.0, 100.0, 400.0, 1000.0 / CAR.max_speed**2, 0.0])
+    for k in range(steps):
+        at = slice(k * size, (k + 1) * size)
+        gradient[at] += model.gradient[k + 1]
+        hessian[at, at] += model.curvature[k + 1] + damping * np.eye(size)
+        for c, (low, high) in (
+            (3, (CAR.min_speed, CAR.max_speed)),
+            (4, (-CAR.max_steering, CAR.max_steering)),
+        ):
+            value = model.states[k + 1, c]
+            gradient[k * size + c] += STRENGTH * (1.0 / (high - value) - 1.0 / (value - low))
+            pushes = interior.multipliers[k, 2 * (c - 1) : 2 * c]
+            hessian[k * size + c, k * size + c] += pushes[0] / (value - low) + pushes[1] / (high - value)
+        for c in range(2):
+            i = steps * size + 2 * k + c
+            value, limit = model.controls[k, c], limits[c]
+            effort = 0.01 * (0.1 if c == 0 else 1.0) / limit**2
+            gradient[i] = effort * value + STRENGTH * (1.0 / (limit - value) - 1.0 / (limit + value))
+            pushes = interior.multipliers[k, 2 * c : 2 * c + 2]
+            hessian[i, i] = effort + pushes[0] / (limit + value) + pushes[1] / (limit - value)
+            hessian[i, i] += damping / limit**2
+    last = slice((steps - 1) * size, steps * size)
+    gradient[last] += bends * (model.states[-1] - interior.aim)
+    hessian[last, last] += np.diag(bends)
+    gradient[-1] = time_counts * steps * CAR.max_speed
+    return hessian, gradient
+
+
+def closing(model, interior, time_counts) -> Floats:
+    """A basis of the changes that keep all gaps as they are to first order."""
+    steps, size = len(model.controls), model.states.shape[1]
+    free = 2 * steps + (1 if time_counts else 0)
+    basis = np.zeros((steps * (size + 2) + 1, free))
+    for column in range(free):
+        controls = np.zeros(2 * steps)
+        longer_s = 1.0 if column == 2 * steps else 0.0
+        if column < 2 * steps:
+            controls[column] = 1.0
+        state = np.zeros(size)
+        for k in range(steps):
+            state = model.by_state[k] @ state + model.by_control[k] @ controls[2 * k : 2 * k + 2]
+            state = state + interior.by_time[k] * longer_s
+            basis[k * size : (k + 1) * size, column] = state
+        basis[steps * size : -1, column] = controls
+        basis[-1, column] = longer_s
+    return basis
+
+
+@settings(max_examples=8, deadline=None)
+@given(metres=st.floats(1.0, 12.0), waits=st.integers(0, 30), slowly=st.floats(0.3, 1.0))
+def test_straight_ahead_it_takes_the_least_time_that_there_is(
+    metres: float, waits: int, slowly: float
+) -> None:
+    count = max(math.ceil(math.sqrt(metres / slowly) / CAR.dt), 2)
+    first = metres / (count * CAR.dt) ** 2
+    controls = np.array([*[(first, 0.0)] * count, *[(0.0, 0.0)] * waits, *[(-first, 0.0)] * count])
+    controls = np.concatenate([controls[:count], controls[count + waits :], np.zeros((waits, 2))])
+    problem, plan = driven(controls)
+    top, most = CAR.max_speed, CAR.max_acceleration
+    way = math.dist(problem.start[:2], problem.goal) - problem.goal_radius
+    least = 2.0 * math.sqrt(way / most) if way * most < top**2 else way / top + top / most
+    better = polish(problem, plan, CAR, scene_of(problem), WORKSPACE).plan
+    assert better is not None
+    assert faults(problem, better) == []
+    assert better.duration_s <= least + 2.5 * CAR.dt
+
+
+@pytest.mark.parametrize("turns", [2, 4, 5])
+def test_a_mirrored_drive_becomes_as_quick(turns: int) -> None:
+    found = []
+    for side in (1.0, -1.0):
+        problem, plan = driven(manoeuvre(turns) * np.array([1.0, side]))
+        better = polish(problem, plan, CAR, scene_of(problem), WORKSPACE).plan
+        assert better is not None
+        assert faults(problem, better) == []
+        assert better.duration_s < 0.8 * plan.duration_s
+        found.append(better.duration_s)
+    assert found[0] == pytest.approx(found[1], abs=1.1 * CAR.dt)
+
+
+@settings(max_examples=20, deadline=None)
+@given(turns=st.integers(1, 5), waits=st.integers(0, 20), backwards=st.booleans())
+def test_a_retimed_drive_goes_the_same_way_within_all_limits(turns: int, waits: int, backwards: bool) -> None:
+    controls = np.concatenate([manoeuvre(turns), np.zeros((waits, 2)), manoeuvre(turns)])
+    _, plan = driven(controls * np.array([0.5 if backwards else 1.0, 1.0]))
+    states, guess = retimed(plan.states, CAR)
+    assert len(guess) <= len(plan.controls)
+    np.testing.assert_array_equal(states[0], plan.states[0])
+    np.testing.assert_allclose(states[-1, :3], plan.states[-1, :3], atol=1e-5)
+    assert (np.abs(guess) <= (CAR.max_acceleration, CAR.max_steering_rate)).all()
+    assert (states[:, 3] <= CAR.max_speed).all()
+    assert (states[:, 3] >= CAR.min_speed).all()
+    apart = np.hypot(*(states[:, None, :2] - plan.states[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
+    assert apart.max() <= CAR.dt * CAR.max_speed
