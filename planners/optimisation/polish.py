@@ -87,8 +87,6 @@ def polish(
         found, used = quickest(states, model, interior, goal, vehicle, scene, barrier, iterations, until)
         if found is not None and len(found.controls) < best:
             return Polished(found, used)
-        if found is not None:
-            return Polished(plan, used)
     model.states[: steps + 1] = model.best_states[: steps + 1] = states
     model.controls[:steps] = model.best_controls[:steps] = plan.controls[:steps]
     descended = _shortened if arriving else _descended

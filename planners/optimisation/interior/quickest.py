@@ -31,7 +31,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
 WEAKER: Final = 0.1  # ... times this when little is left to gain ...
-LAST_STRENGTH: Final = 1e-4  # ... down to this
+LAST_STRENGTH: Final = 3e-4  # ... down to this
 LAST_STEPS_STRENGTH: Final = 1e-3  # while only gaps are closed
 STRENGTH, RANGE_M, CONTACT_M = 0.01, 0.3, 0.003  # of obstacles, as of ``Barrier``
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-6, 1e3  # metres
@@ -172,7 +172,7 @@ def _descend(
             if time_counts and strength <= LAST_STRENGTH and gaps_tried < SMALL_GAPS:
                 return vehicle.dt, iteration + 1, None
             strength = max(WEAKER * strength, LAST_STRENGTH)
-    return vehicle.dt, iterations, None
+    return vehicle.dt, iterations, None if time_counts else _driven(drive, steps, vehicle)
 
 
 def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
