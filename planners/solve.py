@@ -267,7 +267,7 @@ def improved(
         attempt,
         status=str(Status.SOLVED),
         solved=True,
-        source="searched",
+        source=attempt.source if more.is_given else "searched",
         length_m=more.plan.length_m,
         duration_s=more.plan.duration_s,
         plan=more.plan,

@@ -54,6 +54,7 @@ class Improved:
     collision_checks: int
     expansions: int
     nodes: int
+    is_given: bool  # the plan is the given one, polished or not
 
 
 def improve(
@@ -98,6 +99,7 @@ def improve(
     history = [] if given is None else [Improvement(0.0, 0, given.duration_s)]
     spent = searches = checks = nodes = 0
     budget, slack = float(FIRST_EXPANSIONS), FIRST_SLACK
+    is_given = given is not None
 
     def keep(plan: Plan) -> bool:
         """Keep a plan if it is the best; say whether it is."""
@@ -133,10 +135,12 @@ def improve(
         checks += outcome.collision_checks
         nodes += outcome.nodes
         spent += max(outcome.expansions, 1)  # a search from a blocked start costs none, and must end as well
-        if outcome.plan is None or not consider(outcome.plan):
+        if outcome.plan is not None and consider(outcome.plan):
+            is_given = False
+        else:
             budget *= GROWTH
             slack *= SLACK_KEPT
-    return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes)
+    return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes, is_given)
 
 
 def search_and_polish(

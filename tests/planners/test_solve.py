@@ -248,6 +248,7 @@ def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory, 
     assert better.duration_s < first.duration_s
     assert better.planning_seconds >= first.planning_seconds + 0.1
     assert better.expansions > first.expansions
+    assert better.source in (first.source, "searched")
     assert faults(problem, better.plan) == []
 
 

@@ -36,6 +36,16 @@ def test_every_plan_of_the_history_is_better_and_the_last_passes_the_authority(n
     assert result.expansions <= 2_000
 
 
+def test_a_plan_that_is_polished_and_nothing_more_is_still_the_given_one():
+    problem = strewn(4, 20)
+    known = plan("follow", problem, generator(4)).plan
+    polished = improve("gust", problem, known, expansions=anytime.EXPANSIONS_AN_ITERATION * 40)
+    assert polished.plan.duration_s < known.duration_s
+    assert polished.is_given
+    assert not improve("lattice", problem, known, expansions=20_000).is_given
+    assert not improve("gust", problem, expansions=5_000).is_given
+
+
 @EVERY
 def test_the_same_seed_improves_alike(name):
     first, again = (improve(name, strewn(3, 30), expansions=3_000, seed=4) for _ in range(2))
