@@ -1,7 +1,7 @@
 """How fast the planners answer general questions, from scratch or with a library of plans, cold, on one core.
 
 ``python -m tests.speed.general_questions [--questions 200] [--poses] [--vehicle car] [--planners lattice …]
-[--memory LIBRARY] [--keep FILE]``
+[--memory LIBRARY] [--keep FILE] [--unpolished]``
 draws questions in the classes and, where they lie beside the repository, in windows of four city maps: start
 and goal over the free space, speeds from 0 to the largest, 2 to 70 m apart. It prints for each world and
 planner the solved share, of all and of what any planner solves, planning times and driving times. With a
@@ -97,12 +97,15 @@ def measured(
     library: PlanLibrary | None,
     done: Rows,
     kept: Path | None,
+    polished: bool = True,
 ) -> list[list[Answer]]:
     """Answers by question, then planner and assist, cold: other data fill the caches before each attempt."""
     workspace, other_work = Workspace(), OtherWork()
 
     def attempt(way: tuple[str, str], question: Problem, seed: int) -> Attempt:
-        return solve(question, *way, 1, library, seed, vehicle=vehicle, workspace=workspace)
+        return solve(
+            *(question, *way, 1, library, seed), vehicle=vehicle, workspace=workspace, polished=polished
+        )
 
     for way in ways:
         for question in questions[:5]:
@@ -141,11 +144,11 @@ def report(console: Console, asked: argparse.Namespace) -> None:
         table.add_column(column)
     for column in ("solved", "of any", "recalled", "median ms", "mean", "99 %", "driving s", "faulty"):
         table.add_column(column, justify="right")
-    settings = json.dumps([asked.vehicle, kind, ways, str(asked.memory), SEED])
+    settings = json.dumps([asked.vehicle, kind, ways, str(asked.memory), SEED, asked.unpolished])
     done = read_kept(asked.keep, settings)
     for name in asked.worlds:
         questions = list(questions_of(name, asked.questions, vehicle, asked.poses))
-        rows = measured(questions, ways, vehicle, library, done, asked.keep)
+        rows = measured(questions, ways, vehicle, library, done, asked.keep, not asked.unpolished)
         solved = np.array([[answer.solved for answer in row] for row in rows])
         anyone, everyone = solved.any(axis=1), solved.all(axis=1)
         for k, way in enumerate(ways):
@@ -177,6 +180,7 @@ def main() -> None:
     parser.add_argument("--vehicle", choices=VEHICLES, default="car")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=list(PLANNERS))
     parser.add_argument("--memory", type=Path, help="a library")
+    parser.add_argument("--unpolished", action="store_true", help="plans to poses as they were found first")
     parser.add_argument("--keep", type=Path, help="a file of the answers so far, from which to go on")
     parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS))
     parser.add_argument("--failures", action="store_true", help="name questions that only others solve")
