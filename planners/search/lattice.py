@@ -108,13 +108,26 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             before = int(counts[trees.EXPANSIONS])
             grow_lattice(tree, goal, min(before + now, until), frontier, ahead, level, vehicle, scene)
             if counts[trees.GOAL_VERTEX] < 0:
-                expansions, checks = manoeuvring.expansions, manoeuvring.checks
-                manoeuvring.advance(tree, min(there, until - int(counts[trees.EXPANSIONS])))
-                counts[trees.EXPANSIONS] += manoeuvring.expansions - expansions
-                counts[trees.CHECKS] += manoeuvring.checks - checks
+                manoeuvre(tree, manoeuvring, min(there, until - int(counts[trees.EXPANSIONS])))
             if counts[trees.EXPANSIONS] == before:
                 return
             now = here
+
+    def manoeuvre(tree: trees.Tree, search: Manoeuvring, most: int) -> None:
+        expansions, checks = search.expansions, search.checks
+        search.advance(tree, most)
+        tree.counts[trees.EXPANSIONS] += search.expansions - expansions
+        tree.counts[trees.CHECKS] += search.checks - checks
+
+    def explore(tree: trees.Tree, goal: Floats, until: int) -> None:
+        """RRT, or where it has small hopes the search for manoeuvres."""
+        counts = tree.counts
+        if manoeuvring is None or not (manoeuvring.is_tight or manoeuvring.meets):
+            at_random(tree, goal, until)
+        elif not join(tree, manoeuvring.is_tight):
+            manoeuvre(tree, manoeuvring, until - int(counts[trees.EXPANSIONS]))
+            if manoeuvring.is_over:
+                at_random(tree, goal, until)
 
     def join(tree: trees.Tree, is_tight: bool) -> bool:
         """Aim at known endings with as much work as all else has had: what is found alone is found still."""
@@ -126,8 +139,9 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         joined = found and joining.joined
         return found
 
+    at_random = growing(query)
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    outcome = attempt(query, settings.restart_after, prepare, grow, growing(query), explore_from=explore_from)
+    outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
     if joining is None:
         return outcome
     return replace(

@@ -25,13 +25,15 @@ from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED
 from planners.world.problem import start_state
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
 
-LEVELS: Final = (  # and for how many expansions, unless nothing is left before
-    (2000, Outward(cell=0.2, headings=48)),
-    (3000, Outward(cell=0.1, headings=64)),
-    (5000, Outward(cell=0.05, headings=96)),
-    (1 << 30, Outward(cell=0.02, headings=128)),
+LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless nothing is left before
+    (500, Outward(cell=0.2, headings=48)),
+    (2000, Outward(cell=0.2, headings=64, greed=3.0)),
+    (2000, Outward(cell=0.2, headings=64, greed=6.0)),
+    (5000, Outward(cell=0.1, headings=64, greed=6.0)),
+    (10000, Outward(cell=0.05, headings=96, greed=6.0)),
+    (1 << 30, Outward(cell=0.02, headings=128, greed=6.0)),
 )
-MEETING: Final = 3  # times as many, where two trees are to meet
+MEETING: Final = 3  # times as many for each trailer: trees meet where they are wide
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -107,6 +109,7 @@ class Manoeuvring:
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
         # with trailers a tree grows out of the start too: what is hard from one end is easy from the other
         self.meets = bool(trailers_of(vehicle)) and bool(start[0, 3] == 0.0)
+        self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
         self._level = self._spent = self.expansions = 0
         self._begin_at_coarsest()
         # whether there is so little room around the goal that other searches have small hopes
@@ -134,7 +137,7 @@ class Manoeuvring:
         """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
-            level_ends = LEVELS[self._level][0] * (MEETING if self.meets else 1) - self._spent
+            level_ends = LEVELS[self._level][0] * self._longer - self._spent
             more = min(until - self.expansions, level_ends)
             found, used = self._grow(more)
             self.expansions += used

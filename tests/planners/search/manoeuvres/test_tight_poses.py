@@ -17,7 +17,7 @@ from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 
-LIMITS = Limits(expansions=4000)
+LIMITS = Limits(expansions=5000)
 
 
 def slot(source: Family, number: int) -> Problem:
@@ -35,6 +35,15 @@ def test_slots_are_reached_exactly(name: str) -> None:
     for number in range(12):
         problem = slot(family(name, "standard"), number)
         assert faults(problem, solved(problem)) == []
+
+
+HARD = [("angled", 53), ("angled", 71), ("angled", 97), ("perpendicular", 26), ("lot", 2), ("lot", 43)]
+
+
+@pytest.mark.parametrize(("name", "number"), HARD)
+def test_the_narrowest_slots_are_reached_too(name: str, number: int) -> None:
+    problem = to_canonical(family(name, "hard").draw(900, number))[0]
+    assert faults(problem, solved(problem)) == []
 
 
 def test_the_same_question_has_the_same_answer() -> None:
