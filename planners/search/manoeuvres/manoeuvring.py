@@ -34,6 +34,7 @@ LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless n
     (1 << 30, Outward(cell=0.02, headings=128, greed=6.0)),
 )
 MEETING: Final = 3  # times as many for each trailer: trees meet where they are wide
+FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -133,11 +134,18 @@ class Manoeuvring:
         """Whether nothing is left to try."""
         return self._level == len(LEVELS)
 
+    @property
+    def _expansions(self) -> int:
+        """How many the present level has."""
+        if self.meets and self._level == 0:
+            return FIRST_MEETING
+        return LEVELS[self._level][0] * self._longer
+
     def advance(self, tree: Tree, most: int) -> bool:
         """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
-            level_ends = LEVELS[self._level][0] * self._longer - self._spent
+            level_ends = self._expansions - self._spent
             more = min(until - self.expansions, level_ends)
             found, used = self._grow(more)
             self.expansions += used
