@@ -28,9 +28,9 @@ def question_in(
 ) -> Problem | None:
     """Draw a question, always the same one for a world, number and seed.
 
-    The start is uniform over the free poses of the world, at a speed from 0 to the largest; the vehicle can
-    still brake there. The goal is in any direction, at any of ``DISTANCES_M``; a pose has any heading, has
-    room for the vehicle at rest, all straight, and is to be arrived at at rest.
+    The start is uniform over the free poses of the world, at a speed from 0, or the vehicle's least, to the
+    largest; the vehicle can still brake there. The goal is in any direction, at any of ``DISTANCES_M``; a pose
+    has any heading, has room for the vehicle at rest, all straight, and is to be arrived at at rest.
 
     Args:
         world: of which obstacles and bounds are taken.
@@ -70,9 +70,8 @@ def _started(world: Problem, rng: np.random.Generator, vehicle: Vehicle) -> Prob
     (x, y), heading = rng.uniform(low, high).tolist(), rng.uniform(-math.pi, math.pi)
     turn = STEERED * turn_limit(vehicle) * rng.uniform(-1.0, 1.0)
     bent = [BENT * rng.uniform(-1.0, 1.0) for _ in range(state_size(vehicle) - 5)]
-    return replace(
-        world, start=(x, y, heading), start_motion=(rng.uniform(0.0, vehicle.max_speed), turn, *bent)
-    )
+    speed = rng.uniform(max(vehicle.min_speed, 0.0), vehicle.max_speed)
+    return replace(world, start=(x, y, heading), start_motion=(speed, turn, *bent))
 
 
 def _can_stop(state: Floats, vehicle: Vehicle, scene: Scene) -> bool:

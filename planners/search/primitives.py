@@ -194,6 +194,5 @@ def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
     """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
     bits = query.rng.bit_generator
-    return lattice._replace(
-        greed=greed, steps=lattice.steps + int(3.0 * uniform(bits)) - 1, turn=0.7 + 0.6 * uniform(bits)
-    )
+    steps = max(lattice.steps + int(3.0 * uniform(bits)) - 1, 1)
+    return lattice._replace(greed=greed, steps=steps, turn=0.7 + 0.6 * uniform(bits))

@@ -83,7 +83,7 @@ def _drive_known(drive: Drive, endings: Endings, part: int, vehicle: Vehicle, sc
     first = endings.starts[part]
     steps = endings.starts[part + 1] - 1 - first
     turning = turn_wheels(drive, endings.states[first, 4], vehicle)
-    if turning + steps > c.controls.shape[0]:
+    if turning < 0 or turning + steps > c.controls.shape[0]:
         return False
     state = load(c.states, turning, vehicle)
     for i in range(steps):

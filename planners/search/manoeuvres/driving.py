@@ -103,7 +103,10 @@ def connection_is_free(drive: Drive, steps: int, vehicle: Vehicle, scene: Scene)
 
 @lean
 def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
-    """Turn the wheels at rest, from the end of the drive. Returns the steps that lie in the connection."""
+    """Turn the wheels at rest, from the end of the drive.
+
+    Returns the steps that lie in the connection then, or -1 if it has no room for so many.
+    """
     c = drive.connection
     state = load(drive.states, drive.counts[0], vehicle)
     store(c.states, 0, state)
@@ -111,6 +114,8 @@ def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
         return 0  # who turns by driving
     limit = control_limits(vehicle)[1] * vehicle.dt
     steps = max(math.ceil(abs(bend - state[4]) / limit - ROUNDING), 0)
+    if steps > c.controls.shape[0]:
+        return -1
     for i in range(steps):
         second = (bend - state[4]) / (vehicle.dt * (steps - i))
         c.controls[i, 0] = 0.0
@@ -155,6 +160,8 @@ def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Ve
     c = drive.connection
     limit_1, limit_2 = control_limits(vehicle)
     turning = turn_wheels(drive, bend, vehicle)
+    if turning < 0:
+        return False
     top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
     acceleration = limit_1
     if turn_in(bend, 0.0, vehicle) != bend:

@@ -11,6 +11,7 @@ from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.world.authority.authority import faults
 from planners.world.randomness import generator
+from planners.world.vehicles.vehicle import CAR
 from tests.planners.clock import ticks
 from tests.worlds import problem_of, strewn, walled_goal
 
@@ -61,6 +62,12 @@ def test_a_first_plan_counts_before_it_is_polished(name):
     assert found.plan is not None
     first = improve(name, problem, expansions=3_000, seed=4).history[0]
     assert (first.expansions, first.duration_s) == (max(found.expansions, 1), found.plan.duration_s)
+
+
+def test_a_vehicle_of_long_steps_is_improved_too():
+    vehicle = CAR._replace(dt=0.5)
+    found = improve("lattice", strewn(1, 10), expansions=1_500, vehicle=vehicle).plan
+    assert found is None or faults(strewn(1, 10), found, vehicle) == []
 
 
 def test_more_work_gives_shorter_drives():

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planners.search.connection.pose_table import seconds_to_pose
-from planners.search.manoeuvres.driving import allocate_drive, begin, drive_arc
+from planners.search.manoeuvres.driving import allocate_drive, begin, drive_arc, turn_wheels
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.manoeuvring import word_radius
 from planners.search.manoeuvres.outward import Outward, open_node
 from planners.search.manoeuvres.pose_tree import SIZE, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
+from planners.search.query import Limits
+from planners.search.registry import plan
 from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go
 from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
 from planners.world.classes.families import family
 from planners.world.geometry.collision import scene_of
 from planners.world.geometry.occupancy import drawing_of, window_of
 from planners.world.goal import goal_of
-from planners.world.problem import start_state
+from planners.world.problem import Arrival, Problem, obstacles_of, start_state
+from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, state_size
 from planners.world.workspace import Workspace
 
@@ -52,3 +58,16 @@ def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
                 failed += 1
     assert arcs > 1000
     assert failed <= 0.01 * arcs
+
+
+@pytest.mark.parametrize("slow", [{"max_steering_rate": 0.006}, {"dt": 0.001, "max_steering_rate": 0.5}])
+def test_wheels_that_turn_for_longer_than_there_is_room_are_not_turned(slow: dict[str, float]) -> None:
+    vehicle, drive = CAR._replace(**slow), allocate_drive(state_size(CAR))
+    begin(drive, np.zeros((1, state_size(CAR))))
+    assert turn_wheels(drive, vehicle.max_steering, vehicle) == -1
+    problem = Problem(
+        "p", "c", (20.0, 20.0, 0.0), (26.0, 21.0), 0.1, (0.0, 0.0, 40.0, 40.0), obstacles_of([])
+    )
+    asked = replace(problem, arrival=Arrival(0.5, 0.05, 0.0, 0.0))
+    found = plan("lattice", asked, generator(1), vehicle=vehicle, limits=Limits(expansions=300)).plan
+    assert found is None or not faults(asked, found, vehicle)
