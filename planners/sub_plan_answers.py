@@ -55,9 +55,7 @@ class SubPlanAnswer(NamedTuple):
 
     plan: Plan | None
     seconds: float  # what a good plan is estimated to take
-    recalled: (
-        bool  # whether most of the plan was stored; else generic drives or a connection lead most of the way
-    )
+    recalled: bool  # whether most of the plan was stored, and not driven by primitives or a connection
     checks: int  # collision checks that this took
     knows_way: bool  # whether the workspace holds the distances to the goal now
 
@@ -148,10 +146,8 @@ def sub_plan_answer(
     offset = 0 if blindly is None else int(blindly.integers(1, len(subs.begins)))
     cells, scene = Cells(view.bits, window_of(problem)), view.scene
     x, y = problem.goal[0] - start[0], problem.goal[1] - start[1]
-    metres, turn = (
-        max(math.hypot(x, y) - float(near[RADIUS]), 0.0),
-        1.0 - math.cos(math.atan2(y, x) - start[2]),
-    )
+    metres = max(math.hypot(x, y) - float(near[RADIUS]), 0.0)
+    turn = 1.0 - math.cos(math.atan2(y, x) - start[2])
     seconds = seconds_for(metres, turn, start[3], vehicle)
     within = AT_ONCE * seconds / vehicle.dt
     steps = stored = int(recall_one(subs, 0, near, within, LOOKS_AT_ONCE, offset, cells, r, vehicle, scene))

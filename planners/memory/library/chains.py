@@ -40,10 +40,7 @@ BRANCHES: Final = 2  # stretches that lead on from a node, at most
 CUT: Final = 5  # steps at the end of a sub-plan, behind which a wall may stand
 ALL: Final = 1_000  # looks for all together
 EACH: Final = 25  # looks from a node for a sub-plan to the goal
-NEAR: Final = (
-    1.3,
-    4.0,
-)  # it is looked for if the way there is at most so much longer than straight ahead, in m
+NEAR: Final = 1.3, 4.0  # it is looked for if the way is at most so many times straight ahead, and so many m
 GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads on ...
 GENERICS: Final = 3  # ... of which so many are kept, the best
 PARENT, DRIVEN, ROW, STORED, IS_OPEN = range(5)  # columns of Chains.nodes
@@ -197,17 +194,9 @@ def recall_chain(
                 return int(row + driven), int(stored + driven)
         store(r.tried_states, 0, start)
         before = count
+        spent = row * vehicle.dt
         listed = list_stretches(
-            *(
-                stretches,
-                start,
-                row * vehicle.dt,
-                within,
-                ground,
-                chains.listed,
-                chains.listed_estimates,
-                vehicle,
-            )
+            *(stretches, start, spent, within, ground, chains.listed, chains.listed_estimates, vehicle)
         )
         for c in range(listed):
             if count == NODES or count == before + BRANCHES or r.work[LOOKS] >= ALL:

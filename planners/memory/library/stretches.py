@@ -16,14 +16,8 @@ from planners.world.arrays import Floats, Integers
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
-RINGS_M: Final = (
-    4.0,
-    8.0,
-    14.0,
-    22.0,
-    30.0,
-    40.0,
-)  # ends are alike if they lie between the same two distances,
+# ends are alike if they lie between the same two of these distances,
+RINGS_M: Final = (4.0, 8.0, 14.0, 22.0, 30.0, 40.0)
 BEARINGS: Final = 24  # in the same of so many sectors,
 HEADINGS: Final = 5  # and face into the same of so many
 MOST_STEPS: Final = 150

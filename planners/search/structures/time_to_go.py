@@ -65,7 +65,7 @@ def way_to_go(state: State, go: CostToGo) -> tuple[float, float]:
 
 @lean
 def way_from(states: Floats, go: CostToGo, vehicle: Vehicle) -> tuple[float, float]:
-    """The same for ``states[0]``, for Python."""
+    """``way_to_go`` from the first of ``states [T, S]``, for callers that are not compiled themselves."""
     return way_to_go(load(states, 0, vehicle), go)
 
 
