@@ -50,6 +50,7 @@ def draw(
 def plan(
     problem: Path,
     *,
+    pick: str | None = None,
     assist: AssistName | None = None,
     improve_seconds: float = 0.0,
     explain: Annotated[bool, Parameter(negative=())] = False,
@@ -61,7 +62,8 @@ def plan(
     """Plan for one problem; write the plan and a picture.
 
     Args:
-        problem: A .json, .jsonl or .parquet file with one problem.
+        problem: A .json, .jsonl or .parquet file.
+        pick: Which problem of the file, by its id or its number; not needed if there is only one.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
         improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
@@ -75,7 +77,9 @@ def plan(
     from tasks.settings.errors import RunError
 
     assistant = Assistant(options.settings(assist, improve_seconds, problem))
-    attempt, found, answer, failure, written = plan_one(assistant, problem, out, picture, explain, learn)
+    attempt, found, answer, failure, written = plan_one(
+        assistant, problem, out, picture, explain, learn, pick
+    )
     lines = []
     if found is not None:
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
@@ -92,6 +96,7 @@ def plan(
 def optimise(
     problem: Path,
     *,
+    pick: str | None = None,
     plan: Path | None = None,
     planner: PlannerName | None = None,
     straight: Annotated[bool, Parameter(negative=())] = False,
@@ -104,7 +109,8 @@ def optimise(
     """Optimise a plan for one problem, from a plan that may collide, a planner's plan, or a straight line.
 
     Args:
-        problem: A .json, .jsonl or .parquet file with one problem.
+        problem: A .json, .jsonl or .parquet file.
+        pick: Which problem of the file, by its id or its number; not needed if there is only one.
         plan: Begin with the plan of this .json file, made for this problem or another.
         planner: Begin with the plan of this planner; default follow.
         straight: Begin with a straight line from start to goal.
@@ -119,7 +125,7 @@ def optimise(
     from tasks.requests.optimise_one import initial_guess, optimise_one
 
     initial = initial_guess(plan, planner, straight, settled_vehicle(vehicle, problem), seed)
-    found = optimise_one(initial, problem, clearance_weight, out, picture)
+    found = optimise_one(initial, problem, clearance_weight, out, picture, pick)
     write_answer(
         f"{found.summary}, {found.length_m:.1f} m, {found.duration_s:.1f} s"
         f" (guess: {found.guess_duration_s:.1f} s), {found.clearance_m:.2f} m clear",

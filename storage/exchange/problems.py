@@ -41,6 +41,37 @@ def read_problems(path: Path, vehicle: Vehicle = CAR) -> list[Problem]:
     return list(iterate_problems(path, vehicle))
 
 
+def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) -> Problem:
+    """The one problem in the file at ``path`` that is asked for; only this one is checked.
+
+    Args:
+        path: the file.
+        vehicle: the vehicle that drives.
+        pick: the id of the problem, or else its number as messages tell it: its line, or counted from 1. None
+            takes the only one.
+
+    Raises:
+        StorageError: the file has no such problem, or several where none is picked; or it is malformed.
+    """
+    found: list[tuple[int, Any]] = []
+    count = last = 0
+    for count, (last, fields) in enumerate(raw_problems(path), start=1):
+        identity = fields.get("id") if isinstance(fields, Mapping) else None
+        if pick is not None and pick == (identity or _default_id(path, last)):
+            found = [(last, fields)]
+            break
+        if pick == str(last) or (pick is None and count == 1):
+            found = [(last, fields)]
+    if not found or (pick is None and count > 1):
+        asked = "" if pick is None else f", none with the id or number {short(pick)}"
+        choose = f"; choose one with --pick, by its id or its number up to {last}" if count else ""
+        raise StorageError(f"{path} holds {count:,} problem{'s' * (count != 1)}{asked}{choose}.")
+    ((where, problem),) = _checked(path, found, vehicle)
+    if isinstance(problem, str):
+        raise StorageError(f"{where}: {problem}.")
+    return problem
+
+
 def iterate_problems(path: Path, vehicle: Vehicle = CAR) -> Iterator[Problem]:
     """The problems in the file at ``path`` one by one, each checked for a ``vehicle`` when it is read.
 
@@ -81,8 +112,7 @@ def _checked(
         identity = fields.get("id") if isinstance(fields, Mapping) else None
         with_id = f"{where} (id {short(identity)})" if isinstance(identity, str) and identity else where
         try:
-            name = path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
-            problem = problem_of(fields, name, vehicle)
+            problem = problem_of(fields, _default_id(path, number), vehicle)
             stated = isinstance(fields, Mapping) and stated_vehicle(fields) is not None
             first = stated if first is None else first
             if stated != first:
@@ -95,6 +125,11 @@ def _checked(
             continue
         seen.add(problem.id)
         yield where, problem
+
+
+def _default_id(path: Path, number: int) -> str:
+    """The id of a problem that has none."""
+    return path.stem if path.suffix == ".json" else f"{path.stem}-{number}"
 
 
 def vehicle_of_problems(path: Path) -> Vehicle | None:

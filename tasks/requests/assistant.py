@@ -23,7 +23,7 @@ from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
-from storage.exchange.problems import read_problems
+from storage.exchange.problems import read_problem
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.judged_attempts import check_attempt
@@ -177,43 +177,41 @@ class Assistant:
 
 def plan_one(
     assistant: Assistant,
-    problem: Path,
+    file: Path,
     out: Path | None,
     drawing: Path | None,
     explained: bool = False,
     learn: Path | None = None,
+    pick: str | None = None,
 ) -> PlannedOne:
-    """Plan for the only problem in a file.
+    """Plan for one problem of a file.
 
     Args:
         assistant: solves the problem.
-        problem: the file; it must hold one problem.
+        file: the file of the problem.
         out: where to write the plan, or None. Why there is none is written too, but over no older file.
         drawing: where to draw it, or None.
         explained: whether to log and draw the recalled plans, where they collide and how they were used.
         learn: the data folder to which the problem and its plan are added as an experience, or None.
+        pick: the id or the number of the problem; None takes the only one.
 
     Returns:
         the result; finding no plan is a result too.
 
     Raises:
         UsageError: the name of an output has a wrong ending, or an output would be written over an input.
-        RunError: the file does not hold exactly one problem.
+        StorageError: the problem is malformed, or the file has no such problem.
     """
-    check_plan_outputs([problem, *assistant.files], out, drawing)
-    problems = read_problems(problem, assistant.vehicle)
-    if len(problems) != 1:
-        raise RunError(
-            f"{problem} holds {len(problems)} problems; `plan` takes one, `solve` takes any number."
-        )
+    check_plan_outputs([file, *assistant.files], out, drawing)
+    problem = read_problem(file, assistant.vehicle, pick)
     with no_garbage_collection():
-        assistant.warm_up(problems[0])
-        attempt, plan = assistant(problems[0])
-    record = plan_record(assistant, problems[0], attempt, plan)
+        assistant.warm_up(problem)
+        attempt, plan = assistant(problem)
+    record = plan_record(assistant, problem, attempt, plan)
     written = write_answer_file(out, record)
     if learn is not None:
-        remember(learn, [Solved(to_canonical(problems[0])[0], attempt)], assistant.vehicle)
-    recalled = assistant.recalled(problems[0], attempt) if drawing is not None or explained else []
+        remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
+    recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
@@ -221,11 +219,11 @@ def plan_one(
 
         driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
         caption = f"{driven}{attempt.source or attempt.status}"
-        figure = picture(problems[0], plan, caption, recalled, assistant.vehicle, collisions=explained)
+        figure = picture(problem, plan, caption, recalled, assistant.vehicle, collisions=explained)
         save_picture(figure, drawing)
     if explained:
-        _explain(assistant, problems[0], attempt, recalled)
-    failure = None if plan else no_plan(problems[0].id or str(problem), summary, out, written)
+        _explain(assistant, problem, attempt, recalled)
+    failure = None if plan else no_plan(problem.id or str(file), summary, out, written)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
     return PlannedOne(attempt, plan, answer, failure, written)

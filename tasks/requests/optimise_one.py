@@ -19,7 +19,7 @@ from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, read_plan
-from storage.exchange.problems import read_problems
+from storage.exchange.problems import read_problem
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
 from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
@@ -106,29 +106,33 @@ def initial_guess(
 
 
 def optimise_one(
-    initial: InitialGuess, problem_file: Path, clearance_weight: float, out: Path | None, drawing: Path | None
+    initial: InitialGuess,
+    problem_file: Path,
+    clearance_weight: float,
+    out: Path | None,
+    drawing: Path | None,
+    pick: str | None = None,
 ) -> OptimisedOne:
-    """Optimise a plan for the one problem in a file.
+    """Optimise a plan for one problem of a file.
 
     Args:
         initial: where the first guess comes from.
-        problem_file: the file; it must hold one problem.
+        problem_file: the file of the problem.
         clearance_weight: weight of the clearance in the objective, 0 or more; with 0, only time counts.
         out: where to write the plan, or None. Why there is none is written too, but over no older file.
         drawing: where to draw it, or None.
+        pick: the id or the number of the problem; None takes the only one.
 
     Raises:
         UsageError: the weight is negative or infinite, the name of an output has a wrong ending, or an output
             would be written over an input.
-        RunError: the file does not hold exactly one problem, or the optimisation does not converge.
+        StorageError: the problem is malformed, or the file has no such problem.
+        RunError: the optimisation does not converge.
     """
     check_plan_outputs([problem_file, *([] if initial.plan is None else [initial.plan])], out, drawing)
     if not 0.0 <= clearance_weight < float("inf"):
         raise UsageError(f"Clearance weight {clearance_weight}: give 0 or more.")
-    problems = read_problems(problem_file, initial.vehicle)
-    if len(problems) != 1:
-        raise RunError(f"{problem_file} holds {len(problems)} problems; `optimise` takes one.")
-    problem = problems[0]
+    problem = read_problem(problem_file, initial.vehicle, pick)
     weights = DEFAULT_SETTINGS.weights._replace(clearance_weight=clearance_weight)
     initial.warn_of_other_problem(problem)
     initial.guess(problem)  # compiles and fills caches before timing starts

@@ -93,6 +93,14 @@ def test_a_command_tells_programs_what_is_documented(
     assert list(told["files"]) == files
 
 
+@pytest.mark.parametrize("command", ["plan", "optimise"])
+def test_the_problem_that_is_picked_is_the_one_that_is_answered(
+    command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = _told(f"{command} few.jsonl --pick 2", place, monkeypatch, capsys)
+    assert told["answer"]["problem_id"] == problem(1).id
+
+
 def test_the_parts_of_a_plan_are_numbers_and_its_states_are_there_once(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
