@@ -21,11 +21,11 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import Car, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
-ARRIVING_ITERATIONS: Final = 240  # where a drive must arrive as asked; some 80 suffice mostly
+ARRIVING_ITERATIONS: Final = 700  # where a drive must arrive as asked; some 60 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 ROOM: Final = 256  # steps, in which buffers grow
@@ -82,7 +82,7 @@ def polish(
     barrier = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle), 0.0)
     arriving = problem.arrival not in (None, Arrival())
     used = 0
-    if arriving and isinstance(vehicle, Car) and not vehicle.first_order:
+    if arriving and isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         found, used = quickest(states, model, interior, goal, vehicle, scene, barrier, iterations, until)
         if found is not None and len(found.controls) < best:

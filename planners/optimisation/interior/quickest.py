@@ -24,7 +24,7 @@ from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.goal import LEAST_SPEED, MOST_SPEED
+from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import Vehicle
@@ -33,7 +33,7 @@ FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
 WEAKER: Final = 0.1  # ... times this when little is left to gain ...
 LAST_STRENGTH: Final = 3e-4  # ... down to this
 LAST_STEPS_STRENGTH: Final = 1e-3  # while only gaps are closed
-STRENGTH, RANGE_M, CONTACT_M = 0.01, 0.3, 0.003  # of obstacles, as of ``Barrier``
+RANGE_M: Final = 0.3  # of obstacles, as of ``Barrier``
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-6, 1e3  # metres
 TRIES: Final = 8  # shares of a change that are tried
 IN_VAIN: Final = 5  # changes one after another after which there is no hope
@@ -46,12 +46,30 @@ MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
 
 
+class Firmness(NamedTuple):
+    """How firmly a drive is held to its goal and off obstacles, against the time that this takes."""
+
+    tolerance: float  # share of what is tolerated at the goal: the less, the firmer a drive is drawn into it
+    strength: float  # of obstacles, and ...
+    contact_m: float  # ... where they push hardest, as of ``Barrier``
+    afresh: bool  # begins with the given drive again, not with what came of the attempt before
+
+
+ATTEMPTS: Final = (  # one after another, until a drive is found
+    Firmness(1.0, 0.01, 0.003, afresh=True),
+    Firmness(0.5, 0.01, 0.003, afresh=False),
+    Firmness(0.25, 0.01, 0.001, afresh=True),
+    Firmness(0.25, 0.03, 0.001, afresh=True),
+)
+
+
 class _Drive(NamedTuple):
     """What stays the same while a drive is optimised."""
 
     model: Model
     interior: Interior
-    goal: Floats
+    goal: Floats  # that is aimed at
+    asked: Floats  # and that has to be reached
     scene: Scene
     circles: Floats
     barrier: Barrier
@@ -85,34 +103,57 @@ def quickest(
     Returns:
         A free drive that arrives as asked, if one was found, and the iterations used.
     """
-    pushing = barrier._replace(strength=STRENGTH, range_m=RANGE_M, contact=CONTACT_M)
-    drive = _Drive(model, interior, goal, scene, circles_around(scene), pushing, until)
-    start = way[0]
     states, controls = retimed(way, vehicle)
     steps = len(controls)
     if steps == 0 or steps + MORE_STEPS[-1] > len(model.controls):
         return None, 0
-    _fill(drive, states, controls, start)
-    dt, used, _ = _descend(drive, steps, vehicle, True, min(MOST_FIRST, iterations))
-    guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
+    given = guess = Plan(states, controls, vehicle.dt)
+    circles = circles_around(scene)
+    used = 0
+    for firmness in ATTEMPTS:
+        pushing = barrier._replace(strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m)
+        aim = _drawn_in(goal, firmness.tolerance)
+        drive = _Drive(model, interior, aim, goal, scene, circles, pushing, until)
+        guess = given if firmness.afresh else guess
+        _fill(drive, guess, way[0])
+        first = min(MOST_FIRST, iterations - used)
+        dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
+        used += spent
+        guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
+        found, spent = _in_whole_steps(drive, guess, vehicle, iterations - used)
+        used += spent
+        if found is not None or used >= iterations or perf_counter() > until:
+            return found, used
+    return None, used
+
+
+def _drawn_in(goal: Floats, share: float) -> Floats:
+    """The goal with so much of its tolerances of place, heading and hitches."""
+    aim = goal.copy()
+    aim[[RADIUS, HEADING_TOLERANCE]] *= share
+    aim[HITCHES + 1 :: 2] *= share
+    return aim
+
+
+def _in_whole_steps(drive: _Drive, guess: Plan, vehicle: Vehicle, iterations: int) -> tuple[Plan | None, int]:
+    """Divide a guess into steps of the vehicle's length and close its gaps; a drive, and iterations used."""
+    used = 0
     least = max(math.ceil(guess.duration_s / vehicle.dt - LITTLE_LONGER), 1)
     for more in MORE_STEPS:
-        if least + more > len(model.controls) or used >= iterations or perf_counter() > until:
+        if least + more > len(drive.model.controls) or used >= iterations or perf_counter() > drive.until:
             break
-        again = resampled(guess, least + more)
-        _fill(drive, again.states, again.controls, start)
-        most = min(MOST_LAST, iterations - used)
-        _, spent, found = _descend(drive, least + more, vehicle, False, most)
+        _fill(drive, resampled(guess, least + more), guess.states[0])
+        _, spent, found = _descend(drive, least + more, vehicle, False, min(MOST_LAST, iterations - used))
         used += spent
         if found is not None:
             return found, used
     return None, used
 
 
-def _fill(drive: _Drive, states: Floats, controls: Floats, start: Floats) -> None:
-    drive.model.states[: len(states)] = states
+def _fill(drive: _Drive, guess: Plan, start: Floats) -> None:
+    drive.model.states[: len(guess.states)] = guess.states
     drive.model.states[0] = start
-    drive.model.controls[: len(controls)] = controls
+    drive.model.controls[: len(guess.controls)] = guess.controls
 
 
 def _descend(
@@ -181,7 +222,7 @@ def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     controls = drive.model.controls[:steps].copy()
     states = simulate(start, controls, vehicle)
     most = control_limits(vehicle)[0]
-    asked = min(max(states[-1, 3], drive.goal[LEAST_SPEED]), drive.goal[MOST_SPEED])
+    asked = min(max(states[-1, 3], drive.asked[LEAST_SPEED]), drive.asked[MOST_SPEED])
     missing = (asked - states[-1, 3]) / vehicle.dt
     for k in range(steps - 1, -1, -1):  # rounding leaves a little speed, which the last steps take away
         before = controls[k, 0]
@@ -190,7 +231,7 @@ def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
         if missing == 0.0:
             break
     states = simulate(start, controls, vehicle)
-    arrives = steps_to_goal(states[-1:], 0, drive.goal, vehicle) == 0
+    arrives = steps_to_goal(states[-1:], 0, drive.asked, vehicle) == 0
     if not arrives or count_free_prefix(states, vehicle, drive.scene) <= steps:
         return None
     return Plan(states, controls, vehicle.dt)
