@@ -155,14 +155,18 @@ class Assistant:
             workspace=self._workspace,
         )
 
-    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
-        """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
-        canonical, alignment = to_canonical(problem)
-        attempt = self.attempt(canonical)
+    def improved_attempt(self, canonical: Problem, assist: str | None = None) -> Attempt:
+        """Like ``attempt``, and improve its plan for as long as the settings say."""
+        attempt = self.attempt(canonical, assist)
         seconds = self.settings.improve_seconds
         if seconds > 0.0:
             attempt = improved(attempt, canonical, seconds, self.vehicle, self._workspace)
-        attempt = check_attempt(canonical, attempt, set(), self.vehicle)
+        return attempt
+
+    def __call__(self, problem: Problem) -> tuple[Attempt, Plan | None]:
+        """Solve a problem; return the checked attempt and its plan in the frame of the problem."""
+        canonical, alignment = to_canonical(problem)
+        attempt = check_attempt(canonical, self.improved_attempt(canonical), set(), self.vehicle)
         if attempt.length_m is not None:
             attempt = replace(attempt, length_m=problem.scale * attempt.length_m)
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
@@ -241,7 +245,7 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
     log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, by_parts)
     if memory is not None:
         with no_garbage_collection():
-            log_without_memory(attempt, assistant.attempt(canonical, UNASSISTED.name))
+            log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))
 
 
 def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flows.cli.main import call
+from planners.attempt import Attempt
 from planners.explanation import recollections
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.memory import Memory
@@ -82,6 +84,23 @@ def test_the_command_tells_and_draws_it(
     assert marked.read_bytes() != plain.read_bytes()
     assert call(["plan", str(tmp_path / "wall.json"), "--explain"]) == 0
     assert "no memory" in capsys.readouterr().out
+
+
+def test_what_a_memory_is_worth_is_told_of_two_plans_that_were_improved_alike(
+    memory: Memory, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slower(attempt: Attempt, *_: object) -> Attempt:
+        return replace(attempt, planning_seconds=attempt.planning_seconds + 1_000.0)
+
+    monkeypatch.setattr("tasks.requests.assistant.improved", slower)
+    save_memory(tmp_path / "memory", memory)
+    write_problems(tmp_path / "wall.json", [WALL])
+    asked = ["plan", str(tmp_path / "wall.json"), "--memory", str(tmp_path / "memory"), "--explain"]
+    for improvement, slowed in ((["--improve-seconds", "0.001"], True), ([], False)):
+        assert call([*asked, *improvement]) == 0
+        worth = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("worth"))
+        milliseconds = [float(number) for number in re.findall(r"(\S+) ms", worth)]
+        assert [each > 1e6 for each in milliseconds] == [slowed, slowed]
 
 
 @pytest.fixture(scope="module")
