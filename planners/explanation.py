@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.attempt import Attempt
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
@@ -15,8 +16,10 @@ from planners.search.help import PATIENCE
 from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
 from planners.solve import least_blocked
+from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
-from planners.world.problem import Problem
+from planners.world.problem import Problem, is_canonical
+from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
 from planners.world.workspace import Workspace
@@ -77,6 +80,21 @@ def recollections(
             )
         )
     return looked_at
+
+
+def parts_found(
+    problem: Problem, attempt: Attempt, memory: Memory | PlanLibrary, vehicle: Vehicle
+) -> SubPlanAnswer | None:
+    """Look again at what parts of stored plans had for a canonical problem, before an attempt searched.
+
+    None if whole plans of the memory are to answer the problem.
+    """
+    if isinstance(memory, Memory) and is_canonical(problem):
+        return None
+    library = memory.library if isinstance(memory, Memory) else memory
+    is_blind = attempt.assist.startswith("random-")
+    blindly = generator(attempt.seed, "random-plans", problem.id) if is_blind else None
+    return sub_plan_answer(library, View(problem), vehicle, blindly)
 
 
 def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:

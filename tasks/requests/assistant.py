@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any, Final, NamedTuple
 
 from planners.attempt import TIMED_PARTS, Attempt
-from planners.explanation import recollections
+from planners.explanation import parts_found, recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
@@ -20,7 +20,7 @@ from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
-from planners.world.problem import Plan, Problem, is_canonical
+from planners.world.problem import Plan, Problem
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
 from storage.exchange.problems import read_problem
@@ -241,8 +241,8 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
     memory = assistant.memory_of(problem.class_name)
     ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
-    by_parts = isinstance(memory, PlanLibrary) or not is_canonical(canonical)
-    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, by_parts)
+    parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
+    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, parts)
     if memory is not None:
         with no_garbage_collection():
             log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))

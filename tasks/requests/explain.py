@@ -12,6 +12,7 @@ from planners.attempt import Attempt
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
+from planners.sub_plan_answers import SubPlanAnswer
 from planners.world.problem import Plan
 
 USES: Final = {
@@ -19,12 +20,6 @@ USES: Final = {
     "repaired": "repaired",
     "guide": "guided the search",
     "": "",
-}
-_PARTS: Final = {  # by the source of the answer, if parts of plans are recalled instead of whole plans
-    "recalled": "parts {}, driven again",
-    "repaired": "the search joined the end of one {}",
-    "searched": "no part {} leads to the goal more quickly than the plan found without them",
-    None: "no part {} leads to the goal, and no other plan was found",
 }
 HEADINGS: Final = ("", "plan", "rank", "cells", "states", "first", "at", "use")
 FIELDS: Final = (
@@ -40,7 +35,7 @@ def log_explanation(
     memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
-    by_parts: bool,
+    parts: SubPlanAnswer | None,
 ) -> None:
     """Log how the memory was used, a table of the recalled plans, the work done and the times.
 
@@ -49,9 +44,9 @@ def log_explanation(
         memory: the memory or library that was used, or None.
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
         scale: how many metres of the problem are one canonical metre.
-        by_parts: whether parts of plans instead of whole plans can answer the problem.
+        parts: what parts of plans had for the problem; None if whole plans are to answer it.
     """
-    _LOG.info(_recall_line(attempt, memory, recalled, by_parts))
+    _LOG.info(_recall_line(attempt, memory, recalled, parts))
     if recalled:
         _LOG.info(_table(recalled, scale))
     work = f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions"
@@ -73,14 +68,15 @@ def _recall_line(
     attempt: Attempt,
     memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
-    by_parts: bool,
+    parts: SubPlanAnswer | None,
 ) -> str:
     if memory is None:
         return f"recall   no memory was used ({attempt.assist}, {attempt.planner})"
-    of_them = f"of {len(memory.plans):,} plans of {memory.class_name}"
+    plans = f"{len(memory.plans):,} plans of {memory.class_name}"
+    of_them = f"of {plans}"
     if not recalled:
-        told = _PARTS[attempt.source] if by_parts else "no plan {} seemed likely to fit"
-        return f"recall   {told.format(of_them)}"
+        told = f"no plan {of_them} seemed likely to fit" if parts is None else _told_of(parts, attempt, plans)
+        return f"recall   {told}"
     free = sum(
         not (recollection.blocked.any() or recollection.goal_missed_m > 1e-9) for recollection, _ in recalled
     )
@@ -89,6 +85,24 @@ def _recall_line(
         f"recall   {attempt.recall}, {len(recalled)} {of_them}, {free or 'none'} of them free{quicker}; "
         "rank by the encoder, cells and states in collision:"
     )
+
+
+def _told_of(parts: SubPlanAnswer, attempt: Attempt, plans: str) -> str:
+    """How parts of stored ``plans`` were used for an attempt, or why none was."""
+    if attempt.source == "recalled":
+        return f"parts of {plans}, driven again"
+    if attempt.source == "repaired":
+        return f"the search joined the end of one of {plans}"
+    if parts.plan is None:
+        more = "" if attempt.solved else "; the search found no way either"
+        return f"no parts of {plans}, alone or one after another, lead to the goal without a collision{more}"
+    if parts.recalled:
+        found = f"lead to the goal in {parts.plan.duration_s:.1f} s; the search found a quicker drive"
+    else:
+        found = (
+            "make up less than half of the way to the goal that was found with them: it counts as searched"
+        )
+    return f"parts of {plans} {found}"
 
 
 def _table(recalled: Sequence[tuple[Recollection, Plan]], scale: float) -> CellTable:

@@ -18,11 +18,14 @@ from planners.memory.plans.free import turned
 from planners.search.help import PATIENCE
 from planners.search.outcome import work_of
 from planners.solve import solve
+from planners.sub_plan_answers import sub_plan_answer
+from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
-from planners.world.problem import Problem
+from planners.world.problem import CANONICAL_START, Arrival, Problem
 from planners.world.vehicles.vehicle import CAR
-from storage.archives.libraries import save_library
+from planners.world.view import View
+from storage.archives.libraries import load_library, save_library
 from storage.archives.memories import save_memory
 from storage.exchange.problems import write_problems
 from storage.tables.attempts import read_attempts
@@ -113,18 +116,25 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_it_never_says_that_a_library_had_nothing_likely(
+def test_it_says_what_parts_of_plans_had_for_a_question(
     library: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    stored = load_library(library, CAR)
     told = {}
-    for seed in range(20, 26):
-        write_problems(tmp_path / "one.json", [strewn(seed, 30)])
-        asked = ["plan", str(tmp_path / "one.json"), "--memory", str(library), "--explain"]
-        assert call(asked) == 0
+    pose = Arrival(CANONICAL_START[2], 0.05)
+    for question in [replace(strewn(seed, 60), arrival=pose) for seed in (20, 21, 25)]:
+        write_problems(tmp_path / "one.json", [question])
+        asked = ["plan", str(tmp_path / "one.json"), "--memory", str(library), "--assist", "closed"]
+        assert call([*asked, "--explain"]) == 0
         line, *_, source = (line for line in capsys.readouterr().out.splitlines() if line)
-        told[source.partition(",")[0]] = line
-        assert "likely" not in line
-    assert len(set(told.values())) == len(told)  # where the answer came from is told
+        parts = sub_plan_answer(stored, View(to_canonical(question)[0]), CAR)
+        searched = source.startswith("searched")
+        quicker = searched and parts.recalled and parts.plan is not None
+        assert ("quicker" in line) == quicker
+        assert not quicker or f"{parts.plan.duration_s:.1f} s" in line
+        assert ("no parts" in line) == (searched and parts.plan is None)
+        told[source.partition(",")[0], quicker] = line
+    assert len(set(told.values())) == len(told) > 1
 
 
 @pytest.mark.parametrize("command", ["plan", "solve"])
