@@ -53,11 +53,16 @@ def step_of(vehicle: Vehicle) -> ca.Function:
     if vehicle.first_order:  # speed and steering change at once
         begin = ca.vertcat(state[:3], state[3:5] + h * controls, state[5:])
         rates = ca.SX.zeros(2)
-    k1 = slopes(begin, rates, vehicle)
-    k2 = slopes(begin + 0.5 * h * k1, rates, vehicle)
-    k3 = slopes(begin + 0.5 * h * k2, rates, vehicle)
-    k4 = slopes(begin + h * k3, rates, vehicle)
-    return ca.Function("step", [state, controls, h], [begin + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)])
+    return ca.Function("step", [state, controls, h], [_moved(begin, rates, h, vehicle)])
+
+
+def _moved(state: ca.SX, rates: ca.SX, h: ca.SX | float, vehicle: Vehicle) -> ca.SX:
+    """The state ``h`` seconds later, by Runge and Kutta."""
+    k1 = slopes(state, rates, vehicle)
+    k2 = slopes(state + 0.5 * h * k1, rates, vehicle)
+    k3 = slopes(state + 0.5 * h * k2, rates, vehicle)
+    k4 = slopes(state + h * k3, rates, vehicle)
+    return state + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
 def limits_of(vehicle: Vehicle) -> VehicleLimits:
@@ -82,20 +87,19 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
     The discs, ``a_body`` in a row over each body, cover it with the margins that the kernels add:
     what its points do in half a step into or out of the state.
     """
-    state = ca.SX.sym("state", state_size(vehicle))
-    x, y, heading = state[0], state[1], state[2]
-    if isinstance(vehicle, DifferentialDrive):
-        most, change = vehicle.max_turn_rate, vehicle.max_turn_acceleration
+    given = state = ca.SX.sym("state", state_size(vehicle))
+    change = limits_of(vehicle).control_high
+    speed, sharpest = _absolute(state[3]), _absolute(state[4])
+    if vehicle.first_order:  # covered is the step into the state, from its middle
+        state = _moved(state, ca.SX.zeros(2), -0.5 * vehicle.dt, vehicle)
     else:
-        most, change = vehicle.max_steering, vehicle.max_steering_rate
-    speed = _absolute(state[3]) + vehicle.max_acceleration * vehicle.dt
-    sharpest = _absolute(state[4]) + change * vehicle.dt
-    if vehicle.first_order:  # which may be at its limits within a step
-        speed, sharpest = ca.SX(max(vehicle.max_speed, -vehicle.min_speed)), ca.SX(most)
+        speed += vehicle.dt * change[0]
+        sharpest += vehicle.dt * change[1]
     if isinstance(vehicle, DifferentialDrive):
         turn = sharpest
     else:
         turn = speed * ca.tan(sharpest) / vehicle.wheelbase
+    x, y, heading = state[0], state[1], state[2]
     body = (vehicle.front, vehicle.rear, vehicle.width)
     rows = [_row(x, y, heading, body, speed, turn, vehicle.dt, a_body)]
     for i, trailer in enumerate(trailers_of(vehicle)):
@@ -107,7 +111,7 @@ def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:
         turn = speed * ca.sin(ca.fmin(widest, 0.5 * math.pi)) / length
         body = (trailer.front, trailer.rear, trailer.width)
         rows.append(_row(x, y, heading, body, speed, turn, vehicle.dt, a_body))
-    return ca.Function("discs", [state], [ca.horzcat(*part) for part in zip(*rows, strict=True)])
+    return ca.Function("discs", [given], [ca.horzcat(*part) for part in zip(*rows, strict=True)])
 
 
 def _absolute(value: ca.SX) -> ca.SX:

@@ -147,7 +147,22 @@ def most_motion(speed: float, steering: float, car: CarLike) -> tuple[float, flo
     return fastest, fastest * tan(sharpest) / car.wheelbase
 
 
+@inlined
+def swept_motion(state: State, car: CarLike) -> tuple[State, float, float]:
+    """The pose from which a state's steps are covered, and the largest speed and turn rate of these.
+
+    Of first order it is the middle of the step into the state, of which all is known.
+    """
+    if car.first_order:
+        turn = state[3] * tan(state[4]) / car.wheelbase
+        turns = (turn, turn, turn)
+        pose = drive(state[0], state[1], state[2], state[3], state[3], turns, -0.5 * car.dt)
+        return pose, abs(state[3]), abs(turn)
+    speed, turn = most_motion(state[3], state[4], car)
+    return (state[0], state[1], state[2]), speed, turn
+
+
 @implements(interface.swept_bodies, Car)
 def _swept_bodies(state: State, vehicle: Car) -> tuple[Box, ...]:
-    speed, turn = most_motion(state[3], state[4], vehicle)
-    return (leading_body(state, speed, turn, vehicle),)
+    pose, speed, turn = swept_motion(state, vehicle)
+    return (leading_body(pose, speed, turn, vehicle),)

@@ -12,7 +12,7 @@ from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import sincos, tan
 from planners.world.vehicles import interface
-from planners.world.vehicles.car import drive, most_motion, turn_rates
+from planners.world.vehicles.car import drive, most_motion, swept_motion, turn_rates
 from planners.world.vehicles.interface import State, box_at, half_step_ways, leading_body
 from planners.world.vehicles.vehicle import CarWithTrailers, Trailer
 
@@ -74,6 +74,23 @@ def _runge_kutta(start: float, h: float, k1: float, k2: float, k3: float, k4: fl
     return start + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
+@inlined
+def _hitches_after(h: float, speeds: Three, turns: Three, state: State, vehicle: CarWithTrailers) -> Three:
+    """The hitch angles ``h`` seconds later; speeds and turn rates of the car at beginning, middle and end."""
+    trailers = vehicle.trailers
+    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
+    hitches = state[5], _second_hitch(state), state[-1]
+    k = _hitch_rates(speeds[0], turns[0], hitches, lengths)
+    p = _hitch_rates(speeds[1], turns[1], _after(hitches, 0.5 * h, k), lengths)
+    q = _hitch_rates(speeds[1], turns[1], _after(hitches, 0.5 * h, p), lengths)
+    r = _hitch_rates(speeds[2], turns[2], _after(hitches, h, q), lengths)
+    return (
+        _runge_kutta(hitches[0], h, k[0], p[0], q[0], r[0]),
+        _runge_kutta(hitches[1], h, k[1], p[1], q[1], r[1]),
+        _runge_kutta(hitches[2], h, k[2], p[2], q[2], r[2]),
+    )
+
+
 @implements(interface.step, CarWithTrailers)
 def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -> State:
     h = vehicle.dt
@@ -86,16 +103,7 @@ def _step(state: State, first: float, second: float, vehicle: CarWithTrailers) -
     middle_speed = speed + 0.5 * h * first
     turns = turn_rates(speed, steering, first, second, vehicle)
     x, y, heading = drive(state[0], state[1], state[2], speed, end_speed, turns, h)
-    trailers = vehicle.trailers
-    lengths = trailers[0].hitch_length, _second(trailers).hitch_length, trailers[-1].hitch_length
-    hitches = state[5], _second_hitch(state), state[-1]
-    k = _hitch_rates(speed, turns[0], hitches, lengths)
-    p = _hitch_rates(middle_speed, turns[1], _after(hitches, 0.5 * h, k), lengths)
-    q = _hitch_rates(middle_speed, turns[1], _after(hitches, 0.5 * h, p), lengths)
-    r = _hitch_rates(end_speed, turns[2], _after(hitches, h, q), lengths)
-    hitch_1 = _runge_kutta(hitches[0], h, k[0], p[0], q[0], r[0])
-    hitch_2 = _runge_kutta(hitches[1], h, k[1], p[1], q[1], r[1])
-    hitch_3 = _runge_kutta(hitches[2], h, k[2], p[2], q[2], r[2])
+    hitch_1, hitch_2, hitch_3 = _hitches_after(h, (speed, middle_speed, end_speed), turns, state, vehicle)
     end_speed = min(max(end_speed, vehicle.min_speed), vehicle.max_speed)
     end_steering = min(max(end_steering, -vehicle.max_steering), vehicle.max_steering)
     if len(state) == 6:
@@ -187,17 +195,20 @@ def _behind(
 
 @implements(interface.swept_bodies, CarWithTrailers)
 def _swept_bodies(state: State, vehicle: CarWithTrailers) -> tuple[Box, ...]:
-    speed, turn = most_motion(state[3], state[4], vehicle)
-    car = leading_body(state, speed, turn, vehicle)
+    pose, speed, turn = swept_motion(state, vehicle)
+    hitches = state[5], _second_hitch(state), state[-1]
+    if vehicle.first_order:  # those in the middle of the step into the state, too
+        rate = state[3] * tan(state[4]) / vehicle.wheelbase
+        speeds = (state[3], state[3], state[3])
+        hitches = _hitches_after(-0.5 * vehicle.dt, speeds, (rate, rate, rate), state, vehicle)
+    car = leading_body(pose, speed, turn, vehicle)
     trailers, dt = vehicle.trailers, vehicle.dt
-    x, y, heading, turn, first = _behind(state[0], state[1], state[2], state[5], speed, turn, dt, trailers[0])
+    x, y, heading, turn, first = _behind(pose[0], pose[1], pose[2], hitches[0], speed, turn, dt, trailers[0])
     if len(state) == 6:
         return car, first
-    x, y, heading, turn, second = _behind(
-        x, y, heading, _second_hitch(state), speed, turn, dt, _second(trailers)
-    )
+    x, y, heading, turn, second = _behind(x, y, heading, hitches[1], speed, turn, dt, _second(trailers))
     if len(state) == 7:
         return car, first, second
     else:
-        x, y, heading, turn, third = _behind(x, y, heading, state[-1], speed, turn, dt, trailers[-1])
+        x, y, heading, turn, third = _behind(x, y, heading, hitches[2], speed, turn, dt, trailers[-1])
         return car, first, second, third

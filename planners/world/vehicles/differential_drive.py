@@ -104,6 +104,10 @@ def _is_folded(state: State, vehicle: DifferentialDrive) -> bool:
 @implements(interface.swept_bodies, DifferentialDrive)
 def _swept_bodies(state: State, vehicle: DifferentialDrive) -> tuple[Box, ...]:
     h = vehicle.dt
+    if vehicle.first_order:  # covered is the step into the state, from its middle
+        turns = (state[4], state[4], state[4])
+        pose = drive(state[0], state[1], state[2], state[3], state[3], turns, -0.5 * h)
+        return (leading_body(pose, abs(state[3]), abs(state[4]), vehicle),)
     speed = min(abs(state[3]) + vehicle.max_acceleration * h, max(vehicle.max_speed, -vehicle.min_speed))
     turn = min(abs(state[4]) + vehicle.max_turn_acceleration * h, vehicle.max_turn_rate)
     return (leading_body(state, speed, turn, vehicle),)

@@ -118,7 +118,9 @@ def is_folded(state: State, vehicle: Vehicle) -> bool:
 def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
     """A box around each body, larger by what its points do along and across it in half a step.
 
-    So the boxes at both ends of a step cover the sweep between them, and no obstacle is jumped over.
+    So the boxes at both ends of a step cover the sweep between them, and no obstacle is jumped over. Of
+    first order a state knows the step that led to it: its boxes lie around the middle of that step, and
+    cover all of it.
     """
     raise NotImplementedError
 

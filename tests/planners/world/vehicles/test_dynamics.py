@@ -69,14 +69,17 @@ def test_the_error_falls_with_the_fourth_power_of_the_time_step(vehicle: Vehicle
 @each_vehicle
 @settings(max_examples=60, deadline=None)
 @given(seed=seeds)
-def test_the_boxes_of_both_ends_of_a_step_cover_the_bodies_in_its_halves(vehicle: Vehicle, seed: int) -> None:
+def test_boxes_cover_the_bodies_in_the_halves_of_a_step_or_in_all_of_it(vehicle: Vehicle, seed: int) -> None:
     rng = np.random.default_rng(seed)
     state = random_state(rng, vehicle)
     controls = random_controls(rng, state, vehicle)
     end = step(tuple(state), *controls, vehicle)
     motion = exact_motion(state, controls, np.linspace(0.0, vehicle.dt, 21), vehicle)
     corners = footprints(motion, vehicle)  # [21, B, 4, 2]
-    for at, half in (tuple(state), corners[:11]), (end, corners[10:]):
+    covered = ((tuple(state), corners[:11]), (end, corners[10:]))
+    if vehicle.first_order:
+        covered = ((end, corners),)  # whose speed and steering are those of the whole step
+    for at, half in covered:
         for number, box in enumerate(swept_bodies(at, vehicle)):
             ahead, left = _in_frame_of(box, half[:, number])
             assert np.abs(ahead).max() <= box[4] + 1e-9
@@ -88,15 +91,19 @@ def test_the_boxes_of_both_ends_of_a_step_cover_the_bodies_in_its_halves(vehicle
 @given(seed=seeds)
 def test_swept_bodies_lie_around_the_footprints(vehicle: Vehicle, seed: int) -> None:
     state = random_state(np.random.default_rng(seed), vehicle)
+    middle, exact = state, 1e-9
+    if vehicle.first_order:  # that of the step into the state, to the error of a Runge-Kutta step
+        exact = 1e-5
+        middle = exact_motion(state, np.zeros(2), np.array([-0.5 * vehicle.dt]), vehicle)[0]
     for box, corners in zip(
-        swept_bodies(tuple(state), vehicle), footprints(state[np.newaxis], vehicle)[0], strict=True
+        swept_bodies(tuple(state), vehicle), footprints(middle[np.newaxis], vehicle)[0], strict=True
     ):
-        assert box[:2] == pytest.approx(corners.mean(axis=0), abs=1e-9)
+        assert box[:2] == pytest.approx(corners.mean(axis=0), abs=exact)
         along = (corners[1] - corners[0]) / np.linalg.norm(corners[1] - corners[0])
-        assert box[2:4] == pytest.approx(along, abs=1e-9)
+        assert box[2:4] == pytest.approx(along, abs=exact)
         ahead, left = _in_frame_of(box, corners)
-        assert np.abs(ahead).max() < box[4]
-        assert np.abs(left).max() < box[5]
+        assert np.abs(ahead).max() <= box[4] + exact  # who stands needs no margin
+        assert np.abs(left).max() <= box[5] + exact
 
 
 def _in_frame_of(box: Box, points: Floats) -> tuple[Floats, Floats]:
