@@ -20,7 +20,7 @@ from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
-from planners.world.vehicles.vehicle import CAR, Vehicle, state_names, trailers_of
+from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names, trailers_of
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
 LARGEST_HEADING: Final = 10_000.0  # radians; of more turns the last digits are lost
@@ -68,7 +68,10 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if entries > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"
     if not start_is_free:
-        return f"start footprint at {_point(problem.start)} is not free or leaves the bounds; move the start"
+        return (
+            f"start footprint of {name_of(vehicle)} at {_point(problem.start)} is not free or leaves the "
+            "bounds; move the start, or name the vehicle that the problem is for"
+        )
     if not goal_is_free:
         return f"goal centre {_point(problem.goal)} lies in an obstacle or out of bounds; move the goal"
     return None

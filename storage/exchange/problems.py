@@ -25,7 +25,14 @@ from storage.exchange.problem_files import (
 from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
 from storage.fields import number_of, short, text_of
 from storage.places.files import whole_file, write_json
-from storage.vehicles.stated_vehicle import as_text, refuse_another_driver, stated_vehicle, statement_of
+from storage.vehicles.recorded_vehicle import record_of
+from storage.vehicles.stated_vehicle import (
+    FIELD,
+    as_text,
+    refuse_another_driver,
+    stated_vehicle,
+    statement_of,
+)
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
 UNKNOWN_CLASS: Final = "unknown"
@@ -145,14 +152,18 @@ def vehicle_of_problems(path: Path) -> Vehicle | None:
     return None
 
 
-def write_problems(path: Path, problems: Sequence[Problem], vehicle: Vehicle = CAR) -> None:
+def write_problems(
+    path: Path, problems: Sequence[Problem], vehicle: Vehicle = CAR, *, for_it_alone: bool = False
+) -> None:
     """Write ``problems`` for a ``vehicle`` to ``path``, all or none, in the format of its ending.
 
+    The file states its vehicle; the car only if the problems are ``for_it_alone``, as those of a family are.
     Each convex piece becomes a polygon; ``groups`` says which pieces belong to one obstacle. Files hold real
     metres, which are a problem's own lengths times its scale. Reading gives the same problems back: exactly,
     or up to the last digit if the scale is not 1.
     """
-    rows = [fields_of(problem, vehicle) | statement_of(vehicle) for problem in problems]
+    statement = {FIELD: record_of(vehicle)} if for_it_alone else statement_of(vehicle)
+    rows = [fields_of(problem, vehicle) | statement for problem in problems]
     match format_of(path):
         case ".json":
             if len(rows) != 1:
@@ -187,7 +198,7 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
     missing = [name for name in _REQUIRED if fields.get(name) is None]
     if missing:
         raise ValueError(f"field {missing[0]} is missing; expected {', '.join(_REQUIRED)}")
-    refuse_another_driver(fields, vehicle)
+    refuse_another_driver(stated_vehicle(fields), vehicle)
     start, bounds = numbers_of(fields, "start", 3), numbers_of(fields, "bounds", 4)
     goal = goal_of(fields)
     scale = scale_for_vehicle(fields.get("scale"), vehicle)

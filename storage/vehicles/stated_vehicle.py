@@ -44,14 +44,13 @@ def stated_vehicle(fields: Any) -> Vehicle | None:
     return vehicle
 
 
-def refuse_another_driver(fields: Any, driver: Vehicle) -> None:
-    """Raise ValueError if the ``fields`` of a problem state a vehicle other than the one that drives."""
-    stated = stated_vehicle(fields)
-    if stated is None:
-        return
-    difference = first_difference(definition_of(stated), definition_of(driver))
-    if difference:
+def refuse_another_driver(stated: Vehicle | None, driver: Vehicle) -> None:
+    """Raise ValueError if a problem's ``stated`` vehicle, if there is one, is not the one that drives."""
+    difference = first_difference(definition_of(stated), definition_of(driver)) if stated else ""
+    if stated and difference:
+        alike = name_of(stated) == name_of(driver)
         raise ValueError(
-            f"is for vehicle {name_of(stated)}, but {name_of(driver)} is to drive: {difference}; name the "
-            "problem's vehicle with --vehicle, use a memory of it, or leave out the field vehicle"
+            f"is for vehicle {name_of(stated)}, but {name_of(driver)} is to drive"
+            f"{f': {difference}' if alike else ''}; leave out --vehicle, or use a memory of the problem's "
+            "vehicle; or, if any vehicle is meant, leave out the field vehicle"
         )

@@ -7,9 +7,11 @@ from pathlib import Path
 from storage.archives.libraries import HEADERS, vehicle_of
 from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import vehicle_of_problems
-from storage.vehicles.vehicle_files import text_of
+from storage.vehicles.stated_vehicle import refuse_another_driver
+from storage.vehicles.vehicle_files import said_vehicle, text_of
 from tasks.registry.model_uris import memory_folder
 from tasks.settings.checks import checked_vehicle
+from tasks.settings.errors import UsageError
 from tasks.settings.run_settings import DEFAULT_VEHICLE
 
 
@@ -22,16 +24,22 @@ def settled_vehicle(given: str | None, problems: Path | None = None, memory: str
         memory: the address of a memory, which is for one vehicle, or None.
 
     Raises:
-        UsageError: there is no vehicle with the given name, or its file is wrong.
+        UsageError: there is no vehicle with the given name, its file is wrong, or the problems are for
+            another.
         StorageError: the problems are damaged, or the memory is missing or damaged.
         RunError: MLflow does not have the memory.
     """
+    is_file = problems is not None and problems.suffix in FORMATS and problems.is_file()
+    stated = vehicle_of_problems(problems) if problems is not None and is_file else None
     if given is not None:
-        return checked_vehicle(given)
-    if problems is not None and problems.suffix in FORMATS and problems.is_file():
-        stated = vehicle_of_problems(problems)
-        if stated is not None:
-            return text_of(stated)
+        driver = checked_vehicle(given)
+        try:
+            refuse_another_driver(stated, said_vehicle(driver))
+        except ValueError as error:
+            raise UsageError(f"{problems} {error}.") from None
+        return driver
+    if stated is not None:
+        return text_of(stated)
     with memory_folder(memory) as folder:
         for place in () if folder is None else (folder, *sorted(folder.glob("memories/[!.]*"))):
             if any((place / header).is_file() for header in HEADERS):

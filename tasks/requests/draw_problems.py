@@ -48,7 +48,7 @@ def draw_problems(
     except ValueError as error:
         raise UsageError(str(error)) from None
     drawn = [source.draw(seed, index) for index in range(problems)]
-    write_problems(out, drawn, driven)
+    write_problems(out, drawn, driven, for_it_alone=name in FAMILIES)
     if drawing is not None:
         _picture(drawn, driven, drawing)
 

@@ -23,7 +23,8 @@ from tasks.registry.settled_vehicle import settled_vehicle
 from tests.tasks.served import write_memory
 from tests.worlds import problem_of, strewn
 
-BUS = read_vehicle(Path(__file__).parents[3] / "docs" / "vehicles" / "bus.yaml")
+BUS_FILE = Path(__file__).parents[3] / "docs" / "vehicles" / "bus.yaml"
+BUS = read_vehicle(BUS_FILE)
 
 
 @pytest.mark.parametrize("ending", [".json", ".jsonl", ".parquet"])
@@ -78,7 +79,25 @@ def test_who_names_no_vehicle_gets_that_of_the_problem_or_of_the_memory(
     save_library(Path("theirs"), gathered_library("general", CAR_1_TRAILER, [("asked", plan)]))
     assert settled_vehicle(None, Path("any.json"), "theirs") == "car-1-trailer"
     assert settled_vehicle(None, Path("own.json"), "theirs") == "differential-drive"
-    assert settled_vehicle("car", Path("own.json"), "theirs") == "car"
+    assert settled_vehicle("car", Path("any.json"), "theirs") == "car"
+
+
+@pytest.mark.parametrize("command", ["plan", "optimise", "solve", "gather"])
+@pytest.mark.parametrize(("drawn", "given"), [("car", "differential-drive"), ("bus.yaml", "car")])
+def test_a_family_is_for_the_vehicle_it_was_drawn_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str, drawn: str, given: str
+) -> None:
+    file, out = tmp_path / "slot.json", tmp_path / "out.parquet"
+    vehicle = str(BUS_FILE) if drawn == "bus.yaml" else drawn
+    draw = ["draw", "parallel", "--problems", "1", "--vehicle", vehicle, "--out", str(file)]
+    assert call(draw) == 0
+    assert vehicle_of_problems(file) is not None
+    wanted = [] if command in ("plan", "optimise") else ["--out", str(out)]
+    assert call([command, str(file), "--vehicle", given, *wanted]) != 0
+    told = capsys.readouterr().err
+    assert f"is for vehicle {drawn.partition('.')[0]}, but {given} is to drive" in told
+    assert told.count("\n") == 1
+    assert not out.exists()
 
 
 def test_a_file_names_the_vehicle_of_all_its_problems_or_of_none(tmp_path: Path) -> None:
