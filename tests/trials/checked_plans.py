@@ -17,7 +17,7 @@ from rich.console import Console
 
 from planners.world.problem import Plan, Problem
 from tests.trials.car_checker import wrong_with
-from tests.trials.judged_plans import KINDS, attempts
+from tests.trials.judged_plans.canonical_plans import KINDS, attempts
 
 
 def car_plans(seed: int) -> Iterator[tuple[Problem, str, Plan]]:
@@ -26,7 +26,7 @@ def car_plans(seed: int) -> Iterator[tuple[Problem, str, Plan]]:
         if KINDS[index % len(KINDS)][0] != "car":
             continue
         met: set[bytes] = set()
-        for problem, _, source, attempt in attempts(seed, index):
+        for problem, _, _, source, attempt in attempts(seed, index):
             plan = attempt.plan
             if plan is not None and (key := plan.states.tobytes()) not in met:
                 met.add(key)
