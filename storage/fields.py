@@ -97,6 +97,16 @@ def number_of(value: object, name: str) -> float:
         return math.inf  # which the checks refuse
 
 
+def degrees_hint(
+    name: str, angle: float, most: float = math.tau, why: str = "more than a full turn"
+) -> str | None:
+    """What to say of an ``angle`` beyond ``most`` radians, which is hardly meant so; None up to there."""
+    if abs(angle) <= most:
+        return None
+    meant = f"{math.radians(angle):.4g} rad"
+    return f"{name} is {angle:g} rad, {why}; if degrees are meant, {angle:g} of them are {meant}"
+
+
 def scale_of(value: object) -> float:
     """Real metres in a canonical metre; 1 for None. Raises ValueError beyond the limits."""
     scale = 1.0 if value is None else number_of(value, "scale")

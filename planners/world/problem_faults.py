@@ -85,7 +85,8 @@ def _start_fault(problem: Problem, vehicle: Vehicle) -> str | None:
     for name, value in zip(names, problem.start_motion, strict=False):
         low, high = _limits(name, vehicle)
         if not low <= value <= high:
-            return f"start {name} is {value:g}; the vehicle allows {low:g} to {high:g}"
+            unit = {"speed": "m/s", "turn_rate": "rad/s"}.get(name, "rad")
+            return f"start {name} is {value:g} {unit}; the vehicle allows {low:g} to {high:g}"
     return None
 
 

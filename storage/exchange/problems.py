@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -22,7 +23,13 @@ from storage.exchange.problem_files import (
     raw_problems,
     raw_slice,
 )
-from storage.exchange.question_fields import goal_of, numbers_of, question_fields, start_motion_of
+from storage.exchange.question_fields import (
+    goal_of,
+    hint_of_degrees,
+    numbers_of,
+    question_fields,
+    start_motion_of,
+)
 from storage.fields import number_of, short, text_of
 from storage.places.files import whole_file, write_json
 from storage.vehicles.recorded_vehicle import record_of
@@ -35,6 +42,7 @@ from storage.vehicles.stated_vehicle import (
 )
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
+_LOG = logging.getLogger(__name__)
 UNKNOWN_CLASS: Final = "unknown"
 _MIXED: Final = (
     "names its vehicle where the first problem names none, or the other way round; put problems for "
@@ -106,11 +114,11 @@ def problems_or_faults(path: Path, vehicle: Vehicle = CAR) -> Iterator[tuple[str
 
 def problems_or_faults_of(piece: ProblemSlice, vehicle: Vehicle = CAR) -> Iterator[tuple[str, Problem | str]]:
     """Like ``problems_or_faults``, for the slice ``piece``; an id may occur in another slice, too."""
-    return _checked(piece.path, raw_slice(piece), vehicle)
+    return _checked(piece.path, raw_slice(piece), vehicle, warns=piece.first == 1)
 
 
 def _checked(
-    path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle
+    path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle, *, warns: bool = True
 ) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
     first = None  # whether the first problem states its vehicle
@@ -131,6 +139,10 @@ def _checked(
             yield where, f'id "{problem.id}" occurs twice; give every problem its own'
             continue
         seen.add(problem.id)
+        hint = hint_of_degrees(problem) if warns else None
+        if hint is not None:
+            _LOG.warning("%s: %s.", with_id, hint)
+            warns = False
         yield where, problem
 
 

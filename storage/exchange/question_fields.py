@@ -9,13 +9,14 @@ from typing import Any, Final, NamedTuple
 from planners.world.arrays import Point
 from planners.world.problem import GOAL_RADIUS, Arrival, Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of, state_names
-from storage.fields import number_of, short
+from storage.fields import degrees_hint, number_of, short
 
 STARTS: Final = {"start_speed": "speed", "start_steering": "steering", "start_turn_rate": "turn_rate"}
 ENDS: Final = ("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance")
 QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
 POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
 _NAME_IT: Final = "name the vehicle that the problem is for (--vehicle)"
+ANY_HEADING: Final = 3.15  # rad; half a turn, rounded up, allows any heading
 ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
 
 
@@ -116,6 +117,21 @@ def question_fields(problem: Problem, vehicle: Vehicle) -> dict[str, Any]:
     if arrival.hitches:
         goal |= {"goal_hitch": list(arrival.hitches), "goal_hitch_tolerance": list(arrival.hitch_tolerances)}
     return start | goal
+
+
+def hint_of_degrees(problem: Problem) -> str | None:
+    """What to say of a problem with angles that are hardly meant as radians, or None.
+
+    A heading may have turns added, so it is not an error.
+    """
+    arrival = problem.arrival or Arrival()
+    return (
+        degrees_hint("start heading", problem.start[2])
+        or degrees_hint("goal heading", arrival.heading or 0.0)
+        or degrees_hint(
+            "goal_tolerance", arrival.heading_tolerance, ANY_HEADING, "which any heading is within"
+        )
+    )
 
 
 def numbers_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
+from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
@@ -39,6 +41,7 @@ FIELDS: Final = (
     *("duration_s", "first_speed_mps", "planning_ms", "retrieval_ms"),
 )
 RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of planning that a memory takes
+_LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass
@@ -108,6 +111,9 @@ def drive_route(
     check_picture(drawing)
     check_known("format", [] if map_format is None else [map_format], FORMATS)
     pose = _numbers_of(start, 3, "--from", "x,y,heading in metres and radians")
+    hint = degrees_hint("The heading of --from", pose[2])
+    if hint is not None:
+        _LOG.warning("%s.", hint)
     goals_m = [(x, y) for x, y in (_numbers_of(goal, 2, "--to", "x,y in metres") for goal in goals)]
     if not goals_m:
         raise UsageError("There is no goal: give --to x,y once or more often.")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,37 @@ def test_a_scaled_problem_is_the_canonical_one_in_lengths_outside(tmp_path: Path
     assert read_imported(tmp_path / "r.parquet")[0].scale == scale
 
 
+@pytest.mark.parametrize(
+    ("fields", "hinted"),
+    [
+        ({}, None),
+        ({"start": [0.0, 0.0, -math.tau]}, None),
+        ({"start": [0.0, 0.0, 45]}, "start heading is 45 rad, more than a full turn; .* 0.7854 rad"),
+        ({"start": [0.0, 0.0, -90.5]}, "start heading is -90.5 rad"),
+        ({"goal": [50.0, 50.0, math.tau]}, None),
+        ({"goal": [50.0, 50.0, 180]}, "goal heading is 180 rad"),
+        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, math.pi]}, None),
+        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, 5]}, "goal_tolerance is 5 rad"),
+    ],
+)
+@pytest.mark.parametrize("ending", [".jsonl", ".parquet"])
+def test_degrees_are_warned_of_once_and_taken_as_the_radians_that_they_may_be(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, fields: dict[str, Any], hinted: str | None, ending: str
+) -> None:
+    path = tmp_path / f"turned{ending}"
+    usual = {name: value for name, value in GOOD.items() if name != "goal_radius"}
+    rows = [usual | fields | {"id": name} for name in ("one", "two")]
+    if ending == ".jsonl":
+        path.write_text("\n".join(map(json.dumps, rows)))
+    else:
+        pq.write_table(pa.Table.from_pylist(rows), path)
+    first, _ = read_problems(path)
+    assert first.start[2] == rows[0]["start"][2]
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) == (hinted is not None)
+    assert hinted is None or re.search(rf"id 'one'\): {hinted}", told[0])
+
+
 def test_a_missing_id_comes_from_the_file_and_a_missing_class_is_unknown(tmp_path: Path) -> None:
     nameless = {name: value for name, value in GOOD.items() if name not in ("id", "class")}
     (tmp_path / "mine.jsonl").write_text(f"{json.dumps(nameless)}\n{json.dumps(nameless)}\n")
@@ -189,7 +221,7 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal": [50, 50, 0, 0]}, "goal must be a list of 2 numbers, or 3"),
         ({"goal": [50, 50, math.nan]}, "has goal_radius"),
         ({"goal_tolerance": [0.1, 0.1]}, "has goal_tolerance, but a place has goal_radius"),
-        ({"start_speed": 9}, "start speed is 9; the vehicle allows -1 to 4"),
+        ({"start_speed": 9}, "start speed is 9 m/s; the vehicle allows -1 to 4"),
         ({"start_speed": math.nan}, "start speed is nan"),
         ({"start_speed": "fast"}, "start_speed must hold numbers"),
         ({"start_steering": -1}, "start steering is -1"),
