@@ -82,19 +82,27 @@ def polish(
     barrier = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle), 0.0)
     arriving = problem.arrival not in (None, Arrival())
     used = 0
-    if arriving and isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
+    drives = [(states, plan.controls[:steps], best)]
+    if arriving:
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         found, used = quickest(states, model, interior, goal, vehicle, scene, barrier, iterations, until)
         if found is not None and len(found.controls) < best:
-            return Polished(found, used)
-    model.states[: steps + 1] = model.best_states[: steps + 1] = states
-    model.controls[:steps] = model.best_controls[:steps] = plan.controls[:steps]
-    descended = _shortened if arriving else _descended
-    best, more = descended(model, steps, best, goal, barrier, vehicle, scene, iterations - used, until)
-    if best == NEVER:
-        return Polished(None, used + more)
-    found = Plan(model.best_states[: best + 1].copy(), model.best_controls[:best].copy(), vehicle.dt)
-    return Polished(found, used + more)
+            if isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
+                return Polished(found, used)  # which pressing makes hardly any quicker
+            drives.insert(0, (found.states, found.controls, len(found.controls)))
+    lower = _shortened if arriving else _descended
+    better: Plan | None = None
+    for states, controls, best in drives:
+        steps = len(controls)
+        model.states[: steps + 1] = model.best_states[: steps + 1] = states
+        model.controls[:steps] = model.best_controls[:steps] = controls
+        least, more = lower(model, steps, best, goal, barrier, vehicle, scene, iterations - used, until)
+        used += more
+        if least < (NEVER if better is None else len(better.controls)):
+            better = Plan(
+                model.best_states[: least + 1].copy(), model.best_controls[:least].copy(), vehicle.dt
+            )
+    return Polished(better, used)
 
 
 def driven_near(

@@ -10,6 +10,8 @@ import math
 from time import perf_counter
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from planners.optimisation.descent import steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.guesses import resampled
@@ -25,8 +27,9 @@ from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS
+from planners.world.jit import jit
 from planners.world.problem import Plan
-from planners.world.vehicles.dynamics import control_limits, simulate
+from planners.world.vehicles.dynamics import admissible, control_limits, load, simulate, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
@@ -220,7 +223,7 @@ def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     """The drive that the controls in ``drive.model`` lead to, if it is free and arrives as asked."""
     start = drive.model.states[0].copy()
     controls = drive.model.controls[:steps].copy()
-    states = simulate(start, controls, vehicle)
+    states = _keep_within(controls, start, vehicle)
     most = control_limits(vehicle)[0]
     asked = min(max(states[-1, 3], drive.asked[LEAST_SPEED]), drive.asked[MOST_SPEED])
     missing = (asked - states[-1, 3]) / vehicle.dt
@@ -235,3 +238,16 @@ def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     if not arrives or count_free_prefix(states, vehicle, drive.scene) <= steps:
         return None
     return Plan(states, controls, vehicle.dt)
+
+
+@jit
+def _keep_within(controls: Floats, start: Floats, vehicle: Vehicle) -> Floats:
+    """Reduce ``controls [T - 1, 2]`` that lead past a limit, and return the states ``[T, S]``."""
+    states = np.empty((controls.shape[0] + 1, start.shape[0]))
+    for c in range(start.shape[0]):
+        states[0, c] = start[c]
+    for k in range(controls.shape[0]):
+        state = load(states, k, vehicle)
+        controls[k, 0], controls[k, 1] = admissible(state, controls[k, 0], controls[k, 1], vehicle)
+        store(states, k + 1, step(state, controls[k, 0], controls[k, 1], vehicle))
+    return states

@@ -22,19 +22,27 @@ from planners.world.geometry.collision import scene_of
 from planners.world.goal import goal_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
 from planners.world.workspace import Workspace
+from tests.planners.world.motions import KINDS
 from tests.worlds import box, problem_of
 
 WORKSPACE = Workspace()
 STRENGTH = 3e-3
+TRAIN = KINDS["car-first-order-2-trailers"]._replace(trailers=CAR_1_TRAILER.trailers)
+FIRST_ORDER: dict[str, Vehicle] = {
+    "car": KINDS["car-first-order"],
+    "unicycle": KINDS["unicycle-first-order"],
+    "train": TRAIN,
+}
+MORE: dict[str, Vehicle] = FIRST_ORDER | {"differential-drive": DIFFERENTIAL_DRIVE}
 BARRIER = Barrier(0.01, 0.3, 0.0, math.inf, 0.003)
 
 
-def driven(controls: Floats, *obstacles: np.ndarray) -> tuple[Problem, Plan]:
+def driven(controls: Floats, *obstacles: np.ndarray, vehicle: Vehicle = CAR) -> tuple[Problem, Plan]:
     """A drive from the middle of the map, and the problem to arrive where it ends, at rest."""
     empty = replace(problem_of(list(obstacles)), start=(25.0, 25.0, 0.0))
-    states = simulate(start_state(empty), controls, CAR)
+    states = simulate(start_state(empty, vehicle), controls, vehicle)
     arrival = Arrival(float(states[-1, 2]), 0.05, 0.0, 0.0)
     problem = replace(empty, goal=(states[-1, 0], states[-1, 1]), goal_radius=0.1, arrival=arrival)
     return problem, Plan(states, controls)
@@ -154,6 +162,39 @@ def test_straight_ahead_it_takes_the_least_time_that_there_is(
     assert better is not None
     assert faults(problem, better) == []
     assert better.duration_s <= least + 2.5 * CAR.dt
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    name=st.sampled_from(list(FIRST_ORDER)),
+    metres=st.floats(1.0, 12.0),
+    slowly=st.floats(0.1, 1.0),
+    waits=st.integers(0, 10),
+)
+def test_of_first_order_it_takes_only_the_steps_at_full_speed_and_one_to_stand(
+    name: str, metres: float, slowly: float, waits: int
+) -> None:
+    vehicle = FIRST_ORDER[name]
+    step_m = slowly * vehicle.max_speed * vehicle.dt
+    speeds = np.array([*[slowly * vehicle.max_speed] * math.ceil(metres / step_m), *[0.0] * (1 + waits)])
+    rates = np.diff(speeds, prepend=0.0) / vehicle.dt
+    problem, plan = driven(np.column_stack([rates, np.zeros_like(rates)]), vehicle=vehicle)
+    better = polish(problem, plan, vehicle, scene_of(problem), WORKSPACE).plan
+    assert better is not None
+    assert faults(problem, better, vehicle) == []
+    way = math.dist(problem.start[:2], problem.goal) - problem.goal_radius
+    assert len(better.controls) <= math.ceil(way / (vehicle.max_speed * vehicle.dt)) + 2
+
+
+@settings(max_examples=6, deadline=None)
+@given(name=st.sampled_from(list(MORE)), turns=st.integers(1, 4))
+def test_whoever_drives_it_a_manoeuvre_becomes_quicker_and_stays_right(name: str, turns: int) -> None:
+    vehicle = MORE[name]
+    problem, plan = driven(manoeuvre(turns), vehicle=vehicle)
+    better = polish(problem, plan, vehicle, scene_of(problem), WORKSPACE).plan
+    assert better is not None
+    assert faults(problem, better, vehicle) == []
+    assert better.duration_s < 0.9 * plan.duration_s
 
 
 @pytest.mark.parametrize("turns", [2, 4, 5])
