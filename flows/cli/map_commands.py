@@ -83,7 +83,7 @@ def gather(
         sources: Classes (curves, random, trap), maps, folders of worlds: questions are drawn in them, on maps
             and in worlds in their part for training. Families of manoeuvres: these are drawn. Files of
             problems: these are the questions.
-        out: Folder of the library, which may replace an earlier one.
+        out: Folder of the library, a new one.
         plans: How many questions to have answered; where fewer can be, the library holds those.
         poses: Share of the drawn questions that ask for a pose, not for a place.
         difficulty: Difficulty of classes and families.
@@ -145,7 +145,7 @@ def adapt(
         memory: Folder of a memory, a library or a run, or a model in MLflow.
         vehicle: Who is to drive: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of
             another.
-        out: Folder of the new memory or library, which may replace an earlier one.
+        out: Folder of the new memory or library, which must not be there yet.
         seed: Decides the problems by which the plans of a memory are ranked anew.
         workers: Worker processes; default one for each core.
     """

@@ -13,7 +13,7 @@ from planners.memory.plans.plan_arrays import StoredPlans
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.archives.archive import archived_vehicle, read_archive, write_archive
-from storage.archives.memories import is_memory, load_memory
+from storage.archives.memories import load_memory
 from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
 from storage.errors import StorageError
 from storage.fields import scale_of, short, text_of
@@ -60,17 +60,6 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
     except (KeyError, TypeError, ValueError, StorageError) as error:
         reason = str(error).rstrip(".")
         raise StorageError(f"{folder} is not a complete library ({reason}); gather it again.") from None
-
-
-def is_library(folder: Path) -> bool:
-    """Whether a ``folder`` holds a library, complete or not, and nothing else."""
-    names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
-    return _HEADER in names and names <= {_HEADER, *PLAN_FILES}
-
-
-def is_memory_or_library(folder: Path) -> bool:
-    """Whether a ``folder`` holds a memory or a library, complete or not, and nothing else."""
-    return is_memory(folder) or is_library(folder)
 
 
 def vehicle_of(folder: Path) -> Vehicle:

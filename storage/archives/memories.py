@@ -120,12 +120,6 @@ def load_memory(folder: Path, vehicle: Vehicle = CAR) -> Memory:
         raise StorageError(f"{folder} is not a complete memory ({reason}); build it again.") from None
 
 
-def is_memory(folder: Path) -> bool:
-    """Whether a ``folder`` holds a memory, complete or not, and nothing else."""
-    names = {file.name for file in folder.iterdir()} if folder.is_dir() else set()
-    return f"{_KIND}.json" in names and names <= {f"{_KIND}.json", _LISTS, _UNREAD, *_FILES}
-
-
 def _swept(boxes: Floats, masks: Bits, plans: StoredPlans, vehicle: Vehicle) -> tuple[PlanSweeps, Bits]:
     """The sweeps with the stored boxes, and the masks; computed if all stored boxes have other sizes.
 

@@ -18,7 +18,6 @@ from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.archives.libraries import (
     HEADERS,
-    is_memory_or_library,
     load_memory_or_library,
     save_library,
     vehicle_of,
@@ -34,7 +33,7 @@ from tasks.requests.part_folder import (
     do_here,
     part_workers,
     parts_folder,
-    refuse_foreign,
+    refuse_existing,
     unfinished,
 )
 from tasks.settings.checks import check_outputs, check_seed, checked_vehicle
@@ -65,13 +64,13 @@ def adapt(
     Args:
         memory: the address of a memory or a library: a folder, a run, or a model in MLflow.
         vehicle: the other vehicle: a name, or the path of a file.
-        out: the folder to write; it may replace an earlier memory or library.
+        out: the folder to write, which must not be there.
         seed: seed of the problems from which the readout of a memory is fitted again.
         workers: number of worker processes.
         flow: does the pieces in worker processes; None does everything in this process.
 
     Raises:
-        UsageError: a name or a number is wrong, or ``out`` exists and is something else.
+        UsageError: a name or a number is wrong, or ``out`` exists.
         StorageError: the memory cannot be read.
         RunError: no plan can be kept.
     """
@@ -79,7 +78,7 @@ def adapt(
     new = said_vehicle(checked_vehicle(vehicle))
     with memory_at(memory) as folder:
         check_outputs([folder], [out])
-        refuse_foreign(out, is_memory_or_library, "memory or library")
+        refuse_existing(out)
         old = vehicle_of(folder)
         stored = load_memory_or_library(folder, old)
         header = next(folder / name for name in HEADERS if (folder / name).is_file())

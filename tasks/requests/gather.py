@@ -15,7 +15,7 @@ from dashboards.cells import NOTHING, CellTable, decimal
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from planners.world.classes.problem_classes import DIFFICULTIES
-from storage.archives.libraries import is_library, save_library
+from storage.archives.libraries import save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
@@ -30,7 +30,7 @@ from tasks.requests.part_folder import (
     do_here,
     part_workers,
     parts_folder,
-    refuse_foreign,
+    refuse_existing,
     unfinished,
 )
 from tasks.requests.question_sources import is_drawn
@@ -81,7 +81,7 @@ def gather(
 
     Args:
         sources: names of classes and families; paths of maps, of worlds or of files of problems.
-        out: the folder to write.
+        out: the folder to write, which must not be there.
         plans: how many questions to have answered.
         poses: the share of drawn questions that ask for a pose; the others ask for a place.
         difficulty: of classes and families: easy, standard or hard.
@@ -94,7 +94,7 @@ def gather(
         what came of each source.
 
     Raises:
-        UsageError: a number is out of range, or ``out`` would be written over a source.
+        UsageError: a number is out of range, or ``out`` exists.
         StorageError: a source cannot be read.
         RunError: no question could be answered.
     """
@@ -105,7 +105,7 @@ def gather(
     if difficulty != "standard" and not any(map(is_drawn, sources)):
         raise UsageError("--difficulty is of classes and families, and none is among the sources.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
-    refuse_foreign(out, is_library, "library")
+    refuse_existing(out)
     request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
     with unfinished(out):
         if flow is None or workers == 1 or plans <= FEW_PLANS:

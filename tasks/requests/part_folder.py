@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,10 +114,12 @@ def is_readable(shard: Path, key: str) -> bool:
         return False
 
 
-def refuse_foreign(out: Path, is_own: Callable[[Path], bool], called: str) -> None:
-    """Raise UsageError if ``out`` exists, unless it is an empty folder or ``is_own`` accepts it."""
-    if out.exists() and not (is_own(out) or (out.is_dir() and not any(out.iterdir()))):
-        raise UsageError(f"{out} exists and is not a {called}; give --out the name of a new folder.")
+def refuse_existing(out: Path) -> None:
+    """Raise UsageError if ``out`` exists, unless it is an empty folder."""
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise UsageError(
+            f"{out} exists and is left as it is; give --out the name of a new folder, or remove it."
+        )
 
 
 @contextmanager

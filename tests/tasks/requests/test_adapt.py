@@ -127,11 +127,11 @@ def test_plans_that_the_vehicle_cannot_drive_are_told_in_a_line(
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("out", ["thesis", "memory"])
-def test_nothing_is_replaced_but_an_earlier_result(place: Path, tmp_path: Path, out: str) -> None:
+@pytest.mark.parametrize("out", ["thesis", "memory", "library"])
+def test_nothing_is_replaced(place: Path, tmp_path: Path, out: str) -> None:
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "page.tex").write_text("words")
-    target = tmp_path / out if out == "thesis" else place / out  # of which it is made
+    target = tmp_path / out if out == "thesis" else place / out  # of which it is made, or another
     before = sorted(target.rglob("*"))
     assert call(["adapt", str(place / "memory"), "--vehicle", "car", "--out", str(target)]) == 2
     assert sorted(target.rglob("*")) == before

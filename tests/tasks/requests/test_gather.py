@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -45,6 +46,14 @@ def test_the_questions_of_a_file_are_asked_as_they_stand(
     assert call([*asked, "--plans", "2"]) == 0
     library = load_library(tmp_path / "library")
     assert library.questions == ("strewn-1-10", "strewn-2-10")
+    capsys.readouterr()
+    first = {file.name: file.read_bytes() for file in (tmp_path / "library").iterdir()}
+    assert call([*asked, "--plans", "3"]) == 2  # the library is kept
+    assert {file.name: file.read_bytes() for file in (tmp_path / "library").iterdir()} == first
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "--out" in told
+    shutil.rmtree(tmp_path / "library")
     assert call([*asked, "--plans", "3"]) == 3  # there are no more
     told = capsys.readouterr().err
     assert "2 of 3" in told
@@ -90,7 +99,7 @@ def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("name", ["thesis", "thesis/library", "problems.jsonl", "."])
-def test_nothing_that_is_there_is_replaced_but_a_library(
+def test_nothing_that_is_there_is_replaced(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     (tmp_path / "thesis").mkdir()
@@ -105,8 +114,9 @@ def test_nothing_that_is_there_is_replaced_but_a_library(
 
 
 def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: Path) -> None:
-    problems, out = tmp_path / "asked.jsonl", tmp_path / "library"
+    problems = tmp_path / "asked.jsonl"
     for seed in (1, 2):
+        out = tmp_path / f"library-{seed}"
         write_problems(problems, [strewn(seed, 10)])
         gather.gather([str(problems)], out, 1, 0.0, "standard", ImportSettings())
         assert load_library(out).questions == (f"strewn-{seed}-10",)
