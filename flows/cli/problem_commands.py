@@ -187,17 +187,18 @@ def _solve_parts(request: SolveRequest) -> list[PartResult]:
 
 
 def _write_summary(solved: SolvedMany) -> None:
-    outcomes, seconds, _, _ = solved.tally
+    outcomes, seconds, _ = solved.tally
     count, with_plan = len(seconds), sum(n for name, n in outcomes.items() if not name.startswith("("))
     named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
-    speed = f"{solved.solved_now / solved.seconds:,.0f} problems/s"
+    now = solved.solved_now
+    speed = f"{now / solved.seconds:,.0f} problems/s"
     mean_s, median_s, ninth_s = solved.planning_seconds
     driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
         f"planning mean {1e3 * mean_s:.2f} ms, median {1e3 * median_s:.2f} ms, 90 % {1e3 * ninth_s:.2f} ms",
         *([] if driving_s is None else [f"driving  mean {driving_s:.2f} s"]),
-        f"speed    {speed}: {solved.solved_now:,} in {solved.seconds:,.1f} s",
+        *([f"speed    {speed}: {now:,} in {solved.seconds:,.1f} s"] if now else []),
         problems=count,
         solved=with_plan,
         outcomes=dict(outcomes),
@@ -205,6 +206,6 @@ def _write_summary(solved: SolvedMany) -> None:
         planning_median_seconds=median_s,
         planning_p90_seconds=ninth_s,
         driving_mean_seconds=driving_s,
-        solved_now=solved.solved_now,
+        solved_now=now,
         seconds=solved.seconds,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import pyarrow as pa
 
@@ -12,6 +12,8 @@ from storage.errors import StorageError
 from storage.places.mirror import files_in
 from storage.tables.schemas import ATTEMPTS
 from storage.tables.shards import columns_of, read_table, table_of, write_table, write_tables
+
+BATCH_ROWS: Final = 4096
 
 if TYPE_CHECKING:  # pandas takes a fifth of a second to import, and writing rows does not need it
     import pandas as pd
@@ -25,15 +27,24 @@ def write_attempts(path: Path, rows: Sequence[dict[str, Any]], key: str = "") ->
     write_table(path, table_of(rows, ATTEMPTS, "attempt"), key)
 
 
-def join_attempts(path: Path, shards: Sequence[Path]) -> None:
-    """Write the rows of many ``shards`` as one file, with one of them in memory at a time."""
-    write_tables(path, (read_table(shard, ATTEMPTS) for shard in shards), ATTEMPTS)
+def join_attempts(path: Path, shards: Sequence[Path], key: str = "") -> None:
+    """Write the rows of many ``shards`` as one file, with one of them in memory at a time.
+
+    ``key`` says what they were made from.
+    """
+    write_tables(path, (read_table(shard, ATTEMPTS) for shard in shards), ATTEMPTS, key)
 
 
 def attempt_columns(path: Path, names: Sequence[str]) -> dict[str, list[Any]]:
     """The columns ``names`` of the file of attempts at ``path``, as Python values."""
     columns: dict[str, list[Any]] = read_table(path, ATTEMPTS, names).to_pydict()
     return columns
+
+
+def attempt_batches(path: Path, names: Sequence[str]) -> Iterator[dict[str, list[Any]]]:
+    """Like ``attempt_columns``, some thousand rows at a time as Python values."""
+    for batch in read_table(path, ATTEMPTS, names).to_batches(BATCH_ROWS):
+        yield batch.to_pydict()
 
 
 def attempt_records(path: Path) -> list[dict[str, Any]]:

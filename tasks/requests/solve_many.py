@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,8 +18,11 @@ from storage.errors import StorageError
 from storage.exchange.problem_files import raw_slice
 from storage.places.data_folder import open_data_folder
 from storage.places.files import remove_folder
-from storage.tables.attempts import attempt_columns, join_attempts
+from storage.tables.attempts import attempt_batches, attempt_columns, join_attempts
+from storage.tables.shards import shard_is_done
+from tasks.fan_out.keys import key_of
 from tasks.fan_out.progress import progress
+from tasks.inputs.gained_on_the_job import has_gained
 from tasks.registry.model_uris import memory_digest, memory_folder
 from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.part_folder import part_workers, unfinished
@@ -36,19 +40,20 @@ from tasks.settings.errors import UsageError
 if TYPE_CHECKING:
     from tasks.champions.drift_watch import BenchmarkedMemory
 
+_LOG = logging.getLogger(__name__)
 SolveFlow = Callable[[SolveRequest], list[PartResult]]
 
 FEW_PROBLEMS: Final = 1_000  # more are left to workers at once
+TALLIED: Final = ("status", "source", "planning_seconds", "duration_s")
 START_SECONDS: Final = 20.0  # about what a server and workers take to start
 
 
 class Tally(NamedTuple):
-    """Counts and times of all problems; these take 24 bytes of memory for each problem."""
+    """Counts and times of all problems; these take 16 bytes of memory for each problem."""
 
     outcomes: Counter[str]  # problems by the source of their plan, or by the status of a failure, in brackets
     seconds: Floats  # [n] planning times
     driving: Floats  # [n] driving times, NaN where no plan was found
-    repeated_id: str | None  # a message about an id that occurs twice, or None
 
 
 class SolvedMany(NamedTuple):
@@ -83,7 +88,8 @@ def solve_many(
 ) -> SolvedMany:
     """Solve every problem of a file, and write one attempt row each.
 
-    If the command is killed, the same command solves only what is left.
+    If the command is killed, the same command solves only what is left: nothing once it is done, as long as
+    its rows, its plans and what it learned are there.
 
     Args:
         settings: how to solve them.
@@ -115,6 +121,10 @@ def solve_many(
         settings = settings._replace(memory=None if memory is None else str(memory))
         request = SolveRequest(problems, out, settings, memory_digest(memory), plans, learn)
         parts = parts_of(request)
+        key = key_of("solve", [part.key for part in parts])
+        if _is_finished(request, key):
+            _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
+            return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [])
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             begun = sum(len(part.rows_begun()) for part in left)
@@ -128,10 +138,11 @@ def solve_many(
             if faults:
                 raise _malformed(faults)
             seconds = time.monotonic() - began
-            tally = _tally(parts)
-            if tally.repeated_id is not None:
-                raise StorageError(tally.repeated_id)
-            join_attempts(out, [part.shard for part in parts])
+            tally = _tally(attempt_columns(part.shard, TALLIED) for part in parts)
+            repeated = _repeated_id(parts)
+            if repeated is not None:
+                raise StorageError(repeated)
+            join_attempts(out, [part.shard for part in parts], key)
             remove_folder(request.folder)
     solved_now = sum(part.problem_slice.count for part in left) - begun
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request, tally))
@@ -164,21 +175,26 @@ def _malformed(faults: Sequence[str]) -> StorageError:
     )
 
 
-def _tally(parts: Sequence[FilePart]) -> Tally:
+def _is_finished(request: SolveRequest, key: str) -> bool:
+    """Whether an earlier command wrote everything that is asked for, and it is still there."""
+    return (
+        shard_is_done(request.out, key)
+        and (request.plans is None or request.plans.is_dir())
+        and (request.learn is None or has_gained(request.learn))
+    )
+
+
+def _tally(tables: Iterable[dict[str, list[Any]]]) -> Tally:
+    """Count over tables with the columns ``TALLIED``."""
     outcomes: Counter[str] = Counter()
-    seconds, driving, id_hashes = [], [], []
-    for part in parts:
-        rows = attempt_columns(
-            part.shard, ["problem_id", "status", "source", "planning_seconds", "duration_s"]
-        )
+    seconds, driving = [], []
+    for rows in tables:
         outcomes.update(
             source or f"({status})" for source, status in zip(rows["source"], rows["status"], strict=True)
         )
         seconds.append(np.array(rows["planning_seconds"]))
         driving.append(np.array(rows["duration_s"], float))
-        id_hashes.append(np.array([hash(identity) for identity in rows["problem_id"]]))
-    repeated_id = _repeated_id(parts, np.concatenate(id_hashes))
-    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving), repeated_id)
+    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving))
 
 
 def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
@@ -203,8 +219,10 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally
     return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)
 
 
-def _repeated_id(parts: Sequence[FilePart], id_hashes: Floats) -> str | None:
+def _repeated_id(parts: Sequence[FilePart]) -> str | None:
     """A message about a repeated id, found with the hashes of all ids; None if there is none."""
+    ids = (attempt_columns(part.shard, ["problem_id"])["problem_id"] for part in parts)
+    id_hashes = np.concatenate([np.array(list(map(hash, some))) for some in ids])
     order = np.argsort(id_hashes, kind="stable")
     same = np.flatnonzero(id_hashes[order][1:] == id_hashes[order][:-1])
     ends = np.cumsum([part.problem_slice.count for part in parts])

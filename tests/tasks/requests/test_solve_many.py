@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -141,6 +142,32 @@ def test_what_was_finished_before_an_interruption_is_not_done_again(
     assert counting.written == -(-COUNT // SIZE) - 2
     assert equal_but_for_seconds(read_attempts(out), undisturbed)
     assert list(tmp_path.iterdir()) == [out]
+
+
+def test_a_finished_command_is_not_done_again_as_long_as_all_it_wrote_is_there(
+    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, plans, data = (tmp_path / name for name in ("rows.parquet", "plans", "data"))
+    file = tmp_path / "problems.jsonl"
+    shutil.copy(problems, file)
+    first = solve_many(ASSISTANT, file, out, plans, data)
+    assert first.solved_now == COUNT
+    monkeypatch.setattr(Assistant, "__call__", None)  # nothing is attempted
+    rows = out.read_bytes()
+    again = solve_many(ASSISTANT, file, out, plans, data)
+    assert again.solved_now == 0
+    assert out.read_bytes() == rows
+    assert again.tally.outcomes == first.tally.outcomes
+    assert (again.planning_seconds, again.driving_seconds) == (first.planning_seconds, first.driving_seconds)
+    monkeypatch.undo()
+    monkeypatch.setattr(parts, "PART_PROBLEMS", SIZE)
+    assert solve_many(ASSISTANT._replace(seed=2), file, out, plans, data).solved_now == COUNT
+    for lost in (plans, data, out):
+        shutil.rmtree(lost) if lost.is_dir() else lost.unlink()
+        assert solve_many(ASSISTANT._replace(seed=2), file, out, plans, data).solved_now == COUNT
+        assert solve_many(ASSISTANT._replace(seed=2), file, out, plans, data).solved_now == 0
+    file.write_text(file.read_text().replace("curves-easy-11-0", "another"))
+    assert solve_many(ASSISTANT._replace(seed=2), file, out, plans, data).solved_now == COUNT
 
 
 def test_ctrl_c_loses_no_problem_that_was_solved(
