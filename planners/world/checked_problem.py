@@ -63,7 +63,9 @@ def checked_problem(
         points = points - offset
     else:
         offset = (0.0, 0.0)
-    obstacles = cut_polygons(points if scale == 1.0 else points / scale, polygon_starts)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused with its polygon
+        scaled = points if scale == 1.0 else points / scale
+    obstacles = cut_polygons(scaled, polygon_starts)
     if groups is not None:
         ends = np.cumsum([0, *groups])
         obstacles = obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])

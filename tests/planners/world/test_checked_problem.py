@@ -52,3 +52,11 @@ def test_beyond_what_float64_can_say_is_refused_in_one_line() -> None:
     with pytest.raises(ValueError, match="move the origin near the start") as caught:
         asked(2.0 * FARTHEST_M, 0.0)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", [2.0**-6, 1.0])
+def test_a_corner_that_overflows_is_refused_without_a_warning(scale: float) -> None:
+    points = np.array([[1.0, 1.0], [1e308, 1.0], [1.0, 2.0]])
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 the words do not matter
+        checked_problem((0, 0, 0), (5, 5), 1.0, (-9, -9, 9, 9), points, np.array([0, 3]), scale=scale)
+    assert "\n" not in str(caught.value)
