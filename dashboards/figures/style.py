@@ -141,10 +141,14 @@ def logarithmic(axes: Axes, steps: Sequence[float] = (1.0,)) -> None:
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], columns: int) -> None:
-    """A legend of ``handles`` in some ``columns`` at the lower edge of a ``figure``."""
-    figure.legend(
-        handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=_LEGEND_SIZE
-    )
+    """A legend of ``handles`` at the lower edge of a ``figure``, in so many ``columns`` or as many as fit."""
+    for count in range(columns, 0, -1):
+        legend = figure.legend(
+            handles=handles, loc="outside lower left", ncols=count, frameon=False, fontsize=_LEGEND_SIZE
+        )
+        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def legend_alone(axes: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int) -> None:

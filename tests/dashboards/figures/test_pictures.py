@@ -55,6 +55,22 @@ def straight() -> Plan:
     return Plan(simulate(start_state(problem()), controls, CAR), controls)
 
 
+@pytest.mark.parametrize("speed", [0.0, 2.0])
+@pytest.mark.parametrize("arrival", [None, Arrival(0.0, 0.05)])
+@pytest.mark.parametrize("called", ["recalled", "a guess of Follow"])
+def test_the_whole_legend_is_in_the_picture(
+    straight: Plan, speed: float, arrival: Arrival | None, called: str
+) -> None:
+    moving = replace(problem(WALL), start_motion=(speed,), arrival=arrival)
+    for recalled in ((), (straight,)):
+        figure = picture(moving, straight, "", recalled, called=called, collisions=True)
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        shown = legend.get_window_extent()
+        assert 0.0 <= shown.x0 < shown.x1 <= figure.bbox.width
+        assert 0.0 <= shown.y0
+
+
 def texts(figure: Figure) -> list[str]:
     figure.draw_without_rendering()
     return [found.get_text() for found in figure.findobj(Text)]
