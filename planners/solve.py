@@ -28,6 +28,7 @@ from planners.search.registry import PLANNERS
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
+from planners.world.vehicles.reach import least_scale
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
@@ -114,9 +115,15 @@ def solve(
         polished: whether plans to more than a place are polished; else the first is as it was found.
 
     Raises:
-        ValueError: Planner, assist or strategy is unknown, or the memory is missing or of another vehicle or
-            scale.
+        ValueError: Planner, assist or strategy is unknown, the memory is missing or of another vehicle or
+            scale, or the vehicle is too large for collision checks.
     """
+    too_large = least_scale(vehicle)
+    if too_large > 1.0 + 1e-9:
+        raise ValueError(
+            f"vehicle {vehicle.about.name.decode()} is {too_large:.3g} times too large or too fast for "
+            "collision checks: describe it in a vehicle's file, whose scale follows from its size"
+        )
     view = View(problem, workspace)
     if planner not in PLANNERS:
         raise ValueError(f"unknown planner '{planner}': choose one of {', '.join(PLANNERS)}")

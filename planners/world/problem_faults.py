@@ -10,7 +10,6 @@ import numpy as np
 from planners.world.arrays import Bounds, Floats, Integers, Point
 from planners.world.geometry.collision import (
     CELL_M,
-    REACH_M,
     box_is_inside,
     box_meets_piece,
     make_edges,
@@ -20,6 +19,7 @@ from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
+from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names, trailers_of
 
 WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds

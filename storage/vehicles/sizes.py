@@ -3,33 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from planners.world.arrays import Floats
+from planners.world.vehicles.reach import least_scale, paces
 from planners.world.vehicles.vehicle import DifferentialDrive, Trailer, Vehicle, trailers_of
 
-REACH_M: Final = 1.75  # ``planners.world.geometry.collision.REACH_M``, which compiles when it is imported
-ROOM: Final = 1.5  # roadmaps look for places this many times as long as the body
 BEHIND_M: Final = 8.0  # room for trailers behind the start of canonical problems
 SCALES: Final = (2.0**-6, 2.0**6)
 ANGLES: Final = 41  # hitch angles at which bodies may not meet
 
 
-class _Pace(NamedTuple):
-    """The greatest distance that a body's points move in half a step."""
-
-    body: str
-    half_length: float
-    half_width: float
-    half_way: float  # metres
-
-
 def check_sizes(vehicle: Vehicle) -> None:
     """Raise ValueError, the end of a sentence, if a ``vehicle`` moves too far in a step or meets itself."""
     straight = not isinstance(vehicle, DifferentialDrive)  # fast cars do not steer sharply
-    for body, half_length, half_width, half_way in _paces(vehicle, straight):
+    for body, half_length, half_width, half_way in paces(vehicle, straight):
         narrow = min(half_length, half_width)
         if half_way > narrow:
             raise ValueError(
@@ -57,39 +47,14 @@ def scale_for(vehicle: Vehicle) -> float:
     It is the smallest power of two with which planners can check every box and trailers have room behind the
     start. It is 1 for the built-in vehicles.
     """
-    needs = [
-        max(math.hypot(length + way, width + way), ROOM * math.hypot(length, width)) / REACH_M
-        for _, length, width, way in _paces(vehicle)
-    ]
     trailers = trailers_of(vehicle)
     rear = trailers[-1].rear if trailers else vehicle.rear
-    needs.append((sum(trailer.hitch_length for trailer in trailers) + rear) / BEHIND_M)
-    scale = 2.0 ** math.ceil(math.log2(max(needs)))
+    behind = (sum(trailer.hitch_length for trailer in trailers) + rear) / BEHIND_M
+    scale = 2.0 ** math.ceil(math.log2(max(least_scale(vehicle), behind)))
     if not SCALES[0] <= scale <= SCALES[1]:
-        longest = 2.0 * max(length for _, length, _, _ in _paces(vehicle))
+        longest = 2.0 * max(length for _, length, _, _ in paces(vehicle))
         raise ValueError(f"has a body {longest:g} m long; expected a few centimetres to 100 metres")
     return scale
-
-
-def _paces(vehicle: Vehicle, straight: bool = False) -> list[_Pace]:
-    fastest = max(vehicle.max_speed, -vehicle.min_speed)
-    if straight:
-        turn = 0.0
-    elif isinstance(vehicle, DifferentialDrive):
-        turn = vehicle.max_turn_rate
-    else:
-        turn = fastest * math.tan(vehicle.max_steering) / vehicle.wheelbase
-    paces = [_pace("the vehicle", vehicle, fastest, turn, vehicle.dt)]
-    for i, trailer in enumerate(trailers_of(vehicle), start=1):
-        turn = 0.0 if straight else fastest / trailer.hitch_length
-        paces.append(_pace(f"trailer {i}", trailer, fastest, turn, vehicle.dt))
-    return paces
-
-
-def _pace(name: str, body: Vehicle | Trailer, speed: float, turn: float, dt: float) -> _Pace:
-    half_width = 0.5 * body.width
-    way = 0.5 * dt * math.hypot(speed + half_width * turn, max(body.front, body.rear) * turn)
-    return _Pace(name, 0.5 * (body.front + body.rear), half_width, way)
 
 
 def _polygons(body: Vehicle | Trailer) -> list[Floats]:

@@ -16,6 +16,7 @@ from planners.solve import ASSISTS, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
+from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from planners.world.workspace import Workspace
 from tests.planners.clock import ticks
@@ -184,6 +185,16 @@ def test_a_turned_plan_is_driven_by_the_same_controls(memory):
 def test_a_wrong_question_is_refused(memory, planner, assist, k, with_memory, says):
     with pytest.raises(ValueError, match=says):
         solve(problem_of([]), planner, assist, k, memory if with_memory else None)
+
+
+@pytest.mark.parametrize("changed", [{"front": 3.5}, {"width": 3.4}, {"max_speed": 8.0}, {"dt": 0.2}])
+def test_a_vehicle_whose_boxes_reach_farther_than_they_are_checked_is_refused(changed):
+    wider = CAR._replace(**changed)
+    turn = wider.max_speed * np.tan(wider.max_steering) / wider.wheelbase
+    way = 0.5 * wider.dt * np.hypot(wider.max_speed + 0.5 * wider.width * turn, wider.front * turn)
+    assert np.hypot(0.5 * (wider.front + wider.rear) + way, 0.5 * wider.width + way) > REACH_M
+    with pytest.raises(ValueError, match="too large or too fast"):
+        solve(problem_of([]), "lattice", vehicle=wider)
 
 
 @given(seed=st.integers(0, 10**6), count=st.integers(0, 30))

@@ -14,7 +14,6 @@ import numpy as np
 from planners.memory.plans.sweeps import PlanSweeps
 from planners.world.arrays import Bounds, Flags, Floats, Integers, Point, Pose
 from planners.world.geometry.collision import (
-    REACH_M,
     Scene,
     box_is_free,
     box_is_inside,
@@ -25,6 +24,7 @@ from planners.world.geometry.collision import (
 from planners.world.geometry.occupancy import ALL_CELLS, Bits, Drawing
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import BOUNDS, Plan, Problem
+from planners.world.vehicles.reach import REACH_M
 
 START_TOLERANCE = 1e-9  # metres and radians: what turning a problem into the canonical frame rounds away
 NO_PLANS: Final = np.empty(0, np.int32)

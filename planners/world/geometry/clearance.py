@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from planners.world.geometry.collision import NORMAL_X, NORMAL_Y, OFFSET, REACH_M, Scene, X, Y, box_is_free
+from planners.world.geometry.collision import NORMAL_X, NORMAL_Y, OFFSET, Scene, X, Y, box_is_free
 from planners.world.jit import lean
 from planners.world.trigonometry import gap_to_segment, length
+from planners.world.vehicles.reach import REACH_M
 
 
 @lean

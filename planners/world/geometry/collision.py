@@ -16,11 +16,10 @@ from planners.world.jit import inlined, jit, lean
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import State, is_folded, load, swept_bodies
+from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import Vehicle
 
 CELL_M = 2.0  # measured: smaller cells cost more time to fill than they save in checks
-REACH_M = 1.75  # the largest half-diagonal of a box that may be checked
-
 
 NORMAL_X, NORMAL_Y, OFFSET, X, Y = range(5)  # columns of Scene.edges
 FIRST, LAST, FACING = range(3)  # columns of Scene.cell_pieces

@@ -14,7 +14,6 @@ from planners.world.arrays import Floats
 from planners.world.authority.authority_sweeps import prism
 from planners.world.geometry import collision
 from planners.world.geometry.collision import (
-    REACH_M,
     Scene,
     box_is_free,
     box_meets_piece,
@@ -25,6 +24,7 @@ from planners.world.geometry.collision import (
 from planners.world.jit import jit
 from planners.world.problem import BOUNDS, obstacles_of
 from planners.world.vehicles.bodies import footprints
+from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import (
     CAR,
     CAR_1_TRAILER,
