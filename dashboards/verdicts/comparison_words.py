@@ -9,7 +9,7 @@ import pandas as pd
 
 from dashboards.statistics.headline import FEW
 from dashboards.statistics.panels import COMBINED
-from dashboards.verdicts.comparison import ALARM, BETTER, MACHINE, SAME, WORSE
+from dashboards.verdicts.comparison import ALARM, BETTER, MACHINE, SAME, WORSE, alarms
 
 IS_BETTER: Final = "better than"
 IS_WORSE: Final = "worse than"
@@ -44,6 +44,20 @@ def grounds(rows: pd.DataFrame) -> str:
     if len(controls):
         sentences.append("Planning without a memory differs too, so more than the memory has changed.")
     return " ".join(sentences)
+
+
+def main_alarms(rows: pd.DataFrame) -> list[str]:
+    """The ``alarms`` of ``rows``, with those in which nothing but times differs as one."""
+    of_times = rows[(rows["verdict"] == ALARM) & rows["why"].str.startswith(MACHINE)]
+    if len(of_times) < 2:
+        return alarms(rows)
+    least, most = of_times["reduction"].min(), of_times["reduction"].max()
+    range_told = f"{-100.0 * most:+.0f} to {-100.0 * least:+.0f} %"
+    summed = (
+        f"ALARM: {len(of_times)} ways of planning without a memory took {range_told} time: another machine, "
+        "or other load."
+    )
+    return [*alarms(rows.drop(of_times.index)), summed]
 
 
 def _told(judged: pd.DataFrame, verdict: str) -> str:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from flows.cli.run_options import worker_count
-from flows.cli.terminal import write, write_answer, write_files
+from flows.cli.terminal import telling, write, write_answer, write_files
 
 
 def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) -> None:
@@ -40,17 +43,25 @@ def export(run: Path, *, format: str, out: Path) -> None:
     write_files(exported=out)
 
 
-def compare(*runs: Path, out: Path | None = None, measure: bool = False, problems: int | None = None) -> None:
+def compare(
+    *runs: Path,
+    out: Path | None = None,
+    all: Annotated[bool, Parameter(negative=())] = False,
+    measure: bool = False,
+    problems: int | None = None,
+) -> None:
     """Compare runs with the first one, paired by problem: solved, driving, work, and times if measured.
 
     Args:
         runs: Two or more folders of runs, or names of runs in $MOTION_MEMORY_DATA or ./data.
         out: A file that the comparison is also written to: .md, .json or .csv.
+        all: Show every row, not only those that are better or worse; files and --json always have all.
         measure: Measure the memories of both runs in turn, instead of going by what each has measured alone.
         problems: How many test problems of a class to measure; default 300.
     """
     from tasks.reports.compare import compare as task
     from tasks.settings.environment import run_named
 
-    write(*task([run_named(run) for run in runs], out, measure, problems).told())
+    compared = task([run_named(run) for run in runs], out, measure, problems)
+    write(*compared.told(every=all or telling().document is not None))
     write_files(compared=out)

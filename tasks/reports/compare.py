@@ -11,8 +11,9 @@ from typing import Any, Final, NamedTuple
 import pandas as pd
 
 from dashboards.cells import CellTable, as_markdown, markdown_table
-from dashboards.verdicts.comparison import alarms, compare_runs, verdict
+from dashboards.verdicts.comparison import BETTER, WORSE, alarms, compare_runs, verdict
 from dashboards.verdicts.comparison_tables import BY_COUNTS, IN_TURN, comparison_tables
+from dashboards.verdicts.comparison_words import main_alarms
 from storage.errors import StorageError
 from storage.places.data_folder import open_run
 from storage.places.files import whole_file
@@ -34,14 +35,18 @@ class Comparison(NamedTuple):
     how: str  # the measures that decide, in words
     tables: dict[str, pd.DataFrame]  # for each other run, the rows of ``compare_runs``
 
-    def told(self) -> Iterator[str | CellTable]:
-        """All of it in lines and tables."""
+    def told(self, every: bool = True) -> Iterator[str | CellTable]:
+        """All of it in lines and tables, or only what is better or worse unless ``every`` row is wanted."""
         yield CellTable("What differs", ("setting", *self.names), [self.different], "settings")
         yield self.how
         for name, rows in self.tables.items():
             yield f"{name} against {self.names[0]}: {verdict(rows)}"
-            yield from alarms(rows)
-            yield from comparison_tables(rows)
+            yield from alarms(rows) if every else main_alarms(rows)
+            shown = rows if every else rows[rows["verdict"].isin([BETTER, WORSE])]
+            if len(shown):
+                yield from comparison_tables(shown)
+            if len(shown) < len(rows):
+                yield f"{len(rows) - len(shown)} rows without a difference are left out; --all shows them."
 
 
 def compare(

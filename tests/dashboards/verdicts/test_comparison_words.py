@@ -5,8 +5,16 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from dashboards.verdicts.comparison import BETTER, SAME, WORSE, compare_runs
-from dashboards.verdicts.comparison_words import IS_BETTER, IS_BOTH, IS_WORSE, NOT_SHOWN, grounds, standing
+from dashboards.verdicts.comparison import ALARM, BETTER, MACHINE, SAME, WORSE, alarms, compare_runs
+from dashboards.verdicts.comparison_words import (
+    IS_BETTER,
+    IS_BOTH,
+    IS_WORSE,
+    NOT_SHOWN,
+    grounds,
+    main_alarms,
+    standing,
+)
 from tests.dashboards.synthetic import attempts
 
 ROWS = attempts(classes=("trap",), planners=("gust",), problems=120)
@@ -44,3 +52,20 @@ def test_what_changes_without_a_memory_is_told() -> None:
     assert said != grounds(compare_runs(ROWS, ROWS, drawn=500))
     slower = ROWS.assign(planning_seconds=3.0 * ROWS["planning_seconds"])  # the machine is, not the planner
     assert grounds(compare_runs(ROWS, slower, drawn=500)) == grounds(compare_runs(ROWS, ROWS, drawn=500))
+
+
+def test_alarms_of_nothing_but_times_become_one_and_no_other_is_lost() -> None:
+    def rows(*told: tuple[str, str, float]) -> pd.DataFrame:
+        columns = ["verdict", "why", "reduction", "planner", "configuration", "panel"]
+        return pd.DataFrame([(*each, "GUST", "none", "curves") for each in told], columns=columns)
+
+    slower, quicker = (ALARM, f"{MACHINE} 9% more time", -0.09), (ALARM, f"{MACHINE} 20% less time", 0.2)
+    other, fine = (ALARM, "solves fewer", 0.0), ("control", "", 0.0)
+    assert main_alarms(rows(fine)) == []
+    for few in (rows(slower, fine), rows(other, slower)):
+        assert main_alarms(few) == alarms(few)
+    many = rows(slower, other, quicker, fine, slower)
+    kept, summed = main_alarms(many)
+    assert [kept] == alarms(rows(other))
+    assert "3 ways" in summed
+    assert "-20 to +9 %" in summed

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from dashboards.cells import CellTable
 from storage.errors import StorageError
 from storage.places.files import write_json
 from storage.places.run_folder import RunFolder
@@ -20,7 +21,7 @@ from tasks.settings.run_settings import RunSettings
 from tests.storage.tables.test_tables import ATTEMPT
 
 
-def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p") -> Path:
+def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p", checks: int = 100) -> Path:
     run = RunFolder(place)
     write_json(run.settings, json.loads(settings.to_json()))
     rows = [
@@ -29,6 +30,7 @@ def _run(place: Path, settings: RunSettings, seconds: float, problem: str = "p")
             "run_id": settings.run_name,
             "problem_id": f"{problem}-{i}",
             "planning_seconds": seconds if assist == "closed" else 0.1,
+            "collision_checks": checks if assist == "closed" else 100,
             "assist": assist,
             "top_k": 5 if assist == "closed" else 0,
             "recall": "encoder" if assist == "closed" else None,
@@ -70,6 +72,22 @@ def test_runs_are_compared_and_what_differs_is_said(runs: list[Path], tmp_path: 
     assert "one after the other" in (tmp_path / "c.md").read_text()
     with (tmp_path / "c.csv").open(newline="") as text:
         assert [(row["run"], row["first"]) for row in csv.DictReader(text)] == [("two", "one")] * 2
+
+
+@pytest.mark.parametrize("checks", [100, 5_000])
+def test_rows_without_a_difference_are_left_out_and_counted(
+    runs: list[Path], tmp_path: Path, checks: int
+) -> None:
+    other = _run(tmp_path / "other", for_preset("smoke"), 0.02, checks=checks)
+    compared = compare([runs[0], other], None)
+    verdicts = list(compared.tables["other"]["verdict"])
+    differ = sum(each in ("better", "worse") for each in verdicts)
+    assert differ == (checks > 100)
+    for every, shown in ((True, len(verdicts)), (False, differ)):
+        told = list(compared.told(every=every))
+        tables = [each for each in told if isinstance(each, CellTable) and each.name == "comparison"]
+        assert sum(len(group) for table in tables for group in table.groups) == shown
+        assert any("--all" in str(each) for each in told) == (shown < len(verdicts))
 
 
 def test_runs_of_one_name_are_told_apart_by_their_paths(runs: list[Path], tmp_path: Path) -> None:
