@@ -19,14 +19,17 @@ from dashboards.statistics.panels import summarise
 from dashboards.web.attempt_rows import COLUMNS, Attempts, attempts_of
 from dashboards.web.memory_versions import MemoryVersion, Versions
 from dashboards.web.notices import MissingError, NoticeError
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
+from storage.archives.libraries import load_library, vehicle_of
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.data_folder import DataFolder, open_run
 from storage.places.files import read_json, read_text
+from storage.places.mirror import folders_in
 from storage.places.run_folder import NAME, RunFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.imported_problems import read_imported
@@ -160,6 +163,22 @@ class DataReader:
         folder = run.memory(name)
         vehicle = self.vehicle(run)
         return self.kept(("memory", stamp_of(folder)), lambda: load_memory(folder, vehicle))
+
+    def libraries(self, run: RunFolder) -> list[str]:
+        """The names ``libraries/…`` of the data folder's libraries for the vehicle of a ``run``."""
+        vehicle, names = self.vehicle(run), []
+        for folder in folders_in(self.folder.libraries):
+            with suppress(StorageError):  # no library, or one of another version
+                if NAME.fullmatch(folder.name) and vehicle_of(folder) == vehicle:
+                    names.append(f"{self.folder.libraries.name}/{folder.name}")
+        return names
+
+    def memory_or_library(self, run: RunFolder, name: str) -> Memory | PlanLibrary:
+        """The memory of that ``name`` of a ``run``, or the library. Raises MissingError if there is none."""
+        if name not in self.libraries(run):
+            return self.memory(run, name)
+        folder, vehicle = self.folder.path / name, self.vehicle(run)
+        return self.kept(("library", stamp_of(folder)), lambda: load_library(folder, vehicle))
 
     def problem(self, run: RunFolder, class_name: str, identity: str) -> Problem:
         """The problem with the id ``identity``: drawn again, or looked up among the worlds of a ``run``."""

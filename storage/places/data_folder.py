@@ -82,6 +82,11 @@ class DataFolder:
         """The folder of what memories answered at work (``watched.py``)."""
         return self.path / "watched"
 
+    @property
+    def libraries(self) -> Path:
+        """The folder of libraries of plans that the dashboard finds (``archives/libraries.py``)."""
+        return self.path / "libraries"
+
     def run(self, name: str) -> RunFolder:
         """The folder of a run. Raises StorageError unless the name is a plain word."""
         return RunFolder(self.path / "runs" / checked_name(name))

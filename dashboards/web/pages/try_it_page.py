@@ -14,6 +14,7 @@ from dashboards.web.page import Page, menu
 from dashboards.web.parameters import Parameters
 from dashboards.world_outlines import outlines, shown_states
 from planners.attempt import Attempt
+from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
@@ -36,13 +37,15 @@ SEED: Final = 1  # as `plan` has it by default
 LIMITS: Final = Limits(seconds=0.4)  # for each attempt
 REPEATS: Final = 5  # of an attempt; the median time is shown ...
 REPEAT_SECONDS: Final = 0.1  # ... of as many as fit in this
-_WARM: Final[set[tuple[str, str, Vehicle, bool]]] = set()  # planner, assist, vehicle, whether to a place
+# planner, assist, vehicle, whether to a place, whether with a library
+_WARM: Final[set[tuple[str, str, Vehicle, bool, bool]]] = set()
 
 
 def try_it(data: DataReader, params: Parameters) -> Page:
     """The editor with a problem of the run, or a fresh one of a class or a family of manoeuvres."""
     run = data.run(params.run)
-    settings, vehicle, names = data.settings(run), data.vehicle(run), run.memory_names()
+    settings, vehicle = data.settings(run), data.vehicle(run)
+    names = [*run.memory_names(), *data.libraries(run)]
     classes = [name for name in settings["classes"] if name in CLASSES]
     class_name = params.text("class", classes[0] if classes else "random")
     drawable = (*CLASSES, *families_of(vehicle))
@@ -101,7 +104,7 @@ def plan_world(data: DataReader, params: Parameters, content: Any) -> dict[str, 
     planner = choices.one_of("planner", tuple(PLANNERS), "lattice")
     assist = choices.one_of("assist", ASSISTS, "repair")
     name = choices.text("memory")
-    memory = data.memory(run, name) if name else None
+    memory = data.memory_or_library(run, name) if name else None
     problem = _problem(content.get("world"), vehicle)
     canonical, alignment = to_canonical(problem)
     fault = scale_fault(memory, problem.scale) if memory is not None else None
@@ -134,10 +137,11 @@ def _answer(
 
 
 def _median(
-    canonical: Problem, planner: str, assist: str, memory: Memory | None, vehicle: Vehicle
+    canonical: Problem, planner: str, assist: str, memory: Memory | PlanLibrary | None, vehicle: Vehicle
 ) -> tuple[Attempt, float]:
     """An attempt, and the median milliseconds of a few: the first one may find everything cold."""
-    key, workspace = (planner, assist, vehicle, canonical.arrival is None), Workspace()
+    key = (planner, assist, vehicle, canonical.arrival is None, isinstance(memory, PlanLibrary))
+    workspace = Workspace()
     times: list[float] = []
     began = perf_counter()
     while True:

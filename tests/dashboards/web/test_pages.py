@@ -11,12 +11,20 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import httpx
+import numpy as np
 import pytest
 
 from dashboards.verdicts.comparison_words import NOT_SHOWN
 from dashboards.web.attempt_rows import COLUMNS, attempts_of
+from dashboards.web.data_reader import DataReader
 from dashboards.web.memory_versions import MemoryVersion
-from dashboards.web.notices import NoticeError
+from dashboards.web.notices import MissingError, NoticeError
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.memory.memory import Memory
+from planners.world.problem import Plan
+from planners.world.vehicles.dynamics import simulate
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, state_size
+from storage.archives.libraries import save_library
 from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.watched import read_watched
@@ -139,6 +147,32 @@ def test_live_planning_answers_with_and_without_memory(client: httpx.Client) -> 
     assert alone["solved"]
     assert alone["ms"] > 0.0
     assert len(alone["way"]) > 10
+
+
+def test_a_library_in_the_data_folder_can_be_chosen_by_runs_of_its_vehicle(tmp_path: Path) -> None:
+    folder = small_data(tmp_path)
+    client = LocalClient(folder)
+    assert "libraries/" not in client.get("/runs/first/try").text
+    for name, vehicle in (("mine", CAR), ("theirs", CAR_1_TRAILER)):
+        controls = np.tile([1.0, 0.0], (40, 1))
+        plan = Plan(simulate(np.zeros(state_size(vehicle)), controls, vehicle), controls, vehicle.dt)
+        save_library(folder.libraries / name, gathered_library("general", vehicle, [("asked", plan)]))
+    (folder.libraries / "notes").mkdir()
+    text = client.get("/runs/first/try?memory=libraries/mine").text
+    assert re.search(r"<option[^>]*selected[^>]*>libraries/mine<", text)
+    assert "theirs" not in text
+    assert "notes" not in text
+    run, reader = folder.run("first"), DataReader(folder, tuple)
+    assert isinstance(reader.memory_or_library(run, "libraries/mine"), PlanLibrary)
+    assert isinstance(reader.memory_or_library(run, "trap"), Memory)
+    for name in (
+        "libraries/theirs",
+        "libraries/notes",
+        "libraries/../runs/first/memories/trap",
+        "libraries/",
+    ):
+        with pytest.raises(MissingError):
+            reader.memory_or_library(run, f"libraries/{name}")
 
 
 def test_a_world_of_ones_own_is_checked(client: httpx.Client) -> None:
