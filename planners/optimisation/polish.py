@@ -6,6 +6,7 @@ The work is counted in iterations, so the same plan gives the same result on any
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Final, NamedTuple
 
@@ -68,41 +69,66 @@ def polish(
     Returns:
         The quickest free plan that was found and arrives as asked, never a longer one than was given.
     """
+    return polish_quickest(problem, [plan], vehicle, scene, workspace, iterations, margin_m, seconds)[1]
+
+
+def polish_quickest(
+    problem: Problem,
+    plans: Sequence[Plan],
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    iterations: int | None = None,
+    margin_m: float = 0.0,
+    seconds: float = math.inf,
+) -> tuple[int, Polished]:
+    """Polish several plans of which only the one that gets quickest is wanted; arguments as of ``polish``.
+
+    Returns:
+        The number of the plan that got quickest, and what it is now.
+    """
     iterations = most_iterations(problem) if iterations is None else iterations
     until = perf_counter() + seconds
-    steps = len(plan.controls)
-    model, goal = _ready(problem, steps + ROOM, vehicle, workspace)
-    states = simulate(start_state(problem, vehicle), plan.controls, vehicle)
-    arrived = int(steps_to_goal(states, steps, goal, vehicle))
-    if arrived == 0:
-        return Polished(plan, 0)
-    steps = arrived if arrived > 0 else steps
-    states = states[: steps + 1]
-    best = steps if arrived > 0 and count_free_prefix(states, vehicle, scene) == steps + 1 else NEVER
+    most = max(len(plan.controls) for plan in plans)
+    model, goal = _ready(problem, most + ROOM, vehicle, workspace)
+    drives = [simulate(start_state(problem, vehicle), plan.controls, vehicle) for plan in plans]
+    lengths = []  # in steps, of the drives that are plans already
+    for k, states in enumerate(drives):
+        arrived = int(steps_to_goal(states, len(states) - 1, goal, vehicle))
+        if arrived == 0:
+            return k, Polished(plans[k], 0)
+        drives[k] = states = states[: arrived + 1] if arrived > 0 else states
+        is_plan = arrived > 0 and count_free_prefix(states, vehicle, scene) == len(states)
+        lengths.append(arrived if is_plan else NEVER)
     barrier = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle), 0.0)
     arriving = problem.arrival not in (None, Arrival())
     used = 0
-    drives = [(states, plan.controls[:steps], best)]
+    given = [
+        (k, states, plan.controls[: len(states) - 1], length)
+        for k, (states, plan, length) in enumerate(zip(drives, plans, lengths, strict=True))
+    ]
     if arriving:
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
-        found, used = quickest(states, model, interior, goal, vehicle, scene, barrier, iterations, until)
-        if found is not None and len(found.controls) < best:
+        around = goal, vehicle, scene, barrier
+        number, moved, used = quickest(drives, model, interior, *around, iterations, until)
+        given = [min(given, key=lambda each: each[3])]
+        if moved is not None and len(moved.controls) < given[0][3]:
             if isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
-                return Polished(found, used)  # which pressing makes hardly any quicker
-            drives.insert(0, (found.states, found.controls, len(found.controls)))
+                return number, Polished(moved, used)  # which pressing makes hardly any quicker
+            given.insert(0, (number, moved.states, moved.controls, len(moved.controls)))
     lower = _shortened if arriving else _descended
-    better: Plan | None = None
-    for states, controls, best in drives:
+    left = iterations - used // len(plans)
+    number, better = given[0][0], None
+    for k, states, controls, length in given:
         steps = len(controls)
         model.states[: steps + 1] = model.best_states[: steps + 1] = states
         model.controls[:steps] = model.best_controls[:steps] = controls
-        least, more = lower(model, steps, best, goal, barrier, vehicle, scene, iterations - used, until)
-        used += more
+        least, more = lower(model, steps, length, goal, barrier, vehicle, scene, left, until)
+        used, left = used + more, left - more
         if least < (NEVER if better is None else len(better.controls)):
-            better = Plan(
-                model.best_states[: least + 1].copy(), model.best_controls[:least].copy(), vehicle.dt
-            )
-    return Polished(better, used)
+            states, controls = model.best_states[: least + 1].copy(), model.best_controls[:least].copy()
+            number, better = k, Plan(states, controls, vehicle.dt)
+    return number, Polished(better, used)
 
 
 def driven_near(

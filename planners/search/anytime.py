@@ -1,9 +1,10 @@
 """Improves a plan: polishes it, then searches again and again for one that is better once it is polished.
 
-Plans to more than a place are always improved a little, since the first is rarely a good drive. Otherwise
-each search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with
-any of the planners as x). A plan within the bound is polished. The bound is a little above the best driving
-time at first, because a plan as a search finds it takes longer, and falls with each search in vain.
+Plans to more than a place are always improved a little, since the first is rarely a good drive: in narrow
+places drives of several kinds are found at once, elsewhere one after another, each shorter. Otherwise each
+search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with any
+of the planners as x). A plan within the bound is polished. The bound is a little above the best driving time
+at first, because a plan as a search finds it takes longer, and falls with each search in vain.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import NamedTuple
 
-from planners.optimisation.polish import most_iterations, polish
+from planners.optimisation.polish import most_iterations, polish, polish_quickest
 from planners.search.guides.guidance import guidance
+from planners.search.manoeuvres.manoeuvring import is_tight, meets, suits
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.geometry.collision import Scene, scene_of
-from planners.world.problem import Plan, Problem
+from planners.world.goal import goal_of
+from planners.world.problem import Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
@@ -143,26 +146,38 @@ def improve(
     return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes, is_given)
 
 
+def _is_narrow(query: Query) -> bool:
+    """Whether drives of several kinds lead to the goal, and a search for manoeuvres finds them best."""
+    goal, vehicle = goal_of(query.problem), query.vehicle
+    start = start_state(query.problem, vehicle)
+    return suits(goal, vehicle) and (meets(start, vehicle) or is_tight(goal, vehicle, query.scene))
+
+
 def search_and_polish(
     planner: str, query: Query, seed: int, given: Plan | None = None
 ) -> tuple[Outcome, bool]:
-    """Search, and again for a shorter plan while one is found soon; polish the last ones, keep the quickest.
+    """Search for several plans, polish them and keep the quickest.
+
+    Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
+    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon.
 
     Args:
         planner: one of ``PLANNERS``.
         query: what it is asked; its limits are those of all searches together.
         seed: of the further searches.
-        given: a plan to begin with in place of the first search.
+        given: a plan to begin with, which is polished too.
 
     Returns:
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
         with the work and the time of all; and whether it is the given plan.
     """
     began = perf_counter()
-    found = (
-        [PLANNERS[planner](query)] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
-    )
-    plan = found[0].plan
+    varies = planner == "lattice" and _is_narrow(query)
+    query = replace(query, others=varies)
+    found = [] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
+    if given is None or varies:
+        found.append(PLANNERS[planner](query))
+    plan = None if varies else found[0].plan
     while plan is not None and plan.duration_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
@@ -176,13 +191,14 @@ def search_and_polish(
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
         plan = found[-1].plan
     solved = [(each, each.plan) for each in found if each.plan is not None][-POLISHED:]
+    solved += [(each, other) for each in found for other in each.others]
     if not solved:
         return found[0], False
-    polished = [
-        (each, polish(query.problem, plan, query.vehicle, query.scene, query.workspace).plan or plan)
-        for each, plan in solved
-    ]
-    best, plan = min(polished, key=lambda pair: pair[1].duration_s)
+    number, polished = polish_quickest(
+        query.problem, [plan for _, plan in solved], query.vehicle, query.scene, query.workspace
+    )
+    best, given_best = solved[number]
+    plan = polished.plan or given_best
     whole = replace(
         best,
         plan=plan,

@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from time import perf_counter
 from typing import NamedTuple
+
+import numpy as np
 
 from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
 from planners.search.outcome import Outcome
@@ -28,7 +31,7 @@ from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
 from planners.world.arrays import Floats
 from planners.world.geometry.occupancy import drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
-from planners.world.problem import is_canonical
+from planners.world.problem import Plan, is_canonical
 
 
 class LatticeSettings(NamedTuple):
@@ -51,6 +54,7 @@ class LatticeSettings(NamedTuple):
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
+    further: int = 400  # expansions of the search for manoeuvres, for drives of other kinds
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 
 
@@ -142,6 +146,18 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     at_random = growing(query)
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
     outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
+    if query.others and outcome.plan is not None and manoeuvring is not None:
+        began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
+        manoeuvring.further(settings.further)
+        if joining is not None:
+            joining.further(settings.further)
+        outcome = replace(
+            outcome,
+            others=tuple(plan for plan in manoeuvring.kept if not _same(plan, outcome.plan)),
+            expansions=outcome.expansions + manoeuvring.expansions - expansions,
+            collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
+            search_seconds=outcome.search_seconds + perf_counter() - began,
+        )
     if joining is None:
         return outcome
     return replace(
@@ -150,3 +166,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         collision_checks=outcome.collision_checks + joining.checks,
         joined=joined,
     )
+
+
+def _same(plan: Plan, other: Plan) -> bool:
+    return np.array_equal(plan.controls, other.controls)

@@ -39,3 +39,4 @@ class Outcome:
     roadmap_seconds: float
     search_seconds: float
     joined: bool = False  # whether the plan ends with one of the query's endings
+    others: tuple[Plan, ...] = ()  # drives of other kinds, if the query asks for them

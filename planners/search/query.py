@@ -70,3 +70,4 @@ class Query:
     # what else is tried while the search goes on: told of its work so far, it may return a plan that ends it
     beside: Callable[[int], Plan | None] | None = None
     endings: Endings | None = None  # known ways into a pose at rest, for searches of manoeuvres
+    others: bool = False  # whether drives of other kinds than the first are wanted, where they are found soon

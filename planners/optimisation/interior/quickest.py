@@ -7,6 +7,7 @@ again, and only its gaps are closed. What its controls lead to is the answer if 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Final, NamedTuple
 
@@ -46,6 +47,7 @@ NO_GAPS: Final = 1e-6  # and when the last one does
 MOST_FIRST: Final = 60  # iterations while time counts
 MOST_LAST: Final = 15  # and of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
+NEVER: Final = 1 << 30  # steps
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
 
 
@@ -80,7 +82,7 @@ class _Drive(NamedTuple):
 
 
 def quickest(
-    way: Floats,
+    ways: Sequence[Floats],
     model: Model,
     interior: Interior,
     goal: Floats,
@@ -89,45 +91,51 @@ def quickest(
     barrier: Barrier,
     iterations: int,
     until: float,
-) -> tuple[Plan | None, int]:
-    """Find the quickest drive near the way of another one.
+) -> tuple[int, Plan | None, int]:
+    """Find the quickest drive near the way of another one, or of several.
 
     Args:
-        way: the states ``[T, S]`` of a drive, which may be blocked.
+        ways: the states ``[T, S]`` of drives, which may be blocked; all begin at the same one.
         model: buffers with room for as many steps and some more.
         interior: buffers of the same size.
         goal: that of ``goal_of``.
         vehicle: what is driven.
         scene: what must not be met.
         barrier: its margin and hitch count.
-        iterations: at most.
+        iterations: at most, for each way.
         until: when to end, by ``perf_counter``.
 
     Returns:
-        A free drive that arrives as asked, if one was found, and the iterations used.
+        The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
+        the iterations used.
     """
-    states, controls = retimed(way, vehicle)
-    steps = len(controls)
-    if steps == 0 or steps + MORE_STEPS[-1] > len(model.controls):
-        return None, 0
-    given = guess = Plan(states, controls, vehicle.dt)
+    given = [Plan(*retimed(way, vehicle), vehicle.dt) for way in ways]
+    room = len(model.controls) - MORE_STEPS[-1]
+    guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     circles = circles_around(scene)
-    used = 0
+    most, used = iterations * len(guesses), 0
     for firmness in ATTEMPTS:
         pushing = barrier._replace(strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m)
         aim = _drawn_in(goal, firmness.tolerance)
         drive = _Drive(model, interior, aim, goal, scene, circles, pushing, until)
-        guess = given if firmness.afresh else guess
-        _fill(drive, guess, way[0])
-        first = min(MOST_FIRST, iterations - used)
-        dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
-        used += spent
-        guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
-        found, spent = _in_whole_steps(drive, guess, vehicle, iterations - used)
-        used += spent
-        if found is not None or used >= iterations or perf_counter() > until:
-            return found, used
-    return None, used
+        for k in guesses:
+            guess = given[k] if firmness.afresh else guesses[k]
+            steps = len(guess.controls)
+            _fill(drive, guess, ways[k][0])
+            first = min(MOST_FIRST, most - used)
+            dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
+            used += spent
+            guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
+        number, best = -1, None
+        for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
+            below = NEVER if best is None else len(best.controls)
+            found, spent = _in_whole_steps(drive, guesses[k], vehicle, below, most - used)
+            used += spent
+            if found is not None:
+                number, best = k, found
+        if best is not None or used >= most or perf_counter() > until:
+            return number, best, used
+    return -1, None, used
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:
@@ -138,15 +146,23 @@ def _drawn_in(goal: Floats, share: float) -> Floats:
     return aim
 
 
-def _in_whole_steps(drive: _Drive, guess: Plan, vehicle: Vehicle, iterations: int) -> tuple[Plan | None, int]:
-    """Divide a guess into steps of the vehicle's length and close its gaps; a drive, and iterations used."""
+def _in_whole_steps(
+    drive: _Drive, guess: Plan, vehicle: Vehicle, below: int, iterations: int
+) -> tuple[Plan | None, int]:
+    """Divide a guess into less than ``below`` steps of the vehicle's length and close its gaps.
+
+    Returns a drive, if there is one, and the iterations used.
+    """
     used = 0
     least = max(math.ceil(guess.duration_s / vehicle.dt - LITTLE_LONGER), 1)
     for more in MORE_STEPS:
-        if least + more > len(drive.model.controls) or used >= iterations or perf_counter() > drive.until:
+        steps = least + more
+        if min(len(drive.model.controls), below - 1) < steps or used >= iterations:
             break
-        _fill(drive, resampled(guess, least + more), guess.states[0])
-        _, spent, found = _descend(drive, least + more, vehicle, False, min(MOST_LAST, iterations - used))
+        if perf_counter() > drive.until:
+            break
+        _fill(drive, resampled(guess, steps), guess.states[0])
+        _, spent, found = _descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
         used += spent
         if found is not None:
             return found, used

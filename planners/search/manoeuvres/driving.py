@@ -13,6 +13,7 @@ from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
 from planners.search.manoeuvres.joining import Join, allocate_join
 from planners.search.manoeuvres.pace import fill_pace
+from planners.search.manoeuvres.ways import Ways, allocate_ways
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import SLACK
@@ -51,6 +52,7 @@ class Drive(NamedTuple):
     target: Floats  # [7] as of ``goal_of``: the node
     connection: Connection
     join: Join
+    ways: Ways
 
 
 def allocate_drive(state_size: int) -> Drive:
@@ -64,6 +66,7 @@ def allocate_drive(state_size: int) -> Drive:
         np.array([0.0, 0.0, NEAR_M, 0.0, NEAR_M, -SLACK, SLACK]),
         allocate_connection(state_size),
         allocate_join(state_size),
+        allocate_ways(),
     )
 
 

@@ -16,13 +16,15 @@ from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.ways import KEPT, forget_ways, keep_last
 from planners.search.query import Endings, Query
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
+from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED
-from planners.world.problem import start_state
+from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
 
 LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless nothing is left before
@@ -47,6 +49,19 @@ def suits(goal: Floats, vehicle: Vehicle) -> bool:
         and goal[LEAST_SPEED] <= 0.0 <= goal[MOST_SPEED]
         and vehicle.min_speed < 0.0
     )
+
+
+def is_tight(goal: Floats, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether there is so little room around a goal that suits that other searches have small hopes."""
+    return bool(room_around(pose_of(goal, state_size(vehicle))[np.newaxis], vehicle, scene) < TIGHT)
+
+
+def meets(start: Floats, vehicle: Vehicle) -> bool:
+    """Whether a tree grows out of a start ``[S]`` too: what is hard from one end is easy from the other.
+
+    With trailers it does, if the vehicle stands.
+    """
+    return bool(trailers_of(vehicle)) and bool(start[3] == 0.0)
 
 
 def word_radius(vehicle: Vehicle) -> float:
@@ -108,13 +123,13 @@ class Manoeuvring:
         self._known = FromStart(start, go, *known, outward=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
-        # with trailers a tree grows out of the start too: what is hard from one end is easy from the other
-        self.meets = bool(trailers_of(vehicle)) and bool(start[0, 3] == 0.0)
+        forget_ways(self._drive.ways)
+        self._kept: list[Plan | None] = [None] * KEPT
+        self.meets = meets(start[0], vehicle)
         self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
         self._level = self._spent = self.expansions = 0
         self._begin_at_coarsest()
-        # whether there is so little room around the goal that other searches have small hopes
-        self.is_tight = bool(room_around(self._tree.states, vehicle, query.scene) < TIGHT)
+        self.is_tight = is_tight(goal, vehicle, query.scene)
         self._grow(0)  # compiled, if need be, before the planner's clock runs
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
@@ -151,11 +166,39 @@ class Manoeuvring:
             self.expansions += used
             self._spent += used
             if found and add_to_tree(self._drive, tree, self._vehicle):
+                self._keep()
                 return True
             if used == 0 or used == level_ends:
-                self._level, self._spent = self._level + 1, 0
-                self._begin()
+                self._next_level()
         return False
+
+    def further(self, most: int) -> None:
+        """Search on for some expansions, for drives of other kinds, or quicker ones; they are kept."""
+        until = self.expansions + most
+        while self.expansions < until and not self.is_over:
+            found, used = self._grow(min(until - self.expansions, self._expansions - self._spent))
+            self.expansions += used
+            self._spent += used
+            if found:
+                self._keep()
+            elif self.expansions < until:
+                self._next_level()
+
+    @property
+    def kept(self) -> list[Plan]:
+        """The drives of different kinds that were found, the one first that is estimated quickest."""
+        seconds = self._drive.ways.seconds
+        return [plan for k in np.argsort(seconds, kind="stable") if (plan := self._kept[k]) is not None]
+
+    def _keep(self) -> None:
+        drive = self._drive
+        steps = int(drive.counts[0])
+        plan = Plan(drive.states[: steps + 1].copy(), drive.controls[:steps].copy(), self._vehicle.dt)
+        self._kept[keep_last(drive.ways)] = plan
+
+    def _next_level(self) -> None:
+        self._level, self._spent = self._level + 1, 0
+        self._begin()
 
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)

@@ -8,6 +8,7 @@ from planners.search.manoeuvres.arriving import drive_arcs_to_goal
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.joining import MOST_ARCS, arcs_are_free, close
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
+from planners.search.manoeuvres.ways import meeting_is_worth
 from planners.search.query import Endings
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
@@ -43,8 +44,10 @@ def meet(
         scene: what must not be met.
 
     Returns:
-        Whether that leads to the goal, and nothing is in the way.
+        Whether that leads to the goal, nothing is in the way, and it is worth it.
     """
+    if not meeting_is_worth(drive.ways, before, last, tree, node, vehicle):
+        return False
     join = drive.join
     links = 0
     each = last

@@ -14,6 +14,7 @@ from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goa
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.joining import arcs_are_free, close, take_word, trailers_are_off
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
+from planners.search.manoeuvres.ways import word_is_worth
 from planners.search.query import Endings
 from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
@@ -92,6 +93,8 @@ def _shoot_alone(
         word = next_word(c, count, math.inf)
         if word < 0:
             return False
+        if not word_is_worth(drive.ways, c.words[word], radius_at(top, vehicle), tree, node, vehicle):
+            continue
         if word_is_free(c, word, top, vehicle, scene, tree):
             arrives = drive_to_goal(drive, tree, node, word, known.start, known.endings, goal, vehicle, scene)
             tree.counts[CHECKS] += drive.counts[1]
@@ -129,6 +132,8 @@ def _shoot_with_trailers(
         word = next_word(c, count, math.inf)
         if word < 0 or closed == CLOSED:
             return False
+        if not word_is_worth(drive.ways, c.words[word], radius, tree, node, vehicle):
+            continue
         if not outline_is_free(c.words[word], radius, x, y, heading, vehicle, scene):
             continue
         take_word(drive.join, c.words[word], radius, vehicle)

@@ -1,0 +1,180 @@
+"""Which drives of a search are worth driving: of each kind the one estimated quickest, of some kinds.
+
+The first drive that a search finds is seldom of the kind that is quickest when it is improved. Of what kind a
+drive is, its gears and turns say; improving it changes places and times, but not these.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.search.connection.profile import run_seconds
+from planners.search.connection.words import PARTS
+from planners.search.manoeuvres.pose_tree import PoseTree
+from planners.world.arrays import Floats, Indices
+from planners.world.jit import inlined, lean
+from planners.world.trigonometry import wrapped
+from planners.world.vehicles.dynamics import control_limits
+from planners.world.vehicles.vehicle import Vehicle
+
+KEPT: Final = 2  # drives of different kinds: with a third, drives are no shorter by what it takes
+STRAIGHT: Final = 0.3  # radians: who turns less in one gear drives straight on
+MOST_LEGS: Final = 512
+
+
+class Ways(NamedTuple):
+    """The drives that a search has found, one of a kind."""
+
+    seconds: Floats  # [KEPT] estimated driving times; infinite: none
+    kinds: Indices  # [KEPT]
+    legs: Floats  # [MOST_LEGS, 2] scratch: gear (1 or -1), by how many radians it turns
+    counts: Indices  # [1] how many legs there are
+    last_seconds: Floats  # [1] of the last way that was looked at
+    last_kind: Indices  # [1]
+
+
+def allocate_ways() -> Ways:
+    """Buffers; nothing is found yet."""
+    return Ways(
+        np.full(KEPT, np.inf),
+        np.full(KEPT, -1, np.int64),
+        np.zeros((MOST_LEGS, 2)),
+        np.zeros(1, np.int64),
+        np.zeros(1),
+        np.zeros(1, np.int64),
+    )
+
+
+def forget_ways(ways: Ways) -> None:
+    """Nothing is found yet."""
+    ways.seconds.fill(np.inf)
+    ways.kinds.fill(-1)
+
+
+def keep_last(ways: Ways) -> int:
+    """Keep the way that was looked at last; returns in which of the ``KEPT`` places."""
+    same = np.flatnonzero(ways.kinds == ways.last_kind[0])
+    at = int(same[0]) if len(same) else int(np.argmax(ways.seconds))
+    ways.seconds[at], ways.kinds[at] = ways.last_seconds[0], ways.last_kind[0]
+    return at
+
+
+@inlined
+def _add_leg(ways: Ways, metres: float, turn: float) -> None:
+    count = ways.counts[0]
+    if count < MOST_LEGS and metres != 0.0:
+        ways.legs[count, 0] = 1.0 if metres > 0.0 else -1.0
+        ways.legs[count, 1] = turn
+        ways.counts[0] = count + 1
+
+
+@inlined
+def _add_legs_to_root(ways: Ways, tree: PoseTree, node: int, sign: float) -> None:
+    """Add the legs from a node to the root of its tree; ``sign`` -1: of a tree out of the goal."""
+    while node > 0:
+        parent = tree.parents[node]
+        turn = wrapped(tree.states[node, 2] - tree.states[parent, 2])
+        _add_leg(ways, sign * tree.metres[node], sign * turn)
+        node = parent
+
+
+@inlined
+def _kind(ways: Ways) -> int:
+    """A number for the sequence of gears and turns of the legs."""
+    kind = 0
+    i = 0
+    while i < ways.counts[0]:
+        gear = ways.legs[i, 0]
+        turned = 0.0
+        while i < ways.counts[0] and ways.legs[i, 0] == gear:
+            turned += ways.legs[i, 1]
+            i += 1
+        side = 0 if abs(turned) < STRAIGHT else (1 if turned > 0.0 else 2)
+        kind = kind * 7 + 1 + side + (3 if gear > 0.0 else 0)
+    return kind & 0x7FFFFFFFFFFFFFFF
+
+
+@inlined
+def _run(metres: float, gear: float, vehicle: Vehicle) -> float:
+    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    return run_seconds(metres, 0.0, 0.0, top, control_limits(vehicle)[0])
+
+
+@inlined
+def _joined_seconds(
+    tree: PoseTree, node: int, metres: float, gear: float, seconds: float, vehicle: Vehicle
+) -> float:
+    """The time of a way that comes to a node of a goal tree in ``seconds``, its last run ``metres`` long."""
+    whole = seconds + tree.seconds[node]
+    if node > 0 and gear * tree.metres[node] < 0.0:  # it drives on without a stop
+        run = tree.runs[node]
+        whole += _run(metres + run, gear, vehicle) - _run(metres, gear, vehicle) - _run(run, gear, vehicle)
+    return float(whole)
+
+
+@inlined
+def _is_worth(ways: Ways, seconds: float) -> bool:
+    """Whether the way in ``ways.legs`` is of a new kind, or quicker than the one of its kind."""
+    kind = _kind(ways)
+    ways.last_kind[0] = kind
+    ways.last_seconds[0] = seconds
+    worst = 0.0
+    for k in range(KEPT):
+        if ways.kinds[k] == kind:
+            return bool(seconds < ways.seconds[k])
+        worst = max(worst, ways.seconds[k])
+    return bool(seconds < worst)
+
+
+@lean
+def word_is_worth(
+    ways: Ways, word: Floats, radius: float, tree: PoseTree, node: int, vehicle: Vehicle
+) -> bool:
+    """Whether a word ``[2 PARTS]`` to a node of a goal tree is worth driving, with what follows it."""
+    ways.counts[0] = 0
+    seconds = 0.0
+    metres = 0.0
+    gear = 0.0
+    for k in range(PARTS):
+        part = radius * word[PARTS + k]
+        if part == 0.0:
+            continue
+        if gear * part < 0.0:
+            seconds += _run(metres, gear, vehicle)
+            metres = 0.0
+        gear = 1.0 if part > 0.0 else -1.0
+        metres += abs(part)
+        _add_leg(ways, part, word[k] * word[PARTS + k])
+    seconds += _run(metres, gear, vehicle)
+    _add_legs_to_root(ways, tree, node, -1.0)
+    return _is_worth(ways, _joined_seconds(tree, node, metres, gear, seconds, vehicle))
+
+
+@lean
+def meeting_is_worth(
+    ways: Ways, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
+) -> bool:
+    """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
+    ways.counts[0] = 0
+    _add_legs_to_root(ways, before, last, 1.0)
+    count = ways.counts[0]
+    for i in range(count // 2):  # from the root now
+        other = count - 1 - i
+        for c in range(2):
+            ways.legs[i, c], ways.legs[other, c] = ways.legs[other, c], ways.legs[i, c]
+    _add_legs_to_root(ways, tree, node, -1.0)
+    gear = 1.0 if before.metres[last] > 0.0 else -1.0
+    seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
+    return _is_worth(ways, seconds)
+
+
+@inlined
+def worst_kept(ways: Ways) -> float:
+    """The longest time of what is kept, in seconds; infinite while there is room."""
+    worst = 0.0
+    for k in range(KEPT):
+        worst = max(worst, ways.seconds[k])
+    return math.inf if worst == math.inf else worst

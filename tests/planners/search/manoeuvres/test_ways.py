@@ -1,0 +1,71 @@
+"""A search in a narrow place goes on for drives of other kinds; the quickest of all when polished is kept."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from planners.optimisation.polish import polish_quickest
+from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
+from planners.search.outcome import Outcome
+from planners.search.query import Query
+from planners.search.registry import PLANNERS
+from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.families import family
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+from planners.world.workspace import Workspace
+
+WORKSPACE = Workspace()
+
+
+def searched(problem: Problem, vehicle: Vehicle, others: bool) -> Outcome:
+    rng, scene = np.random.default_rng(0), scene_of(problem)
+    return PLANNERS["lattice"](Query(problem, rng, scene, WORKSPACE, vehicle=vehicle, others=others))
+
+
+@pytest.mark.parametrize(
+    ("name", "vehicle"), [("parallel", "car"), ("lot", "car"), ("dock", "car-1-trailer")]
+)
+def test_others_are_plans_that_differ_and_the_first_stays(name: str, vehicle: str) -> None:
+    driven, found = VEHICLES[vehicle], 0
+    for number in range(5):
+        problem = to_canonical(family(name, vehicle=driven).draw(6, number))[0]
+        alone, several = searched(problem, driven, False), searched(problem, driven, True)
+        assert alone.plan is not None
+        assert several.plan is not None
+        assert alone.others == ()
+        assert np.array_equal(alone.plan.controls, several.plan.controls)
+        plans = [several.plan, *several.others]
+        assert [fault for plan in plans for fault in faults(problem, plan, driven)] == []
+        assert len({plan.controls.tobytes() for plan in plans}) == len(plans)
+        assert len(plans) <= KEPT + 1
+        found += len(several.others)
+    assert found >= 5
+
+
+def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
+    for number in range(4):
+        problem = to_canonical(family("perpendicular").draw(6, number))[0]
+        found = searched(problem, CAR, True)
+        assert found.plan is not None
+        plans = [found.plan, *found.others]
+        best, polished = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE)
+        assert polished.plan is not None
+        assert faults(problem, polished.plan, CAR) == []
+        assert 0 <= best < len(plans)
+        assert polished.plan.duration_s <= min(plan.duration_s for plan in plans)
+
+
+def test_one_way_of_each_kind_is_kept_and_the_slowest_gives_way() -> None:
+    ways, best = allocate_ways(), dict[int, float]()
+    forget_ways(ways)
+    for kind, seconds in [(1, 9.0), (2, 8.0), (1, 7.0), (3, 6.0), (4, 5.0), (4, 4.0)]:
+        if seconds < ways.seconds.max() or kind in ways.kinds:
+            ways.last_kind[0], ways.last_seconds[0] = kind, seconds
+            keep_last(ways)
+        best[kind] = min(seconds, best.get(kind, seconds))
+    assert len(set(ways.kinds)) == KEPT
+    assert sorted(ways.seconds) == sorted(best.values())[:KEPT]
