@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -13,6 +13,7 @@ from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
 from planners.memory.recall import RECALLS
+from planners.search.guides.grid_path import grid_metres
 from planners.solve import solve
 from planners.world.problem import (
     BOUNDS,
@@ -24,12 +25,27 @@ from planners.world.problem import (
 )
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
+from planners.world.view import View
 from planners.world.workspace import Workspace
 from tasks.settings.run_settings import ABLATION_PLANNER
 
 EMPTY: Final = Problem(
     "empty", "empty", CANONICAL_START, CANONICAL_GOAL, GOAL_RADIUS, BOUNDS, obstacles_of([])
 )
+
+
+def compile_free_answer(problem: Problem, attempt: Callable[[Problem], object], workspace: Workspace) -> None:
+    """Recall a stored plan that is free, and look whether it is a detour: most questions need both.
+
+    Args:
+        problem: a canonical problem; it is attempted without its obstacles.
+        attempt: attempts a problem with a memory.
+        workspace: the caller's buffers.
+    """
+    empty = replace(problem, obstacles=EMPTY.obstacles)
+    attempt(empty)
+    bits = View(empty, workspace).bits
+    grid_metres(bits, empty.start[:2], empty.goal, empty.goal_radius, workspace)
 
 
 def compile_assists(
@@ -59,10 +75,15 @@ def compile_assists(
     blocked = replace(EMPTY, obstacles=obstacles_of([[box]]))
     turned = replace(blocked, start=(*EMPTY.start[:2], EMPTY.start[2] + 0.01))  # so that a scene is checked
     for strategy in strategies:
-        for problem, assist in ((blocked, "open"), (blocked, "repair"), (turned, "closed")):
-            solve(
+
+        def attempt(problem: Problem, assist: str = "closed", strategy: str = strategy) -> object:
+            return solve(
                 *(problem, planner, assist, 1, memory),
                 vehicle=vehicle,
                 strategy=strategy,
                 workspace=workspace,
             )
+
+        for problem, assist in ((blocked, "open"), (blocked, "repair"), (turned, "closed")):
+            attempt(problem, assist)
+        compile_free_answer(EMPTY, attempt, workspace)

@@ -20,12 +20,13 @@ from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
 from storage.exchange.problems import read_problem
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
+from tasks.attempts.compile_assists import compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
@@ -120,7 +121,8 @@ class Assistant:
         itself is in the caches when it is attempted. If plans are to be improved, that code is made ready
         too; otherwise the first plan would spend its seconds on compiling.
         """
-        other = mirrored(to_canonical(problem)[0])
+        canonical, alignment = to_canonical(problem)
+        other = mirrored(canonical)
         deadline = perf_counter() + WARM_SECONDS
         seed = self.settings.seed
         while True:
@@ -128,6 +130,11 @@ class Assistant:
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
                 break
             seed += 1
+        plan = next((attempt.plan for attempt in attempts if attempt.plan is not None), None)
+        if plan is not None:
+            from_canonical(plan, alignment)
+        if isinstance(self.memory_of(problem.class_name), Memory) and is_canonical(other):
+            compile_free_answer(other, self.attempt, self._workspace)
         if self.settings.improve_seconds > 0.0:
             work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
             improve(

@@ -1,4 +1,4 @@
-"""Who asks for a second of improving gets one: nothing is compiled or loaded while it runs."""
+"""Nothing is compiled or loaded while a question is answered, or while its plan is improved."""
 
 from __future__ import annotations
 
@@ -25,6 +25,38 @@ canonical = to_canonical(problem(0))[0]
 improve("lattice", canonical, assistant.attempt(canonical).plan, expansions=6000)
 print(sorted(name for name, _ in loaded() - before))
 """
+
+
+WITH_MEMORY = """
+import gc, sys
+from pathlib import Path
+from numba.core.dispatcher import Dispatcher
+from tasks.requests.assistant import Assistant, AssistantSettings
+from tests.tasks.served import problem, write_memory
+from tests.worlds import box, problem_of
+
+def loaded():
+    kernels = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {(each.py_func.__qualname__, str(kind)) for each in kernels for kind in each.signatures}
+
+assistant = Assistant(AssistantSettings("lattice", "closed", 3, str(write_memory(Path(sys.argv[1]), 6)), 1))
+assistant.warm_up(problem_of([box(25.0, 25.0, 2.35, 24.0, 1.0)]))  # nothing that is stored is free there
+before = loaded()
+for index in range(6):
+    assistant(problem(index))
+print(sorted(name for name, _ in loaded() - before))
+"""
+
+
+def test_all_that_a_stored_plan_needs_is_warm_even_if_none_was_free_before(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", WITH_MEMORY, str(tmp_path / "memory")],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_all_that_improves_a_plan_is_warm_before_the_first_one() -> None:
