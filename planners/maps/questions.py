@@ -20,6 +20,7 @@ STEERED: Final = 0.5  # share of the largest steering angle or turn rate, at mos
 BENT: Final = 0.3  # radians, at most, of each hitch at the start
 POSE_RADIUS: Final = 0.1  # metres
 POSE_TOLERANCE: Final = 0.05  # radians
+BRAKING_STEPS: Final = 10_000  # whoever needs more to stand is too fast anywhere
 TRIES: Final = 1_000  # draws until a world is given up
 
 
@@ -78,6 +79,8 @@ def _can_stop(state: Floats, vehicle: Vehicle, scene: Scene) -> bool:
     """Whether braking as hard as possible, with the steering as it is, is free until the vehicle stands."""
     most = vehicle.max_acceleration * vehicle.dt
     steps = math.ceil(state[3] / most)
+    if steps > BRAKING_STEPS:
+        return False
     controls = np.zeros((steps, 2))
     controls[:, 0] = -state[3] / max(steps, 1) / vehicle.dt
     return bool(count_free_prefix(simulate(state, controls, vehicle), vehicle, scene) == steps + 1)

@@ -37,16 +37,17 @@ _LIMITS: Final = {  # of each kind
     "unicycle-first-order": ("speed", "turn_rate"),
 }
 ALL_LIMITS: Final = ("speed", "acceleration", "steering", "steering_rate", "turn_rate", "turn_acceleration")
-_RANGES: Final = {  # above, up to, unit
-    "acceleration": (0.0, 100.0, "m/s^2"),
-    "steering": (0.0, 1.4, "rad"),
-    "steering_rate": (0.0, 100.0, "rad/s"),
-    "turn_rate": (0.0, 50.0, "rad/s"),
-    "turn_acceleration": (0.0, 1000.0, "rad/s^2"),
-    "wheelbase": (0.0, 100.0, "m"),
-    "hitch_length": (0.0, 100.0, "m"),
-    "max_hitch": (0.0, 1.57, "rad"),
-    "step": (0.0, 1.0, "s"),
+_LEAST: Final = 0.001  # of every number: far less, and planning never ends
+_RANGES: Final = {  # up to, unit
+    "acceleration": (100.0, "m/s^2"),
+    "steering": (1.4, "rad"),
+    "steering_rate": (100.0, "rad/s"),
+    "turn_rate": (50.0, "rad/s"),
+    "turn_acceleration": (1000.0, "rad/s^2"),
+    "wheelbase": (100.0, "m"),
+    "hitch_length": (100.0, "m"),
+    "max_hitch": (1.57, "rad"),
+    "step": (1.0, "s"),
 }
 _FASTEST: Final = 100.0  # m/s
 _NAME: Final = re.compile(r"[a-z0-9](-?[a-z0-9]){0,39}")
@@ -202,10 +203,10 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
     if not isinstance(speeds, list) or len(speeds) != 2:
         raise ValueError(f"has limits.speed {short(speeds)}; expected [least, most] in m/s")
     least, most = (yaml_number(speed, "limits.speed") for speed in speeds)
-    if not (-_FASTEST <= least < most <= _FASTEST and most > 0.0):
+    if not (-_FASTEST <= least < most <= _FASTEST and most >= _LEAST):
         raise ValueError(
-            f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most] with most above 0 and above "
-            f"the least, both within {_FASTEST:g}"
+            f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most] with most above the least, "
+            f"from {_LEAST:g}, both within {_FASTEST:g}"
         )
     others = {name: _ranged(fields[name], name, "limits.") for name in _LIMITS[kind] if name != "speed"}
     return {"speed": (least, most), **others}
@@ -235,10 +236,10 @@ def _trailer(fields: object, number: int) -> Trailer:
 
 def _ranged(value: object, name: str, where: str = "") -> float:
     """A number in the range of its kind. Raises ValueError, which says the range and its unit."""
-    above, most, unit = _RANGES[name]
+    most, unit = _RANGES[name]
     number = yaml_number(value, where + name)
-    if not above < number <= most:
-        raise ValueError(f"has {where}{name} {number:g} {unit}; expected more than {above:g}, up to {most:g}")
+    if not _LEAST <= number <= most:
+        raise ValueError(f"has {where}{name} {number:g} {unit}; expected {_LEAST:g} to {most:g}")
     return number
 
 

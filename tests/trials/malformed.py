@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import random
 import sys
 import traceback
@@ -70,7 +71,7 @@ def spoiled(fields: dict[str, Any], rng: random.Random) -> dict[str, Any]:
             break
         within, key = rng.choice(places)
         value, how = within[key], rng.randrange(6)
-        if how <= 1 and isinstance(value, int | float):
+        if how <= 1 and isinstance(value, float):
             within[key] = value * rng.choice(FACTORS)
         elif how == 2 and isinstance(value, list) and value:
             within[key] = value + value[: rng.choice([1, 1, 50])] if rng.random() < 0.5 else value[:-1]
@@ -79,7 +80,7 @@ def spoiled(fields: dict[str, Any], rng: random.Random) -> dict[str, Any]:
         elif how == 4 and isinstance(within, dict):
             within[rng.choice(UNKNOWN)] = value
         else:
-            within[key] = rng.choice(ODD)
+            within[key] = deepcopy(rng.choice(ODD))
     return fields
 
 
@@ -156,6 +157,7 @@ def main() -> int:
     outcomes: Counter[str] = Counter()
     wrong = 0
     warnings.simplefilter("error")  # a warning is more lines
+    logging.disable(logging.WARNING)  # angles that look like degrees are told of, which is no fault
     with TemporaryDirectory() as folder:
         for index in range(asked.count):
             outcome, told = tried(Path(folder), asked.seed, index)

@@ -28,3 +28,8 @@ def test_a_question_makes_sense_and_is_always_the_same(vehicle: Vehicle, seed: i
         assert problem_fault(asked, vehicle) is None
         assert DISTANCES_M[0] <= math.dist(asked.start[:2], asked.goal) <= DISTANCES_M[1]
         assert (asked.arrival is not None) == pose
+
+
+def test_who_cannot_brake_is_asked_nothing() -> None:
+    world = problem_class("random").draw(1, 0)
+    assert question_in(world, 0, 1, CAR._replace(max_acceleration=1e-9)) is None
