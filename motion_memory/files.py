@@ -75,7 +75,8 @@ def solve_many(
 ) -> None:
     """Solve each problem of a file in this process, and write one row each (docs/problem-files.md).
 
-    If a call is interrupted, the same call later continues where it stopped.
+    If a call is interrupted, the same call later continues where it stopped. Once all is done, it does
+    nothing as long as what was written is there.
 
     Args:
         problems: a .json, .jsonl or .parquet file.
