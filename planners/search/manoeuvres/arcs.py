@@ -6,7 +6,7 @@ from typing import Final
 
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
-from planners.world.vehicles.dynamics import State, step, turn_in
+from planners.world.vehicles.dynamics import State, curvature_of, step, turn_in, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
@@ -14,10 +14,24 @@ FINE: Final = 5  # so many looks where the way is narrow, each with a smaller ma
 
 
 @inlined
-def stride_of(gear: float, vehicle: Vehicle) -> float:
-    """The metres from one look to the next: no more than are driven in a step at full speed."""
+def top_speed(gear: float, bend: float, vehicle: Vehicle) -> float:
+    """The largest speed (m/s) in a gear and a bend; 0 or less if the vehicle does not drive in that gear."""
     top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
-    return float(min(STRIDE * (vehicle.front + vehicle.rear), top * vehicle.dt))
+    if bend != 0.0 and turn_in(bend, 0.0, vehicle) != bend:  # who turns by driving
+        top = min(top, turn_limit(vehicle) / abs(curvature_of(bend, vehicle)))
+    return float(top)
+
+
+@inlined
+def stride_of(gear: float, vehicle: Vehicle) -> float:
+    """The metres from one look to the next: no more than are driven in a step at full speed.
+
+    Who cannot stand drives whole steps at its least speed. Vehicles may be those that drive out of a goal.
+    """
+    least = max(vehicle.min_speed, -vehicle.max_speed)
+    if least > 0.0:
+        return least * vehicle.dt if top_speed(gear, 0.0, vehicle) > 0.0 else 0.0
+    return float(min(STRIDE * (vehicle.front + vehicle.rear), top_speed(gear, 0.0, vehicle) * vehicle.dt))
 
 
 @inlined

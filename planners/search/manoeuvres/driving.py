@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, radius_at
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
+from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of, top_speed
 from planners.search.manoeuvres.joining import Join, allocate_join
 from planners.search.manoeuvres.pace import fill_pace
 from planners.search.manoeuvres.ways import Ways, allocate_ways
@@ -27,7 +27,6 @@ from planners.world.vehicles.dynamics import (
     store,
     tightest_bend,
     turn_in,
-    turn_limit,
 )
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -158,19 +157,49 @@ def _list_limits(
 
 
 @lean
+def _drive_on(drive: Drive, bend: float, metres: float, vehicle: Vehicle, scene: Scene) -> bool:
+    """Drive an arc of the first order that cannot stand: as quickly as it can, else as slowly."""
+    c = drive.connection
+    top = top_speed(1.0, bend, vehicle)
+    for slowly in range(2):
+        steps = math.ceil(metres / (top * vehicle.dt) - ROUNDING)
+        if slowly == 1:
+            steps = int(metres / (vehicle.min_speed * vehicle.dt) + ROUNDING)
+        if steps > c.controls.shape[0]:
+            return False
+        speed = metres / (max(steps, 1) * vehicle.dt)
+        if steps == 0 or not (vehicle.min_speed - SLACK <= speed <= top + SLACK):
+            continue
+        state = load(drive.states, drive.counts[0], vehicle)
+        store(c.states, 0, state)
+        for i in range(steps):
+            first = (speed - state[3]) / vehicle.dt
+            second = (turn_in(bend, speed, vehicle) - state[4]) / vehicle.dt
+            first, second = admissible(state, first, second, vehicle)
+            c.controls[i, 0] = first
+            c.controls[i, 1] = second
+            state = step(state, first, second, vehicle)
+            store(c.states, i + 1, state)
+        if connection_is_free(drive, steps, vehicle, scene):
+            return append(drive, steps)
+    return False
+
+
+@lean
 def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Vehicle, scene: Scene) -> bool:
     """Turn the wheels at rest, then drive an arc from rest to rest, as quickly as obstacles allow."""
     c = drive.connection
     limit_1, limit_2 = control_limits(vehicle)
-    turning = turn_wheels(drive, bend, vehicle)
+    if vehicle.min_speed > 0.0:
+        return _drive_on(drive, bend, metres, vehicle, scene)
+    before = drive.states[drive.counts[0], 4]
+    turning = turn_wheels(drive, before if vehicle.first_order else bend, vehicle)
     if turning < 0:
         return False
-    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    top = top_speed(gear, bend, vehicle)
     acceleration = limit_1
     if turn_in(bend, 0.0, vehicle) != bend:
-        curvature = abs(curvature_of(bend, vehicle))
-        top = min(top, turn_limit(vehicle) / curvature)
-        acceleration = min(limit_1, limit_2 / curvature)
+        acceleration = min(limit_1, limit_2 / abs(curvature_of(bend, vehicle)))
     count = _list_limits(drive, gear, bend, metres, top, vehicle, scene)
     for slower in range(PACES):
         for i in range(count + 1):
@@ -203,7 +232,7 @@ def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Ve
 def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
     """Drive a word of the connection: in one go if it is free at some speed, else from arc to arc."""
     c = drive.connection
-    at_rest = drive.states[0, 3] == 0.0
+    at_rest = vehicle.first_order or drive.states[0, 3] == 0.0
     for share in (1.0, 0.5, 0.25):
         for k in range(c.states.shape[1]):
             c.states[0, k] = drive.states[0, k]

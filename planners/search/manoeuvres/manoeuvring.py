@@ -23,12 +23,12 @@ from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits, window_of
-from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED
+from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
 
 LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless nothing is left before
-    (500, Outward(cell=0.2, headings=48)),
+    (500, Outward(cell=0.2, headings=48, timed=True)),
     (2000, Outward(cell=0.2, headings=64, greed=3.0)),
     (2000, Outward(cell=0.2, headings=64, greed=6.0)),
     (5000, Outward(cell=0.1, headings=64, greed=6.0)),
@@ -38,30 +38,47 @@ LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless n
 MEETING: Final = 3  # times as many for each trailer: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
+SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
 def suits(goal: Floats, vehicle: Vehicle) -> bool:
-    """Whether a goal, that of ``goal_of``, may be reached by manoeuvres: a pose at rest, also backwards."""
+    """Whether a goal, that of ``goal_of``, may be reached by manoeuvres: a pose, at rest.
+
+    Who cannot stand has to change speed and turn at once, and may arrive at any speed that is asked.
+    """
+    if vehicle.min_speed > 0.0 and not vehicle.first_order:
+        return False
+    slowest = max(vehicle.min_speed, 0.0)
     return bool(
         goal[HEADING_TOLERANCE] < np.inf
-        and goal[LEAST_SPEED] <= 0.0 <= goal[MOST_SPEED]
-        and vehicle.min_speed < 0.0
+        and goal[LEAST_SPEED] <= vehicle.max_speed
+        and goal[MOST_SPEED] >= slowest
+        and (slowest > 0.0 or goal[LEAST_SPEED] <= 0.0)
     )
 
 
 def is_tight(goal: Floats, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether there is so little room around a goal that suits that other searches have small hopes."""
-    return bool(room_around(pose_of(goal, state_size(vehicle))[np.newaxis], vehicle, scene) < TIGHT)
+    """Whether there is so little room around a goal that suits that other searches have small hopes.
+
+    Who cannot stand has no room to try again.
+    """
+    root = pose_of(goal, state_size(vehicle))[np.newaxis]
+    return bool(vehicle.min_speed > 0.0 or room_around(root, _reversed(vehicle), vehicle, scene) < TIGHT)
+
+
+def _reversed(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with time reversed: a drive of it out of a goal is one into it."""
+    return vehicle._replace(min_speed=-vehicle.max_speed, max_speed=-vehicle.min_speed)
 
 
 def meets(start: Floats, vehicle: Vehicle) -> bool:
     """Whether a tree grows out of a start ``[S]`` too: what is hard from one end is easy from the other.
 
-    With trailers it does, if the vehicle stands.
+    With trailers it does, if the vehicle stands, or can at once.
     """
-    return bool(trailers_of(vehicle)) and bool(start[3] == 0.0)
+    return bool(trailers_of(vehicle)) and bool(vehicle.first_order or start[3] == 0.0)
 
 
 def word_radius(vehicle: Vehicle) -> float:
@@ -71,6 +88,13 @@ def word_radius(vehicle: Vehicle) -> float:
         length = trailer.hitch_length
         least = max(length / math.sin(HITCH_SHARE * trailer.max_hitch), math.hypot(least, length))
     return max(least, float(radius_at(vehicle.max_speed, vehicle)))
+
+
+def _at_its_slowest(vehicle: Vehicle) -> Vehicle:
+    """Who cannot stand turns most sharply at its least speed, and what leads there can be driven faster."""
+    if vehicle.min_speed <= 0.0:
+        return vehicle
+    return vehicle._replace(max_speed=min(SLOWLY * vehicle.min_speed, vehicle.max_speed))
 
 
 def _alone(vehicle: Vehicle) -> Vehicle:
@@ -111,11 +135,18 @@ class Manoeuvring:
             goal: that of ``goal_of``; it has to suit.
             occupied: ``[64]`` the cells of the problem's window that are not free.
         """
-        problem, vehicle = query.problem, query.vehicle
+        problem, vehicle = query.problem, _at_its_slowest(query.vehicle)
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
+        self._outgoing = _reversed(vehicle)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
         self._drive = query.workspace.buffers(allocate_drive, size)
+        self._drive.target[[LEAST_SPEED, MOST_SPEED]] = -SLACK, SLACK
+        if vehicle.min_speed > 0.0:
+            self._drive.target[[LEAST_SPEED, MOST_SPEED]] = (
+                vehicle.min_speed - SLACK,
+                vehicle.max_speed + SLACK,
+            )
         go = query.workspace.buffers(allocate_way_from_start)
         fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
         start = start_state(problem, vehicle)[np.newaxis]
@@ -217,13 +248,18 @@ class Manoeuvring:
     def _grow(self, most: int) -> tuple[bool, int]:
         """Grow the trees by some expansions at most; whether there is a drive, and how many they were."""
         level = _suited(LEVELS[self._level][1], self._vehicle)
-        settings = self._goal, self._drive, level, self._vehicle, self._scene
+        settings = self._goal, self._drive, level
+        driven = self._vehicle, self._scene
         used = 0
         if self.meets:
-            found, used = grow_outward(self._other, self._tree, most // 2, self._known_there, *settings)
+            found, used = grow_outward(
+                self._other, self._tree, most // 2, self._known_there, *settings, self._vehicle, *driven
+            )
             if found:
                 return True, used
-        found, more = grow_outward(self._tree, self._other, most - used, self._known, *settings)
+        found, more = grow_outward(
+            self._tree, self._other, most - used, self._known, *settings, self._outgoing, *driven
+        )
         return found, used + more
 
     @property

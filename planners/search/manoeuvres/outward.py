@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
-from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of
+from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of, top_speed
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
@@ -44,22 +44,25 @@ class Outward(NamedTuple):
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, 128 at most
     greed: float = 1.5  # weight of the time from the start
+    timed: bool = False  # whether it counts that a gear or a bend is slow; then drives are hard to find
 
 
 @lean
-def room_around(states: Floats, vehicle: Vehicle, scene: Scene) -> float:
+def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scene) -> float:
     """The share that is free of the tightest arcs and straight ways from ``states[0]``, a length each."""
     bend_limit = tightest_bend(vehicle.max_speed, vehicle)
     free = 0.0
     whole = 0.0
     for gear in GEARS:
-        stride = stride_of(gear, vehicle)
+        stride = stride_of(gear, outgoing)
+        if stride <= 0.0:
+            continue
         for share in (1.0, 0.0, -1.0):
             state = load(states, 0, vehicle)
             metres = 0.0
             more = stride
             while metres < vehicle.front + vehicle.rear and more == stride:
-                state, more, _ = stride_along(state, gear, share * bend_limit, stride, vehicle, scene)
+                state, more, _ = stride_along(state, gear, share * bend_limit, stride, outgoing, scene)
                 metres += more
             free += metres
             whole += vehicle.front + vehicle.rear
@@ -98,14 +101,18 @@ def open_node(
     further: bool,
     known: FromStart,
     settings: Outward,
+    outgoing: Vehicle,
     vehicle: Vehicle,
     scene: Scene,
 ) -> None:
-    """Let the ends of all arcs out of a node wait; ``further``: also of its own arc, driven on."""
+    """Let the ends of all arcs out of a node wait; ``further``: also of its own arc, driven on.
+
+    ``outgoing`` is the vehicle as it drives out of the root: out of a goal its speeds have other signs.
+    """
     bend_limit = tightest_bend(vehicle.max_speed, vehicle)
     size = vehicle.front + vehicle.rear
     for gear in GEARS:
-        stride = stride_of(gear, vehicle)
+        stride = stride_of(gear, outgoing)
         if stride <= 0.0:
             continue
         for share in settings.bends:
@@ -120,16 +127,18 @@ def open_node(
             before = 0.0
             mark = 0
             while mark < len(settings.marks):
-                state, free, checks = stride_along(state, gear, bend, stride, vehicle, scene)
+                state, free, checks = stride_along(state, gear, bend, stride, outgoing, scene)
                 tree.counts[CHECKS] += checks
                 metres += free
                 ended = free < stride
                 if ended or metres >= settings.marks[mark] * STRIDE * size - 1e-9:
                     mark += 1
-                    if metres - before >= 2.0 * stride / FINE:
+                    if metres - before >= 2.0 * stride / FINE and not (ended and vehicle.min_speed > 0.0):
                         longest = mark == len(settings.marks) and not ended
                         way = gear * metres
-                        _wait(tree, other, node, state, bend, way, longest, known, settings, vehicle)
+                        _wait(
+                            tree, other, node, state, bend, way, longest, known, settings, outgoing, vehicle
+                        )
                     before = metres
                 if ended:
                     break
@@ -146,6 +155,7 @@ def _wait(
     longest: bool,
     known: FromStart,
     settings: Outward,
+    outgoing: Vehicle,
     vehicle: Vehicle,
 ) -> None:
     cell = settings.cell * (vehicle.front + vehicle.rear)
@@ -153,7 +163,8 @@ def _wait(
         tree.frontier, cell_of(state, metres, tree, cell, settings.headings, vehicle)
     ):
         return
-    seconds = seconds_after(tree, node, bend, metres, vehicle)
+    top = top_speed(metres, bend, outgoing) if settings.timed else vehicle.max_speed
+    seconds = seconds_after(tree, node, bend, metres, top, vehicle)
     left = _seconds_from_start(state, known, vehicle)
     estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds)
@@ -174,6 +185,7 @@ def grow_outward(
     goal: Floats,
     drive: Drive,
     settings: Outward,
+    outgoing: Vehicle,
     vehicle: Vehicle,
     scene: Scene,
 ) -> tuple[bool, int]:
@@ -204,5 +216,5 @@ def grow_outward(
                 return True, expansions
         elif shoot(tree, node, known, goal, drive, vehicle, scene):
             return True, expansions
-        open_node(tree, other, node, longest == 1, known, settings, vehicle, scene)
+        open_node(tree, other, node, longest == 1, known, settings, outgoing, vehicle, scene)
     return False, expansions

@@ -84,20 +84,26 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
 
 
 @inlined
-def _run_seconds(metres: float, vehicle: Vehicle) -> float:
-    return run_seconds(metres, 0.0, 0.0, vehicle.max_speed, control_limits(vehicle)[0])
+def _run_seconds(metres: float, top: float, vehicle: Vehicle) -> float:
+    return run_seconds(metres, 0.0, 0.0, top, control_limits(vehicle)[0])
 
 
 @inlined
-def seconds_after(tree: PoseTree, node: int, bend: float, metres: float, vehicle: Vehicle) -> float:
-    """The time to the goal from the end of an arc out of a node, in seconds; ``metres`` as in the tree."""
+def seconds_after(
+    tree: PoseTree, node: int, bend: float, metres: float, top: float, vehicle: Vehicle
+) -> float:
+    """The time to the goal from the end of an arc out of a node, in seconds; ``metres`` as in the tree.
+
+    ``top`` is the largest speed on the arc, in m/s.
+    """
     turning = abs(bend - tree.bends[node]) / bend_rate(vehicle.max_speed, vehicle)
     seconds = tree.seconds[node]
     if tree.metres[node] * metres > 0.0:
         run = tree.runs[node]
-        seconds += _run_seconds(run + abs(metres), vehicle) - _run_seconds(run, vehicle) + ROLLING * turning
+        seconds += _run_seconds(run + abs(metres), top, vehicle) - _run_seconds(run, top, vehicle)
+        seconds += ROLLING * turning
     else:
-        seconds += _run_seconds(abs(metres), vehicle) + (turning if node > 0 else 0.0)
+        seconds += _run_seconds(abs(metres), top, vehicle) + (turning if node > 0 else 0.0)
     return float(seconds)
 
 

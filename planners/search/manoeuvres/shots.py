@@ -115,7 +115,7 @@ def _shoot_with_trailers(
     """Try words to a node, corrected so that the trailers stand as they do there."""
     c = drive.connection
     x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
-    if known.start[0, 3] != 0.0:
+    if known.start[0, 3] != 0.0 and not vehicle.first_order:
         return False
     radius = known.radius
     dx = (tree.states[node, 0] - x) / radius

@@ -28,6 +28,8 @@ from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, state_size
 from planners.world.workspace import Workspace
 
+OUTGOING = CAR._replace(min_speed=-CAR.max_speed, max_speed=-CAR.min_speed)
+
 
 @pytest.mark.parametrize("name", ["parallel", "perpendicular", "lot"])
 def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
@@ -46,7 +48,7 @@ def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
         plant_root(tree, pose_of(goal, size))
         for node in range(60):
             if node < tree.counts[SIZE]:
-                open_node(tree, tree, node, False, known, Outward(), CAR, scene)
+                open_node(tree, tree, node, False, known, Outward(), OUTGOING, CAR, scene)
         for node in range(1, min(int(tree.counts[SIZE]), 500)):
             metres, parent = float(tree.metres[node]), int(tree.parents[node])
             begin(drive, tree.states[node][np.newaxis])

@@ -1,0 +1,60 @@
+"""Who drives forwards only, and even who cannot stand, reaches poses where there is room to turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planners.search.manoeuvres.manoeuvring import suits
+from planners.solve import solve
+from planners.world.authority.authority import faults
+from planners.world.goal import goal_of
+from planners.world.problem import Arrival, Problem
+from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.workspace import Workspace
+from tests.planners.world.motions import KINDS
+from tests.worlds import box, problem_of
+
+WORKSPACE = Workspace()
+FORWARDS: dict[str, Vehicle] = {
+    "car": CAR._replace(min_speed=0.0),
+    "differential-drive": DIFFERENTIAL_DRIVE._replace(min_speed=0.0),
+    "car, first order": KINDS["car-first-order"]._replace(min_speed=0.0),
+    "unicycle that cannot stand": KINDS["unicycle-first-order"]._replace(min_speed=2.0),
+    "car that cannot stand": KINDS["car-first-order"]._replace(min_speed=2.0),
+}
+
+
+def asked(seed: int, vehicle: Vehicle) -> Problem:
+    """From a pose to a pose some metres away, among three boxes."""
+    rng = np.random.default_rng(seed)
+    way, side = rng.uniform(5.0, 14.0), rng.uniform(-math.pi, math.pi)
+    boxes = [box(25.0 + x, 25.0 + y, 0.4, 0.6, 0.5) for x, y in rng.uniform(3.0, 9.0, (3, 2))]
+    goal = 25.0 - way * abs(math.cos(side)), 25.0 + way * math.sin(side)
+    slow = max(vehicle.min_speed, 0.0)
+    arrival = Arrival(rng.uniform(-3.0, 3.0), 0.1, slow, vehicle.max_speed if slow > 0.0 else 0.0)
+    start = 25.0, 25.0, rng.uniform(-3.0, 3.0)
+    return replace(problem_of(boxes), start=start, goal=goal, goal_radius=0.2, arrival=arrival)
+
+
+@pytest.mark.parametrize("name", FORWARDS)
+def test_poses_are_reached_without_reversing(name: str) -> None:
+    vehicle = FORWARDS[name]
+    for seed in range(8):
+        problem = asked(seed, vehicle)
+        plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+        assert plan is not None
+        assert faults(problem, plan, vehicle) == []
+        assert plan.states[:, 3].min() >= vehicle.min_speed - 1e-9
+
+
+def test_who_cannot_stand_is_not_asked_to() -> None:
+    unicycle = FORWARDS["unicycle that cannot stand"]
+    problem = asked(0, unicycle)
+    assert suits(goal_of(problem), unicycle)
+    at_rest = replace(problem, arrival=Arrival(0.0, 0.1, 0.0, 0.0))
+    assert not suits(goal_of(at_rest), unicycle)
+    assert not suits(goal_of(problem), unicycle._replace(first_order=False))
