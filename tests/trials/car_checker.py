@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import shapely
 
-from planners.world.problem import Floats, Plan, Problem
+from planners.world.problem import Arrival, Floats, Plan, Problem
 
 WHEELBASE: Final = 1.6  # metres
 REAR, FRONT, SIDE = -0.2, 1.8, 0.45  # metres from the rear axle
@@ -71,16 +71,30 @@ def wrong_with(problem: Problem, plan: Plan) -> list[str]:
     ]
     if plan.dt != STEP:
         found.append("time step")
-    if np.abs(states[0] - [*problem.start, 0.0, 0.0]).max() > OFFSET:
+    motion_asked = [*problem.start_motion, 0.0, 0.0][:2]
+    if np.abs(states[0] - [*problem.start, *motion_asked]).max() > OFFSET:
         found.append("start")
     if math.hypot(*(states[-1, :2] - problem.goal)) > problem.goal_radius + ROUNDING:
         found.append("goal")
+    if problem.arrival is not None and arrives_wrong(states[-1], problem.arrival):
+        found.append("arrival")
     if np.abs(driven(states[:-1], controls, STEP) - states[1:]).max() > ROUNDED_STEP:
         found.append("dynamics")
     motion, aside = motion_of(states, controls)
     if np.abs(motion[:, -1] - states[1:]).max() > ONE_STEP:
         found.append("motion")
     return found + contacts(problem, corners(motion), aside)
+
+
+def arrives_wrong(last: Floats, asked: Arrival) -> bool:
+    """Whether the ``last [5]`` state has another heading or speed than is asked for."""
+    low, high = asked.least_speed - OFFSET, asked.most_speed + OFFSET
+    if not low <= last[3] <= high:
+        return True
+    if asked.heading is None:
+        return False
+    off = np.angle(np.exp(1j * (last[2] - asked.heading)))
+    return bool(abs(off) > asked.heading_tolerance + OFFSET)
 
 
 def motion_of(states: Floats, controls: Floats) -> tuple[Floats, float]:

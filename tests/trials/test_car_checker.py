@@ -9,7 +9,7 @@ import shapely
 from hypothesis import given, settings
 
 from planners.world.authority.authority import faults
-from planners.world.problem import Plan, Problem, obstacles_of
+from planners.world.problem import Arrival, Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR
 from tests.planners.world.authority.test_authority import EMPTY, good_plan, winding_plan
 from tests.planners.world.motions import exact_motion
@@ -38,12 +38,21 @@ def test_plans_of_every_planner_and_assist_pass() -> None:
     assert not [wrong for _, wrong in checked if wrong]
 
 
+def test_what_arrives_as_asked_passes() -> None:
+    end = good_plan().states[-1]
+    asked = replace(EMPTY, arrival=Arrival(float(end[2]) + 20.0 * np.pi, 0.01, float(end[3]), float(end[3])))
+    assert wrong_with(asked, good_plan()) == []
+
+
 @pytest.mark.parametrize(
     ("fault", "problem", "plan"),
     [
         ("dynamics", EMPTY, bent(good_plan(), 0, 1e-5)),
         ("motion", EMPTY, bent(good_plan(), 1, 1e-3)),
         ("start", replace(EMPTY, start=(0.0, 0.1, EMPTY.start[2])), good_plan()),
+        ("start", replace(EMPTY, start_motion=(1.0,)), good_plan()),
+        ("arrival", replace(EMPTY, arrival=Arrival(EMPTY.start[2] + 1.0, 0.9)), good_plan()),
+        ("arrival", replace(EMPTY, arrival=Arrival(least_speed=9.0)), good_plan()),
         ("goal", replace(EMPTY, goal=(50.0, 45.0)), good_plan()),
         ("speed", EMPTY, bent(good_plan(), 3, 0.1)),
         ("steering", EMPTY, bent(good_plan(), 4, 0.8)),

@@ -32,19 +32,12 @@ from rich.table import Table
 from planners.world.authority.authority import faults
 from planners.world.vehicles.vehicle import name_of
 from storage.places.files import whole_file
-from tests.trials.judged_plans import canonical_plans, general_plans, manoeuvre_plans
 from tests.trials.judged_plans.made import Maker
+from tests.trials.judged_plans.makers import MAKERS
 
 SAVE_SECONDS: Final = 10.0
 SOURCES: Final = ("recalled", "repaired", "searched", "improved", "polished")
 HEADINGS: Final = ("vehicle", "asked", "planner", "assist")
-MAKERS: Final[dict[str, Maker]] = {
-    "canonical": canonical_plans.attempts,
-    "polished": canonical_plans.polished,
-    "general": general_plans.attempts,
-    "manoeuvres": manoeuvre_plans.attempts,
-}
-
 Counts = Counter[tuple[str, ...]]  # by ``HEADINGS`` and source
 
 
@@ -111,7 +104,7 @@ def main() -> int:
             saved = time.monotonic()
         if done:
             break
-        more, wrong = judge(asked.seed, index, asked.folder, MAKERS[asked.of])
+        more, wrong = judge(asked.seed, index, asked.folder, MAKERS[asked.of].attempts)
         counts += more
         faulty += wrong
         index += 1
