@@ -55,6 +55,7 @@ class LatticeSettings(NamedTuple):
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
     further: int = 400  # expansions of the search for manoeuvres, for drives of other kinds
+    for_one: int = 2000  # as long as it has found none
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 
 
@@ -148,12 +149,14 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
     if query.others and outcome.plan is not None and manoeuvring is not None:
         began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
-        manoeuvring.further(settings.further)
+        manoeuvring.further(settings.further, settings.for_one)
+        kept = manoeuvring.kept
         if joining is not None:
-            joining.further(settings.further)
+            joining.further(settings.further, settings.further)
+            kept += joining.kept
         outcome = replace(
             outcome,
-            others=tuple(plan for plan in manoeuvring.kept if not _same(plan, outcome.plan)),
+            others=tuple(plan for plan in kept if not _same(plan, outcome.plan)),
             expansions=outcome.expansions + manoeuvring.expansions - expansions,
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + perf_counter() - began,

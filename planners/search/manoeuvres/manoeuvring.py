@@ -16,7 +16,7 @@ from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
-from planners.search.manoeuvres.ways import KEPT, forget_ways, keep_last
+from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.query import Endings, Query
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
 from planners.search.structures.tree import Tree
@@ -27,13 +27,14 @@ from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLAC
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
 
-LEVELS: Final = (  # greedier, then finer; and for how many expansions, unless nothing is left before
-    (500, Outward(cell=0.2, headings=48, timed=True)),
-    (2000, Outward(cell=0.2, headings=64, greed=3.0)),
-    (2000, Outward(cell=0.2, headings=64, greed=6.0)),
-    (5000, Outward(cell=0.1, headings=64, greed=6.0)),
-    (10000, Outward(cell=0.05, headings=96, greed=6.0)),
-    (1 << 30, Outward(cell=0.02, headings=128, greed=6.0)),
+# greedier, then finer: for how many expansions, unless nothing is left before, and the greed with trailers
+LEVELS: Final = (
+    (500, Outward(cell=0.2, headings=48, greed=2.5), 2.5),
+    (2000, Outward(cell=0.2, headings=64, greed=3.0), 6.0),
+    (2000, Outward(cell=0.2, headings=64, greed=6.0), 12.0),
+    (5000, Outward(cell=0.1, headings=64, greed=12.0), 12.0),
+    (10000, Outward(cell=0.05, headings=96, greed=12.0), 12.0),
+    (1 << 30, Outward(cell=0.02, headings=128, greed=12.0), 12.0),
 )
 MEETING: Final = 3  # times as many for each trailer: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
@@ -106,12 +107,13 @@ def _alone(vehicle: Vehicle) -> Vehicle:
     return Car(**fields)._replace(max_steering=math.atan(vehicle.wheelbase / word_radius(vehicle)))
 
 
-def _suited(level: Outward, vehicle: Vehicle) -> Outward:
-    """The level with bends in which trailers can follow for long, and the tightest, in which they fold."""
+def _suited(number: int, vehicle: Vehicle) -> Outward:
+    """A level; with bends in which trailers follow for long, and the tightest, in which they fold."""
+    _, level, greed = LEVELS[number]
     if not isinstance(vehicle, CarWithTrailers):
         return level
     share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
-    return level._replace(bends=(1.0, share, 0.0, -share, -1.0))
+    return level._replace(bends=(1.0, share, 0.0, -share, -1.0), greed=greed)
 
 
 def allocate_way_from_start() -> CostToGo:
@@ -168,6 +170,8 @@ class Manoeuvring:
         other = copy.copy(self)
         size = state_size(query.vehicle)
         other._tree, other._other = query.workspace.buffers(allocate_trees, size, 1)
+        other._drive = other._drive._replace(ways=allocate_ways())
+        other._kept = [None] * KEPT
         other._known = self._known._replace(endings=endings)
         other._known_there = self._known_there._replace(endings=endings)
         other._begin_at_coarsest()
@@ -203,8 +207,18 @@ class Manoeuvring:
                 self._next_level()
         return False
 
-    def further(self, most: int) -> None:
-        """Search on for some expansions, for drives of other kinds, or quicker ones; they are kept."""
+    def further(self, most: int, for_one: int) -> None:
+        """Search on for drives of other kinds, or quicker ones; they are kept.
+
+        Args:
+            most: expansions.
+            for_one: expansions for a first drive, if there is none yet.
+        """
+        if not self.kept:
+            self._go_on(for_one, for_one=True)
+        self._go_on(most)
+
+    def _go_on(self, most: int, for_one: bool = False) -> None:
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
             found, used = self._grow(min(until - self.expansions, self._expansions - self._spent))
@@ -212,6 +226,8 @@ class Manoeuvring:
             self._spent += used
             if found:
                 self._keep()
+                if for_one:
+                    return
             elif self.expansions < until:
                 self._next_level()
 
@@ -242,12 +258,12 @@ class Manoeuvring:
         if not self.is_over:
             plant_root(self._tree, self._known_there.start[0])
             plant_root(self._other, self._known.start[0])
-            level = _suited(LEVELS[self._level][1], self._vehicle)
+            level = _suited(self._level, self._vehicle)
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
 
     def _grow(self, most: int) -> tuple[bool, int]:
         """Grow the trees by some expansions at most; whether there is a drive, and how many they were."""
-        level = _suited(LEVELS[self._level][1], self._vehicle)
+        level = _suited(self._level, self._vehicle)
         settings = self._goal, self._drive, level
         driven = self._vehicle, self._scene
         used = 0

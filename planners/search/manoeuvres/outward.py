@@ -44,7 +44,6 @@ class Outward(NamedTuple):
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, 128 at most
     greed: float = 1.5  # weight of the time from the start
-    timed: bool = False  # whether it counts that a gear or a bend is slow; then drives are hard to find
 
 
 @lean
@@ -163,8 +162,7 @@ def _wait(
         tree.frontier, cell_of(state, metres, tree, cell, settings.headings, vehicle)
     ):
         return
-    top = top_speed(metres, bend, outgoing) if settings.timed else vehicle.max_speed
-    seconds = seconds_after(tree, node, bend, metres, top, vehicle)
+    seconds = seconds_after(tree, node, bend, metres, top_speed(metres, bend, outgoing), vehicle)
     left = _seconds_from_start(state, known, vehicle)
     estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds)

@@ -84,7 +84,8 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
 
 
 @inlined
-def _run_seconds(metres: float, top: float, vehicle: Vehicle) -> float:
+def seconds_of_run(metres: float, top: float, vehicle: Vehicle) -> float:
+    """The time to drive some metres from rest to rest, no faster than ``top`` (m/s), in seconds."""
     return run_seconds(metres, 0.0, 0.0, top, control_limits(vehicle)[0])
 
 
@@ -100,10 +101,10 @@ def seconds_after(
     seconds = tree.seconds[node]
     if tree.metres[node] * metres > 0.0:
         run = tree.runs[node]
-        seconds += _run_seconds(run + abs(metres), top, vehicle) - _run_seconds(run, top, vehicle)
+        seconds += seconds_of_run(run + abs(metres), top, vehicle) - seconds_of_run(run, top, vehicle)
         seconds += ROLLING * turning
     else:
-        seconds += _run_seconds(abs(metres), top, vehicle) + (turning if node > 0 else 0.0)
+        seconds += seconds_of_run(abs(metres), top, vehicle) + (turning if node > 0 else 0.0)
     return float(seconds)
 
 

@@ -11,13 +11,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.search.connection.profile import run_seconds
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.pose_tree import PoseTree
+from planners.search.manoeuvres.arcs import top_speed
+from planners.search.manoeuvres.pose_tree import PoseTree, seconds_of_run
 from planners.world.arrays import Floats, Indices
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
-from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
 KEPT: Final = 2  # drives of different kinds: with a third, drives are no shorter by what it takes
@@ -99,8 +98,7 @@ def _kind(ways: Ways) -> int:
 
 @inlined
 def _run(metres: float, gear: float, vehicle: Vehicle) -> float:
-    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
-    return run_seconds(metres, 0.0, 0.0, top, control_limits(vehicle)[0])
+    return seconds_of_run(metres, top_speed(gear, 0.0, vehicle), vehicle)
 
 
 @inlined

@@ -17,7 +17,7 @@ from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 
-LIMITS = Limits(expansions=5000)
+LIMITS = Limits(expansions=6000)
 
 
 def slot(source: Family, number: int) -> Problem:
