@@ -149,10 +149,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
     if query.others and outcome.plan is not None and manoeuvring is not None:
         began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
-        manoeuvring.further(settings.further, settings.for_one)
+        left = query.limits.expansions - outcome.expansions
+        left = manoeuvring.further(settings.further, settings.for_one, left)
         kept = manoeuvring.kept
         if joining is not None:
-            joining.further(settings.further, settings.further)
+            joining.further(settings.further, settings.further, left)
             kept += joining.kept
         outcome = replace(
             outcome,

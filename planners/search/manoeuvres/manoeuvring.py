@@ -207,16 +207,22 @@ class Manoeuvring:
                 self._next_level()
         return False
 
-    def further(self, most: int, for_one: int) -> None:
+    def further(self, most: int, for_one: int, within: int) -> int:
         """Search on for drives of other kinds, or quicker ones; they are kept.
 
         Args:
             most: expansions.
-            for_one: expansions for a first drive, if there is none yet.
+            for_one: expansions before that, for a first drive, if there is none yet.
+            within: expansions in all.
+
+        Returns:
+            How many expansions are left of those.
         """
+        until = self.expansions + within
         if not self.kept:
-            self._go_on(for_one, for_one=True)
-        self._go_on(most)
+            self._go_on(min(for_one, within), for_one=True)
+        self._go_on(min(most, until - self.expansions))
+        return until - self.expansions
 
     def _go_on(self, most: int, for_one: bool = False) -> None:
         until = self.expansions + most

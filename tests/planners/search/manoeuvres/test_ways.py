@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planners.optimisation.polish import polish_quickest
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Outcome
-from planners.search.query import Query
+from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
@@ -21,9 +23,11 @@ from planners.world.workspace import Workspace
 WORKSPACE = Workspace()
 
 
-def searched(problem: Problem, vehicle: Vehicle, others: bool) -> Outcome:
-    rng, scene = np.random.default_rng(0), scene_of(problem)
-    return PLANNERS["lattice"](Query(problem, rng, scene, WORKSPACE, vehicle=vehicle, others=others))
+def searched(problem: Problem, vehicle: Vehicle, others: bool, limits: Limits | None = None) -> Outcome:
+    query = Query(
+        problem, np.random.default_rng(0), scene_of(problem), WORKSPACE, vehicle=vehicle, others=others
+    )
+    return PLANNERS["lattice"](replace(query, limits=limits or Limits()))
 
 
 @pytest.mark.parametrize(
@@ -44,6 +48,14 @@ def test_others_are_plans_that_differ_and_the_first_stays(name: str, vehicle: st
         assert len(plans) <= KEPT + 1
         found += len(several.others)
     assert found >= 3  # in most of them
+
+
+def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
+    for number in range(3):
+        problem = to_canonical(family("parallel").draw(6, number))[0]
+        first = searched(problem, CAR, False).expansions
+        for most in (first, first + 7, first + 100):
+            assert searched(problem, CAR, True, Limits(expansions=most)).expansions <= most
 
 
 def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
