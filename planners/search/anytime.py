@@ -191,7 +191,7 @@ def search_and_polish(
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
         plan = found[-1].plan
     solved = [(each, each.plan) for each in found if each.plan is not None][-POLISHED:]
-    solved += [(each, other) for each in found for other in each.others]
+    solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
         return found[0], False
     number, polished = polish_quickest(

@@ -11,10 +11,8 @@ from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
 
-import numpy as np
-
 from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
-from planners.search.outcome import Outcome
+from planners.search.outcome import Other, Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
 from planners.search.rrt import growing
@@ -157,7 +155,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             kept += joining.kept
         outcome = replace(
             outcome,
-            others=tuple(plan for plan in kept if not _same(plan, outcome.plan)),
+            others=tuple(_differing(kept, outcome.plan)),
             expansions=outcome.expansions + manoeuvring.expansions - expansions,
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + perf_counter() - began,
@@ -172,5 +170,13 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     )
 
 
-def _same(plan: Plan, other: Plan) -> bool:
-    return np.array_equal(plan.controls, other.controls)
+def _differing(kept: list[Other], plan: Plan) -> list[Other]:
+    """Each drive once, without those that are the plan: both searches may find the same."""
+    seen = {plan.controls.tobytes()}
+    differing = []
+    for other in kept:
+        controls = other.plan.controls.tobytes()
+        if controls not in seen:
+            seen.add(controls)
+            differing.append(other)
+    return differing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final
+from typing import Final, NamedTuple
 
 from planners.world.problem import Plan
 
@@ -27,6 +27,13 @@ class Status(StrEnum):
     INFEASIBLE = "infeasible"  # it is certain that no drive leads to the goal
 
 
+class Other(NamedTuple):
+    """A drive that was found besides the plan."""
+
+    plan: Plan
+    joined: bool  # whether it ends with one of the query's endings
+
+
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """One search: its plan, if any, and what it cost."""
@@ -39,4 +46,4 @@ class Outcome:
     roadmap_seconds: float
     search_seconds: float
     joined: bool = False  # whether the plan ends with one of the query's endings
-    others: tuple[Plan, ...] = ()  # drives of other kinds, if the query asks for them
+    others: tuple[Other, ...] = ()  # drives of other kinds, if the query asks for them

@@ -17,6 +17,7 @@ from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outw
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
+from planners.search.outcome import Other
 from planners.search.query import Endings, Query
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
 from planners.search.structures.tree import Tree
@@ -157,7 +158,7 @@ class Manoeuvring:
         to_goal = query.workspace.buffers(allocate_cost_to_go)
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
         forget_ways(self._drive.ways)
-        self._kept: list[Plan | None] = [None] * KEPT
+        self._kept: list[Other | None] = [None] * KEPT
         self.meets = meets(start[0], vehicle)
         self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
         self._level = self._spent = self.expansions = 0
@@ -238,16 +239,16 @@ class Manoeuvring:
                 self._next_level()
 
     @property
-    def kept(self) -> list[Plan]:
+    def kept(self) -> list[Other]:
         """The drives of different kinds that were found, the one first that is estimated quickest."""
         seconds = self._drive.ways.seconds
-        return [plan for k in np.argsort(seconds, kind="stable") if (plan := self._kept[k]) is not None]
+        return [other for k in np.argsort(seconds, kind="stable") if (other := self._kept[k]) is not None]
 
     def _keep(self) -> None:
         drive = self._drive
         steps = int(drive.counts[0])
         plan = Plan(drive.states[: steps + 1].copy(), drive.controls[:steps].copy(), self._vehicle.dt)
-        self._kept[keep_last(drive.ways)] = plan
+        self._kept[keep_last(drive.ways)] = Other(plan, self.joined)
 
     def _next_level(self) -> None:
         self._level, self._spent = self._level + 1, 0

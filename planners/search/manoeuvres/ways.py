@@ -6,7 +6,6 @@ drive is, its gears and turns say; improving it changes places and times, but no
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -167,12 +166,3 @@ def meeting_is_worth(
     gear = 1.0 if before.metres[last] > 0.0 else -1.0
     seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
     return _is_worth(ways, seconds)
-
-
-@inlined
-def worst_kept(ways: Ways) -> float:
-    """The longest time of what is kept, in seconds; infinite while there is room."""
-    worst = 0.0
-    for k in range(KEPT):
-        worst = max(worst, ways.seconds[k])
-    return math.inf if worst == math.inf else worst

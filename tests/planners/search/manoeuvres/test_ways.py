@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from planners.optimisation.polish import polish_quickest
+from planners.search.anytime import search_and_polish
+from planners.search.manoeuvres.endings import endings_of
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Outcome
-from planners.search.query import Limits, Query
+from planners.search.query import Endings, Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
@@ -23,10 +25,15 @@ from planners.world.workspace import Workspace
 WORKSPACE = Workspace()
 
 
+def asked(
+    problem: Problem, vehicle: Vehicle = CAR, endings: Endings | None = None, others: bool = True
+) -> Query:
+    rng, scene = np.random.default_rng(0), scene_of(problem)
+    return Query(problem, rng, scene, WORKSPACE, vehicle=vehicle, endings=endings, others=others)
+
+
 def searched(problem: Problem, vehicle: Vehicle, others: bool, limits: Limits | None = None) -> Outcome:
-    query = Query(
-        problem, np.random.default_rng(0), scene_of(problem), WORKSPACE, vehicle=vehicle, others=others
-    )
+    query = asked(problem, vehicle, others=others)
     return PLANNERS["lattice"](replace(query, limits=limits or Limits()))
 
 
@@ -42,7 +49,7 @@ def test_others_are_plans_that_differ_and_the_first_stays(name: str, vehicle: st
         assert several.plan is not None
         assert alone.others == ()
         assert np.array_equal(alone.plan.controls, several.plan.controls)
-        plans = [several.plan, *several.others]
+        plans = [several.plan, *(other.plan for other in several.others)]
         assert [fault for plan in plans for fault in faults(problem, plan, driven)] == []
         assert len({plan.controls.tobytes() for plan in plans}) == len(plans)
         assert len(plans) <= KEPT + 1
@@ -58,12 +65,43 @@ def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
             assert searched(problem, CAR, True, Limits(expansions=most)).expansions <= most
 
 
+def test_of_drives_with_known_endings_only_those_that_end_so_are_said_to() -> None:
+    drawn = family("parallel")
+    known = [searched(to_canonical(drawn.draw(4, number))[0], CAR, False).plan for number in range(6)]
+    endings = endings_of([(plan.states, plan.controls) for plan in known if plan is not None], CAR)
+    joined = same = 0
+    for number in range(8):
+        problem = to_canonical(drawn.draw(6, number))[0]
+        alone, several = (
+            PLANNERS["lattice"](asked(problem)),
+            PLANNERS["lattice"](asked(problem, CAR, endings)),
+        )
+        assert alone.plan is not None
+        assert several.plan is not None
+        without = {plan.controls.tobytes() for plan in (alone.plan, *(other.plan for other in alone.others))}
+        ends = {several.plan.controls.tobytes(): several.joined}
+        ends |= {other.plan.controls.tobytes(): other.joined for other in several.others}
+        assert len(ends) == 1 + len(several.others)
+        assert not any(ends[controls] for controls in without & set(ends))
+        joined += sum(ends.values())
+
+        best, _ = search_and_polish("lattice", asked(problem), 0)
+        whole, _ = search_and_polish("lattice", asked(problem, CAR, endings), 0)
+        assert best.plan is not None
+        assert whole.plan is not None
+        if np.array_equal(best.plan.controls, whole.plan.controls):
+            same += 1
+            assert not whole.joined
+    assert joined > 0
+    assert same > 0
+
+
 def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
     for number in range(4):
         problem = to_canonical(family("perpendicular").draw(6, number))[0]
         found = searched(problem, CAR, True)
         assert found.plan is not None
-        plans = [found.plan, *found.others]
+        plans = [found.plan, *(other.plan for other in found.others)]
         best, polished = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE)
         assert polished.plan is not None
         assert faults(problem, polished.plan, CAR) == []
