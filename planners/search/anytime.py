@@ -36,6 +36,7 @@ SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
 SHORTER = 0.9  # of the driving time of the plan before: so long may the next one to a pose take ...
 AGAIN = 1000  # ... and so many expansions its search
+BESIDE = 4000  # expansions of the search beside a plan that is given
 POLISHED = 2  # of the last plans: which of them is quickest when polished cannot be told before
 
 
@@ -175,8 +176,11 @@ def search_and_polish(
     varies = planner == "lattice" and _is_narrow(query)
     query = replace(query, others=varies)
     found = [] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
-    if given is None or varies:
+    if given is None:
         found.append(PLANNERS[planner](query))
+    elif varies:
+        limits = replace(query.limits, expansions=min(BESIDE, query.limits.expansions))
+        found.append(PLANNERS[planner](replace(query, limits=limits)))
     plan = None if varies else found[0].plan
     while plan is not None and plan.duration_s > 0.0:  # it may be at the goal already
         limits = replace(

@@ -55,7 +55,7 @@ def suits(goal: Floats, vehicle: Vehicle) -> bool:
     slowest = max(vehicle.min_speed, 0.0)
     return bool(
         goal[HEADING_TOLERANCE] < np.inf
-        and goal[LEAST_SPEED] <= vehicle.max_speed
+        and goal[LEAST_SPEED] <= _at_its_slowest(vehicle).max_speed
         and goal[MOST_SPEED] >= slowest
         and (slowest > 0.0 or goal[LEAST_SPEED] <= 0.0)
     )
