@@ -14,7 +14,7 @@ from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior
-from planners.optimisation.interior.quickest import quickest
+from planners.optimisation.interior.quickest import NEVER, quickest
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
@@ -31,7 +31,6 @@ SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
-NEVER: Final = 1 << 30  # steps
 # strength, range and least gain in metres: obstacles push from far and softly first, then only close to them
 STAGES: Final = ((0.1, 1.0, 0.2), (0.03, 0.5, 0.06), (0.01, 0.3, 0.02))
 

@@ -197,10 +197,7 @@ class Manoeuvring:
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
             level_ends = self._expansions - self._spent
-            more = min(until - self.expansions, level_ends)
-            found, used = self._grow(more)
-            self.expansions += used
-            self._spent += used
+            found, used = self._grow(min(until - self.expansions, level_ends))
             if found and add_to_tree(self._drive, tree, self._vehicle):
                 self._keep()
                 return True
@@ -228,9 +225,7 @@ class Manoeuvring:
     def _go_on(self, most: int, for_one: bool = False) -> None:
         until = self.expansions + most
         while self.expansions < until and not self.is_over:
-            found, used = self._grow(min(until - self.expansions, self._expansions - self._spent))
-            self.expansions += used
-            self._spent += used
+            found, _ = self._grow(min(until - self.expansions, self._expansions - self._spent))
             if found:
                 self._keep()
                 if for_one:
@@ -273,17 +268,19 @@ class Manoeuvring:
         level = _suited(self._level, self._vehicle)
         settings = self._goal, self._drive, level
         driven = self._vehicle, self._scene
-        used = 0
+        found, used = False, 0
         if self.meets:
             found, used = grow_outward(
                 self._other, self._tree, most // 2, self._known_there, *settings, self._vehicle, *driven
             )
-            if found:
-                return True, used
-        found, more = grow_outward(
-            self._tree, self._other, most - used, self._known, *settings, self._outgoing, *driven
-        )
-        return found, used + more
+        if not found:
+            found, more = grow_outward(
+                self._tree, self._other, most - used, self._known, *settings, self._outgoing, *driven
+            )
+            used += more
+        self.expansions += used
+        self._spent += used
+        return found, used
 
     @property
     def checks(self) -> int:

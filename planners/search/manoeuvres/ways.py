@@ -113,17 +113,24 @@ def _joined_seconds(
 
 
 @inlined
+def _is_quick(ways: Ways, seconds: float) -> bool:
+    """Whether a way takes less than the slowest that is kept: no other is worth a look at its legs."""
+    worst = 0.0
+    for k in range(KEPT):
+        worst = max(worst, ways.seconds[k])
+    return bool(seconds < worst)
+
+
+@inlined
 def _is_worth(ways: Ways, seconds: float) -> bool:
-    """Whether the way in ``ways.legs`` is of a new kind, or quicker than the one of its kind."""
+    """Whether a quick way, its legs in ``ways.legs``, is of a new kind, or the quickest of its kind."""
     kind = _kind(ways)
     ways.last_kind[0] = kind
     ways.last_seconds[0] = seconds
-    worst = 0.0
     for k in range(KEPT):
         if ways.kinds[k] == kind:
             return bool(seconds < ways.seconds[k])
-        worst = max(worst, ways.seconds[k])
-    return bool(seconds < worst)
+    return True
 
 
 @lean
@@ -146,8 +153,11 @@ def word_is_worth(
         metres += abs(part)
         _add_leg(ways, part, word[k] * word[PARTS + k])
     seconds += _run(metres, gear, vehicle)
+    seconds = _joined_seconds(tree, node, metres, gear, seconds, vehicle)
+    if not _is_quick(ways, seconds):
+        return False
     _add_legs_to_root(ways, tree, node, -1.0)
-    return _is_worth(ways, _joined_seconds(tree, node, metres, gear, seconds, vehicle))
+    return _is_worth(ways, seconds)
 
 
 @lean
@@ -155,6 +165,10 @@ def meeting_is_worth(
     ways: Ways, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
 ) -> bool:
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
+    gear = 1.0 if before.metres[last] > 0.0 else -1.0
+    seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
+    if not _is_quick(ways, seconds):
+        return False
     ways.counts[0] = 0
     _add_legs_to_root(ways, before, last, 1.0)
     count = ways.counts[0]
@@ -163,6 +177,4 @@ def meeting_is_worth(
         for c in range(2):
             ways.legs[i, c], ways.legs[other, c] = ways.legs[other, c], ways.legs[i, c]
     _add_legs_to_root(ways, tree, node, -1.0)
-    gear = 1.0 if before.metres[last] > 0.0 else -1.0
-    seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
     return _is_worth(ways, seconds)
