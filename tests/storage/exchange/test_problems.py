@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,7 @@ from hypothesis import strategies as st
 from planners.world.problem import Problem
 from storage.errors import StorageError
 from storage.exchange.problem_files import FORMATS
-from storage.exchange.problems import read_problem, read_problems, write_problems
+from storage.exchange.problems import read_problems, write_problems
 from storage.tables.imported_problems import read_imported, write_imported
 from tests.storage.samples import box, problem_with, problems, quick, same_problem, star
 
@@ -49,37 +47,6 @@ def test_problems_come_back_exactly(
     assert all(map(same_problem, found, read))
     write_problems(path, read)
     assert path.read_bytes() == before
-
-
-@quick
-@given(
-    found=st.lists(problems(), min_size=2, max_size=4, unique_by=lambda problem: problem.id),
-    ending=st.sampled_from([".jsonl", ".parquet"]),
-)
-def test_each_problem_of_a_file_can_be_picked_by_its_id_or_its_number(
-    tmp_path_factory: pytest.TempPathFactory, found: list[Problem], ending: str
-) -> None:
-    path = tmp_path_factory.getbasetemp() / f"many{ending}"
-    found = [replace(problem, id=f"p-{problem.id}") for problem in found]  # no id is a number
-    write_problems(path, found)
-    for number, problem in enumerate(found, start=1):
-        assert same_problem(read_problem(path, pick=problem.id), problem)
-        assert same_problem(read_problem(path, pick=str(number)), problem)
-    for wrong in (None, "0", str(len(found) + 1), "another"):
-        with pytest.raises(StorageError, match=f"holds {len(found)} problems.*--pick"):
-            read_problem(path, pick=wrong)
-
-
-def test_an_id_is_picked_before_a_number_and_lines_count_as_messages_count_them(tmp_path: Path) -> None:
-    first, second, third = (json.dumps(GOOD | {"id": name}) for name in ("a", "1", ""))
-    path = tmp_path / "mine.jsonl"
-    path.write_text(f"{first}\n\n{second}\n{third}\nno problem")
-    assert read_problem(path, pick="1").id == "1"
-    assert read_problem(path, pick="mine-4").id == "mine-4"
-    path.write_text(f"{first}\n\n{second}\n{third}\n")
-    assert read_problem(path, pick="3").id == "1"
-    path.write_text(f"{first}\n")
-    assert read_problem(path).id == read_problem(path, pick="1").id == "a"
 
 
 @quick
@@ -141,37 +108,6 @@ def test_a_scaled_problem_is_the_canonical_one_in_lengths_outside(tmp_path: Path
         assert again.goal == pytest.approx(problem.goal, rel=1e-15)
     write_imported(tmp_path / "r.parquet", [problem])
     assert read_imported(tmp_path / "r.parquet")[0].scale == scale
-
-
-@pytest.mark.parametrize(
-    ("fields", "hinted"),
-    [
-        ({}, None),
-        ({"start": [0.0, 0.0, -math.tau]}, None),
-        ({"start": [0.0, 0.0, 45]}, "start heading is 45 rad, more than a full turn; .* 0.7854 rad"),
-        ({"start": [0.0, 0.0, -90.5]}, "start heading is -90.5 rad"),
-        ({"goal": [50.0, 50.0, math.tau]}, None),
-        ({"goal": [50.0, 50.0, 180]}, "goal heading is 180 rad"),
-        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, math.pi]}, None),
-        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, 5]}, "goal_tolerance is 5 rad"),
-    ],
-)
-@pytest.mark.parametrize("ending", [".jsonl", ".parquet"])
-def test_degrees_are_warned_of_once_and_taken_as_the_radians_that_they_may_be(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, fields: dict[str, Any], hinted: str | None, ending: str
-) -> None:
-    path = tmp_path / f"turned{ending}"
-    usual = {name: value for name, value in GOOD.items() if name != "goal_radius"}
-    rows = [usual | fields | {"id": name} for name in ("one", "two")]
-    if ending == ".jsonl":
-        path.write_text("\n".join(map(json.dumps, rows)))
-    else:
-        pq.write_table(pa.Table.from_pylist(rows), path)
-    first, _ = read_problems(path)
-    assert first.start[2] == rows[0]["start"][2]
-    told = [record.getMessage() for record in caplog.records]
-    assert len(told) == (hinted is not None)
-    assert hinted is None or re.search(rf"id 'one'\): {hinted}", told[0])
 
 
 def test_a_missing_id_comes_from_the_file_and_a_missing_class_is_unknown(tmp_path: Path) -> None:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -130,3 +134,33 @@ def test_a_malformed_question_is_told_in_one_line(vehicle: Any, changes: dict[st
         assert json.loads(json.dumps(fields_of(asked, vehicle), allow_nan=False))
     assert "\n" not in told
     assert len(told) < 600
+
+
+@pytest.mark.parametrize(
+    ("fields", "hinted"),
+    [
+        ({}, None),
+        ({"start": [0.0, 0.0, -math.tau]}, None),
+        ({"start": [0.0, 0.0, 45]}, "start heading is 45 rad, more than a full turn; .* 0.7854 rad"),
+        ({"start": [0.0, 0.0, -90.5]}, "start heading is -90.5 rad"),
+        ({"goal": [50.0, 50.0, math.tau]}, None),
+        ({"goal": [50.0, 50.0, 180]}, "goal heading is 180 rad"),
+        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, math.pi]}, None),
+        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, 5]}, "goal_tolerance is 5 rad"),
+    ],
+)
+@pytest.mark.parametrize("ending", [".jsonl", ".parquet"])
+def test_degrees_are_warned_of_once_and_taken_as_the_radians_that_they_may_be(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, fields: dict[str, Any], hinted: str | None, ending: str
+) -> None:
+    path = tmp_path / f"turned{ending}"
+    rows = [GOOD | fields | {"id": name} for name in ("one", "two")]
+    if ending == ".jsonl":
+        path.write_text("\n".join(map(json.dumps, rows)))
+    else:
+        pq.write_table(pa.Table.from_pylist(rows), path)
+    first, _ = read_problems(path)
+    assert first.start[2] == rows[0]["start"][2]
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) == (hinted is not None)
+    assert hinted is None or re.search(rf"id 'one'\): {hinted}", told[0])
