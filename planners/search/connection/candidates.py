@@ -12,9 +12,10 @@ from planners.search.connection.connection import (
     lead_of,
     radius_at,
 )
+from planners.search.connection.dubins import list_forward_words
 from planners.search.connection.profile import run_seconds
 from planners.search.connection.words import PARTS, list_words
-from planners.world.arrays import Floats
+from planners.world.arrays import Floats, Pose
 from planners.world.goal import X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos, wrapped
@@ -59,6 +60,23 @@ def word_seconds(
 
 
 @lean
+def list_words_between(start: Pose, end: Pose, radius: float, words: Floats, vehicle: Vehicle) -> int:
+    """List the words from a pose to another one that a vehicle can drive with this radius (m).
+
+    Returns how many there are in ``words [MOST_WORDS, 2 PARTS]``.
+    """
+    dx = (end[0] - start[0]) / radius
+    dy = (end[1] - start[1]) / radius
+    sin, cos = sincos(start[2])
+    x = dx * cos + dy * sin
+    y = dy * cos - dx * sin
+    turn = wrapped(end[2] - start[2])
+    if vehicle.min_speed >= 0.0:
+        return list_forward_words(x, y, turn, words)
+    return list_words(x, y, turn, words)
+
+
+@lean
 def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) -> int:
     """List the words that may lead from ``c.states[0]`` to a goal.
 
@@ -74,11 +92,8 @@ def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) 
     state = load(c.states, 0, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
     radius = radius_at(top, vehicle)
-    dx = (goal[X] - x) / radius
-    dy = (goal[Y] - y) / radius
-    sin, cos = sincos(heading)
-    turn = wrapped(heading_at(state, goal) - heading)
-    count = list_words(dx * cos + dy * sin, dy * cos - dx * sin, turn, c.words)
+    there = (goal[X], goal[Y], heading_at(state, goal))
+    count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
     lead = lead_of(state, top, vehicle)
     for i in range(count):
         c.seconds[i] = word_seconds(c.words[i], radius, lead, state[3], goal, top, vehicle)

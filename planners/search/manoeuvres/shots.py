@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from planners.search.connection.candidates import list_connections, next_word, word_seconds
+from planners.search.connection.candidates import (
+    list_connections,
+    list_words_between,
+    next_word,
+    word_seconds,
+)
 from planners.search.connection.connection import Connection, first_pose, radius_at
 from planners.search.connection.outline import outline_is_free
-from planners.search.connection.words import PARTS, list_words
+from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.arcs import stride_along, stride_of
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goal
 from planners.search.manoeuvres.driving import Drive
@@ -20,7 +25,6 @@ from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
-from planners.world.trigonometry import sincos, wrapped
 from planners.world.vehicles.dynamics import load, tightest_bend
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -115,14 +119,11 @@ def _shoot_with_trailers(
     """Try words to a node, corrected so that the trailers stand as they do there."""
     c = drive.connection
     x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+    there = (tree.states[node, 0], tree.states[node, 1], tree.states[node, 2])
     if known.start[0, 3] != 0.0 and not vehicle.first_order:
         return False
     radius = known.radius
-    dx = (tree.states[node, 0] - x) / radius
-    dy = (tree.states[node, 1] - y) / radius
-    sin, cos = sincos(heading)
-    turn = wrapped(tree.states[node, 2] - heading)
-    count = list_words(dx * cos + dy * sin, dy * cos - dx * sin, turn, c.words)
+    count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
     for i in range(count):
         c.seconds[i] = word_seconds(c.words[i], radius, 0.0, 0.0, drive.target, vehicle.max_speed, vehicle)
     for k in range(tree.states.shape[1]):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planners.search.manoeuvres.manoeuvring import suits
+from planners.search.manoeuvres.manoeuvring import suits, word_radius
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.goal import goal_of
@@ -40,15 +40,17 @@ def asked(seed: int, vehicle: Vehicle) -> Problem:
     return replace(problem_of(boxes), start=start, goal=goal, goal_radius=0.2, arrival=arrival)
 
 
+def is_driven_forwards(problem: Problem, vehicle: Vehicle) -> None:
+    plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
+    assert plan is not None
+    assert faults(problem, plan, vehicle) == []
+    assert plan.states[:, 3].min() >= vehicle.min_speed - 1e-9
+
+
 @pytest.mark.parametrize("name", FORWARDS)
 def test_poses_are_reached_without_reversing(name: str) -> None:
-    vehicle = FORWARDS[name]
     for seed in range(8):
-        problem = asked(seed, vehicle)
-        plan = solve(problem, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan
-        assert plan is not None
-        assert faults(problem, plan, vehicle) == []
-        assert plan.states[:, 3].min() >= vehicle.min_speed - 1e-9
+        is_driven_forwards(asked(seed, FORWARDS[name]), FORWARDS[name])
 
 
 def test_who_cannot_stand_is_not_asked_to() -> None:
@@ -58,3 +60,21 @@ def test_who_cannot_stand_is_not_asked_to() -> None:
     at_rest = replace(problem, arrival=Arrival(0.0, 0.1, 0.0, 0.0))
     assert not suits(goal_of(at_rest), unicycle)
     assert not suits(goal_of(problem), unicycle._replace(first_order=False))
+
+
+def in_a_dead_end(seed: int, vehicle: Vehicle) -> Problem:
+    """From facing the closed end of a lane to facing its open end, with 0.4 m beside a turn on each side."""
+    radius = word_radius(vehicle._replace(max_speed=max(vehicle.min_speed, 1.0)))
+    half = math.hypot(radius + 0.5 * vehicle.width, vehicle.front) + 0.4
+    walls = [box(25.0, 36.0, 0.0, half + 1.0, 1.0)]
+    walls += [box(25.0 + side * (half + 1.0), 25.0, 0.0, 1.0, 10.0) for side in (-1.0, 1.0)]
+    start = 25.0 + np.random.default_rng(seed).uniform(-0.3, 0.3) * half, 22.0, 0.5 * math.pi
+    slow = max(vehicle.min_speed, 0.0)
+    arrival = Arrival(-0.5 * math.pi, 0.1, slow, vehicle.max_speed if slow > 0.0 else 0.0)
+    return replace(problem_of(walls), start=start, goal=(25.0, 12.0), goal_radius=0.2, arrival=arrival)
+
+
+@pytest.mark.parametrize("name", FORWARDS)
+def test_who_faces_a_dead_end_turns_round(name: str) -> None:
+    for seed in range(4):
+        is_driven_forwards(in_a_dead_end(seed, FORWARDS[name]), FORWARDS[name])
