@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from planners.world.vehicles.vehicle import Vehicle, trailers_of
+from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, trailers_of
 from storage.fields import number_of, parse_json, short, text_of
 from storage.places.files import read_text
 from storage.worlds.limits import check_file, whole_number
@@ -89,8 +89,7 @@ def bench_mr_scenes(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fields]
         if name not in environments:
             raise ValueError(f"has no environment {short(name)}; it has {', '.join(environments)}")
         start, goal = _numbers(problem, "start", 3), _numbers(problem, "goal", 3)
-        x_min, y_min, x_max, y_max = _corners(problem.get("bounds"))
-        bounds = [x_min - reach, y_min - reach, x_max + reach, y_max + reach]
+        bounds = _widened(_corners(problem.get("bounds")), reach)
         yield _id(problem), _pose_to_pose(start, goal, bounds, environments[name])
 
 
@@ -98,7 +97,9 @@ def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fiel
     """Problems of dynobench, one in its YAML or many packed as JSON, or why they are not for a ``vehicle``.
 
     The vehicle of the model ``car1_v0`` is called ``dynobench-car1-v0``. JSON has ``problems``, each with
-    ``id``, ``model``, ``start``, ``goal``, ``bounds`` and ``obstacles``. Raises ValueError or StorageError.
+    ``id``, ``model``, ``start``, ``goal``, ``bounds`` and ``obstacles``. The bounds contain the reference
+    point; they are widened so far that whoever stays in them keeps it there. Raises ValueError or
+    StorageError.
     """
     check_file(file, LARGEST_FILE, "is it a problem of dynobench?")
     problems = _listed(_object(file), "problems") if file.suffix == ".json" else [_in_yaml(file)]
@@ -108,12 +109,21 @@ def dynobench_problems(file: Path, vehicle: Vehicle) -> Iterator[tuple[str, Fiel
         if vehicle.about.name.decode() != wanted:
             yield _id(problem), f"is for the model {model}; use it with a --vehicle named {wanted}"
             continue
-        kind = model.startswith("car"), model.startswith("unicycle2")
-        fields: Fields = {"bounds": _corners(problem.get("bounds"))}
+        fields: Fields = {"bounds": _widened(_corners(problem.get("bounds")), _inscribed(vehicle))}
         fields["obstacles"] = [_box(each) for each in _listed(problem, "obstacles")]
-        size = 5 if model.startswith("unicycle2") else 3 + len(trailers_of(vehicle))
-        fields |= _start(_numbers(problem, "start", size), *kind)
-        yield _id(problem), fields | _goal(_numbers(problem, "goal", size), *kind, vehicle)
+        size = 3 + (len(trailers_of(vehicle)) if vehicle.first_order else 2)
+        fields |= _start(_numbers(problem, "start", size), vehicle)
+        yield _id(problem), fields | _goal(_numbers(problem, "goal", size), vehicle)
+
+
+def _inscribed(vehicle: Vehicle) -> float:
+    """How far the first body extends from its reference point in every direction, in metres."""
+    return vehicle.scale * min(vehicle.front, vehicle.rear, 0.5 * vehicle.width)
+
+
+def _widened(bounds: list[float], by: float) -> list[float]:
+    x_min, y_min, x_max, y_max = bounds
+    return [x_min - by, y_min - by, x_max + by, y_max + by]
 
 
 def _in_yaml(file: Path) -> Fields:
@@ -134,32 +144,34 @@ def _in_yaml(file: Path) -> Fields:
     }
 
 
-def _start(state: list[float], is_car: bool, is_second_order: bool) -> Fields:
+def _start(state: list[float], vehicle: Vehicle) -> Fields:
     x, y, heading, *rest = state
-    if is_car:  # the headings of the trailers
-        return {"start": [x, y, heading], "start_hitch": _hitches(heading, rest)}
-    if is_second_order:
-        return {"start": [x, y, heading], "start_speed": rest[0], "start_turn_rate": rest[1]}
-    return {"start": [x, y, heading]}
+    fields: Fields = {"start": [x, y, heading]}
+    if not vehicle.first_order:
+        turning = "start_turn_rate" if isinstance(vehicle, DifferentialDrive) else "start_steering"
+        fields |= {"start_speed": rest[0], turning: rest[1]}
+    elif rest:  # the headings of the trailers
+        fields["start_hitch"] = _hitches(heading, rest)
+    return fields
 
 
-def _goal(state: list[float], is_car: bool, is_second_order: bool, vehicle: Vehicle) -> Fields:
+def _goal(state: list[float], vehicle: Vehicle) -> Fields:
     """What is asked at the goal: all of it together is within dynobench's distance.
 
-    That is 1 m of place and 0.5 of each heading, and for speeds 0.25 of each. Speeds of the first order are
-    controls and may be any. A turn rate at the goal cannot be asked for.
+    That is 1 m of place and 0.5 of each heading, and for speeds 0.25 of each (0.2 for ``car2_v0``). Speeds of
+    the first order are controls and may be any. Neither turn rate nor steering can be asked for at the goal.
     """
     x, y, heading, *rest = state
     fields: Fields = {"goal": [x, y, heading], "goal_tolerance": [0.4 * DISTANCE, 1.2 * DISTANCE]}
     low, high = vehicle.scale * vehicle.min_speed, vehicle.scale * vehicle.max_speed
     fields["goal_speed"] = [low, high]
-    if is_car:
+    if not vehicle.first_order:
+        fields["goal_tolerance"] = [0.4 * DISTANCE, 0.6 * DISTANCE]
+        fields["goal_speed"] = [max(rest[0] - 0.4 * DISTANCE, low), min(rest[0] + 0.4 * DISTANCE, high)]
+    elif rest:
         angle = 0.4 * DISTANCE  # of the car, and as much again of the hitch
         fields |= {"goal_tolerance": [0.4 * DISTANCE, angle], "goal_hitch": _hitches(heading, rest)}
         fields["goal_hitch_tolerance"] = [angle] * len(rest)
-    if is_second_order:
-        fields["goal_tolerance"] = [0.4 * DISTANCE, 0.6 * DISTANCE]
-        fields["goal_speed"] = [max(rest[0] - 0.4 * DISTANCE, low), min(rest[0] + 0.4 * DISTANCE, high)]
     return fields
 
 

@@ -22,14 +22,13 @@ MODELS = [read_vehicle(path) for path in sorted(Path("docs/vehicles/benchmarks")
 
 def slopes(state: np.ndarray, action: np.ndarray, vehicle: Vehicle) -> np.ndarray:
     """Dynobench's equations, in real metres."""
-    name, heading = vehicle.about.name.decode(), state[2]
-    if "car1" in name:
-        speed, turn = action[0], action[0] / 0.25 * np.tan(action[1])
-        trailer = speed / 0.5 * np.sin(heading - state[3])
-        return np.array([speed * np.cos(heading), speed * np.sin(heading), turn, trailer])
-    speed, turn = (action if "unicycle1" in name else state[3:5]).tolist()
-    accelerations = [] if "unicycle1" in name else action.tolist()
-    return np.array([speed * np.cos(heading), speed * np.sin(heading), turn, *accelerations])
+    heading, is_car = state[2], "car" in vehicle.about.name.decode()
+    speed, turn = (action if vehicle.first_order else state[3:5]).tolist()
+    turn = speed / 0.25 * np.tan(turn) if is_car else turn
+    more = action.tolist()
+    if vehicle.first_order:
+        more = [speed / 0.5 * np.sin(heading - state[3])] if is_car else []
+    return np.array([speed * np.cos(heading), speed * np.sin(heading), turn, *more])
 
 
 @pytest.mark.parametrize("vehicle", MODELS, ids=lambda vehicle: vehicle.about.name.decode())

@@ -7,13 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given
+from hypothesis import strategies as st
 
 from flows.cli.main import call
 from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import DifferentialDrive
 from storage.exchange.problems import read_problems
 from storage.vehicles.vehicle_files import read_vehicle
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
+from tests.storage.samples import quick
 from tests.worlds import SHARED
 
 GIVEN = SHARED / "manoeuvres"
@@ -130,7 +134,13 @@ def test_what_is_wrong_with_a_file_is_told_in_one_line(
 
 @pytest.mark.parametrize(
     ("model", "start", "count"),
-    [("unicycle2_v0", [1.0, 1.0, 0.0], 5), ("unicycle1_v0", [1.0, 1.0], 3), ("car1_v0", [1.0, 1.0, 0.0], 4)],
+    [
+        ("unicycle2_v0", [1.0, 1.0, 0.0], 5),
+        ("unicycle1_v0", [1.0, 1.0], 3),
+        ("unicycle_first_order_0", [1.0, 1.0, 0.0, 0.0], 3),
+        ("car1_v0", [1.0, 1.0, 0.0], 4),
+        ("car2_v0", [1.0, 1.0, 0.0], 5),
+    ],
 )
 def test_a_state_of_too_few_numbers_is_told(
     model: str, start: list[float], count: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -177,3 +187,101 @@ def test_an_imported_case_is_a_problem_file_in_its_own_frame(tmp_path: Path) -> 
     shift = (np.array(far) - there.offset) / there.scale  # less than a metre: offsets are whole ones
     assert math.hypot(*shift) < 1.0
     assert np.allclose(there.obstacles.vertices, near.obstacles.vertices + shift, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.skipif(not GIVEN.is_dir(), reason="the problems of others do not lie beside the repository")
+def test_every_model_of_dynobench_has_a_vehicle_of_its_size_and_limits() -> None:
+    models = json.loads((GIVEN / "dynobench/problems.json").read_text())["models"]
+    for model, about in models.items():
+        vehicle = read_vehicle(VEHICLES / f"dynobench-{model.replace('_', '-')}.yaml")
+        speeds = [vehicle.scale * vehicle.min_speed, vehicle.scale * vehicle.max_speed]
+        assert speeds == [about["min_vel"], about["max_vel"]]
+        if "min_angular_vel" in about:
+            least, most = about["min_angular_vel"], about["max_angular_vel"]
+            assert isinstance(vehicle, DifferentialDrive)
+            assert vehicle.max_turn_rate == min(-least, most)
+        if about.get("shape") == "sphere":
+            (outline,) = vehicle.about.outline
+            ring = vehicle.scale * shapely.Polygon(outline).exterior.distance(shapely.Point(0.0, 0.0))
+            reach = vehicle.scale * max(math.hypot(x, y) for x, y in outline)
+            assert about["radius"] - 1e-12 <= ring
+            assert reach <= 1.021 * about["radius"]
+
+
+def problem_of(folder: Path, model: str, **fields: object) -> Problem:
+    raw = {"id": "kin", "model": model, "bounds": [[0, 0], [6, 6]], "obstacles": [], **fields}
+    (folder / "kin.json").write_text(json.dumps({"problems": [raw]}))
+    return imported(folder / "kin.json", "dynobench", f"dynobench-{model.replace('_', '-')}")["kin"]
+
+
+def test_a_second_order_car_starts_in_motion_with_its_wheels_turned(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, "car2_v0", start=[1, 2, 0.3, 0.2, -0.4], goal=[4, 4, 1, 0, 0])
+    assert problem.scale * problem.start_motion[0] == pytest.approx(0.2)
+    assert problem.start_motion[1] == pytest.approx(-0.4)
+    assert problem.arrival is not None
+    assert problem.arrival.heading == 1.0
+    assert problem.scale * problem.arrival.most_speed == pytest.approx(0.04)
+
+
+@quick
+@given(
+    x=st.floats(-1.0, 7.0), y=st.floats(-1.0, 7.0), heading=st.floats(-3.1, 3.1),
+    model=st.sampled_from(["car2_v0", "unicycle1_v0", "unicycle_first_order_0"]),
+)  # fmt: skip
+def test_whoever_stays_in_the_bounds_keeps_the_reference_point_in_those_of_dynobench(
+    x: float, y: float, heading: float, model: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    rest = [0, 0] if model == "car2_v0" else []
+    ends = {"start": [3, 3, 0, *rest], "goal": [4, 4, 0, *rest]}
+    problem = problem_of(tmp_path_factory.mktemp("bounds"), model, **ends)
+    vehicle = read_vehicle(VEHICLES / f"dynobench-{model.replace('_', '-')}.yaml")
+    box = shapely.box(-vehicle.rear, -0.5 * vehicle.width, vehicle.front, 0.5 * vehicle.width)
+    turned = shapely.affinity.rotate(box, heading, origin=(0, 0), use_radians=True)
+    body = shapely.affinity.translate(turned, x / problem.scale, y / problem.scale)
+    if shapely.box(*problem.bounds).contains(body):
+        assert -1e-9 <= x <= 6.0 + 1e-9
+        assert -1e-9 <= y <= 6.0 + 1e-9
+
+
+SQUARE = [[9.0, -3.0], [12.0, -3.0], [12.0, 3.0], [9.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "area"),
+    [
+        ([SQUARE[::-1]], 18.0),
+        ([[*SQUARE, SQUARE[0]]], 18.0),
+        ([[SQUARE[0], SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[2], SQUARE[2], SQUARE[3]]], 18.0),
+        ([[*SQUARE[:1], [10.0, -3.0], *SQUARE[1:]]], 18.0),
+        ([SQUARE, [[12, -3], [15, -3], [15, 3], [12, 3]]], 36.0),  # touching
+        ([[[100, 100], [103, 100], [103, 106], [100, 106]]], 18.0),  # out of bounds
+        ([[[-4, -3], [14, -3], [14, 8], [-4, 8], [-4, 7.5], [13.5, 7.5], [13.5, -2.5], [-4, -2.5]]], 23.0),
+    ],
+)
+@pytest.mark.parametrize("far", [(0.0, 0.0), (4_484_378_811.25, -354_286_007.25)])
+def test_polygons_are_read_however_they_are_drawn(
+    obstacles: list[list[list[float]]], area: float, far: tuple[float, float], tmp_path: Path
+) -> None:
+    x, y = far
+    moved = [[[x + u, y + w] for u, w in polygon] for polygon in obstacles]
+    case = {"id": "drawn", "start": [x, y, 0.1], "goal": [x + 6.0, y + 4.0, 1.0], "obstacles": moved}
+    (tmp_path / "drawn.json").write_text(json.dumps({"cases": [case]}))
+    problem = imported(tmp_path / "drawn.json", "tpcap", "tpcap-car")["drawn"]
+    pieces = [shapely.Polygon(problem.scale * piece) for piece in problem.obstacles.pieces()]
+    assert sum(piece.area for piece in pieces) == pytest.approx(area, rel=1e-6)
+    offset = np.array(problem.offset) - far
+    for polygon in obstacles:
+        wanted = shapely.Polygon(np.array(polygon) - offset)
+        assert shapely.union_all(pieces).buffer(1e-5).contains(wanted)
+
+
+def test_an_obstacle_over_the_start_is_told_in_one_line(tmp_path: Path) -> None:
+    case = {**TPCAP, "obstacles": [[[-1, -1], [1, -1], [1, 1], [-1, 1]]]}
+    (tmp_path / "case.json").write_text(json.dumps({"cases": [case]}))
+    settings = ImportSettings(vehicle=read_vehicle(VEHICLES / "tpcap-car.yaml"))
+    parts = [
+        import_part(source_at(tmp_path / "case.json", "tpcap"), part, settings) for part in ("train", "test")
+    ]
+    ((_, told),) = [each for part in parts for each in part.skipped]
+    assert "start footprint" in told
+    assert "\n" not in told
