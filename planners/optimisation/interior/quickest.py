@@ -27,7 +27,7 @@ from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS
+from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS, SLACK
 from planners.world.jit import jit
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import admissible, control_limits, load, simulate, step, store
@@ -240,20 +240,31 @@ def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     start = drive.model.states[0].copy()
     controls = drive.model.controls[:steps].copy()
     states = _keep_within(controls, start, vehicle)
-    most = control_limits(vehicle)[0]
-    asked = min(max(states[-1, 3], drive.asked[LEAST_SPEED]), drive.asked[MOST_SPEED])
-    missing = (asked - states[-1, 3]) / vehicle.dt
-    for k in range(steps - 1, -1, -1):  # rounding leaves a little speed, which the last steps take away
-        before = controls[k, 0]
-        controls[k, 0] = min(max(before + missing, -most), most)
-        missing -= controls[k, 0] - before
-        if missing == 0.0:
-            break
+    controls = at_asked_speed(controls, float(states[-1, 3]), drive.asked, vehicle)
     states = simulate(start, controls, vehicle)
     arrives = steps_to_goal(states[-1:], 0, drive.asked, vehicle) == 0
     if not arrives or count_free_prefix(states, vehicle, drive.scene) <= steps:
         return None
     return Plan(states, controls, vehicle.dt)
+
+
+def at_asked_speed(controls: Floats, speed: float, goal: Floats, vehicle: Vehicle) -> Floats:
+    """Controls ``[T - 1, 2]`` that end at a speed that is asked for, where these end at ``speed`` (m/s).
+
+    Rounding leaves a little speed, which the last steps take away. What they are to leave lies within what is
+    asked by its slack, so that rounding again does no harm.
+    """
+    most = control_limits(vehicle)[0]
+    asked = min(max(speed, goal[LEAST_SPEED] + SLACK), goal[MOST_SPEED] - SLACK)
+    missing = (asked - speed) / vehicle.dt
+    controls = controls.copy()
+    for k in range(len(controls) - 1, -1, -1):
+        before = controls[k, 0]
+        controls[k, 0] = min(max(before + missing, -most), most)
+        missing -= controls[k, 0] - before
+        if missing == 0.0:
+            break
+    return controls
 
 
 @jit

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
 from planners.optimisation.interior.newton import direction
+from planners.optimisation.interior.quickest import at_asked_speed
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import polish
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
-from planners.world.goal import goal_of
+from planners.world.goal import goal_of, reaches
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
@@ -224,3 +225,16 @@ def test_a_retimed_drive_goes_the_same_way_within_all_limits(turns: int, waits: 
     assert (states[:, 3] >= CAR.min_speed).all()
     apart = np.hypot(*(states[:, None, :2] - plan.states[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() <= CAR.dt * CAR.max_speed
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10**6), left=st.floats(-0.01, 0.01))
+def test_what_rounding_leaves_of_a_speed_does_not_count(seed: int, left: float) -> None:
+    rng = np.random.default_rng(seed)
+    controls = np.concatenate([manoeuvre(2), rng.normal(0.0, 1e-3, (3, 2))])
+    problem, plan = driven(controls)
+    controls[-1, 0] += (left - plan.states[-1, 3]) / CAR.dt
+    start = start_state(problem, CAR)
+    speed = float(simulate(start, controls, CAR)[-1, 3])
+    ended = simulate(start, at_asked_speed(controls, speed, goal_of(problem), CAR), CAR)
+    assert reaches(tuple(ended[-1]), goal_of(problem))
