@@ -147,13 +147,6 @@ def improve(
     return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes, is_given)
 
 
-def _is_narrow(query: Query) -> bool:
-    """Whether drives of several kinds lead to the goal, and a search for manoeuvres finds them best."""
-    goal, vehicle = goal_of(query.problem), query.vehicle
-    start = start_state(query.problem, vehicle)
-    return suits(goal, vehicle) and (meets(start, vehicle) or is_tight(goal, vehicle, query.scene))
-
-
 def search_and_polish(
     planner: str, query: Query, seed: int, given: Plan | None = None
 ) -> tuple[Outcome, bool]:
@@ -164,7 +157,7 @@ def search_and_polish(
 
     Args:
         planner: one of ``PLANNERS``.
-        query: what it is asked; its limits are those of all searches together.
+        query: what it is asked; its limits are those of all searches together, the seconds those of all.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
 
@@ -172,8 +165,13 @@ def search_and_polish(
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
         with the work and the time of all; and whether it is the given plan.
     """
-    began = perf_counter()
-    varies = planner == "lattice" and _is_narrow(query)
+    until = perf_counter() + query.limits.seconds
+    goal, vehicle = goal_of(query.problem), query.vehicle
+    if planner == "lattice" and suits(goal, vehicle):
+        query = replace(query, is_tight=is_tight(goal, vehicle, query.scene))
+    varies = query.is_tight is not None and (
+        query.is_tight or meets(start_state(query.problem, vehicle), vehicle)
+    )
     query = replace(query, others=varies)
     found = [] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
     if given is None:
@@ -186,7 +184,7 @@ def search_and_polish(
         limits = replace(
             query.limits,
             expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
-            seconds=query.limits.seconds - (perf_counter() - began),
+            seconds=until - perf_counter(),
             bound_s=min(SHORTER * plan.duration_s, query.limits.bound_s),
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
@@ -199,7 +197,8 @@ def search_and_polish(
     if not solved:
         return found[0], False
     number, polished = polish_quickest(
-        query.problem, [plan for _, plan in solved], query.vehicle, query.scene, query.workspace
+        *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
+        seconds=until - perf_counter(),
     )
     best, given_best = solved[number]
     plan = polished.plan or given_best

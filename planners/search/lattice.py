@@ -62,6 +62,7 @@ NOWHERE = place(0.0, 0.0, 0.0)
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     """Plan from the problem's start to its goal. A guide is not looked at."""
+    until = perf_counter() + query.limits.seconds
     go = query.workspace.buffers(allocate_cost_to_go)
     frontier = query.workspace.buffers(allocate_frontier)
     vehicle, scene = query.vehicle, query.scene
@@ -148,10 +149,10 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     if query.others and outcome.plan is not None and manoeuvring is not None:
         began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
-        left = manoeuvring.further(settings.further, settings.for_one, left)
+        left = manoeuvring.further(settings.further, settings.for_one, left, until)
         kept = manoeuvring.kept
         if joining is not None:
-            joining.further(settings.further, settings.further, left)
+            joining.further(settings.further, settings.further, left, until)
             kept += joining.kept
         outcome = replace(
             outcome,

@@ -67,6 +67,7 @@ class Query:
     prefix: Plan | None = None  # a free drive from the problem's start, from which the search goes on
     occupied: Bits | None = None  # [64] the cells that are not free, if they are drawn
     knows_way: bool = False  # whether the workspace holds the distances to the goal over these cells already
+    is_tight: bool | None = None  # whether there is little room around the goal, if that is known already
     # what else is tried while the search goes on: told of its work so far, it may return a plan that ends it
     beside: Callable[[int], Plan | None] | None = None
     endings: Endings | None = None  # known ways into a pose at rest, for searches of manoeuvres

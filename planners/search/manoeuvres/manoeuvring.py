@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -42,6 +43,7 @@ FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: g
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
 SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
 TIGHT: Final = 0.6  # a goal with less room around it is tight
+SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
@@ -163,7 +165,8 @@ class Manoeuvring:
         self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
         self._level = self._spent = self.expansions = 0
         self._begin_at_coarsest()
-        self.is_tight = is_tight(goal, vehicle, query.scene)
+        known_tight = query.is_tight
+        self.is_tight = is_tight(goal, vehicle, query.scene) if known_tight is None else known_tight
         self._grow(0)  # compiled, if need be, before the planner's clock runs
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
@@ -194,44 +197,47 @@ class Manoeuvring:
 
     def advance(self, tree: Tree, most: int) -> bool:
         """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
-        until = self.expansions + most
-        while self.expansions < until and not self.is_over:
-            level_ends = self._expansions - self._spent
-            found, used = self._grow(min(until - self.expansions, level_ends))
-            if found and add_to_tree(self._drive, tree, self._vehicle):
+        end = self.expansions + most
+        while self._finds_drive(end):
+            if add_to_tree(self._drive, tree, self._vehicle):
                 self._keep()
                 return True
-            if used == 0 or used == level_ends:
-                self._next_level()
         return False
 
-    def further(self, most: int, for_one: int, within: int) -> int:
+    def further(self, most: int, for_one: int, within: int, until: float) -> int:
         """Search on for drives of other kinds, or quicker ones; they are kept.
 
         Args:
             most: expansions.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
+            until: when to end, by ``perf_counter``.
 
         Returns:
             How many expansions are left of those.
         """
-        until = self.expansions + within
-        if not self.kept:
-            self._go_on(min(for_one, within), for_one=True)
-        self._go_on(min(most, until - self.expansions))
-        return until - self.expansions
+        last = self.expansions + within
+        if not self.kept and self._finds_drive(min(self.expansions + for_one, last), until):
+            self._keep()
+        end = min(self.expansions + most, last)
+        while self._finds_drive(end, until):
+            self._keep()
+        return last - self.expansions
 
-    def _go_on(self, most: int, for_one: bool = False) -> None:
-        until = self.expansions + most
-        while self.expansions < until and not self.is_over:
-            found, _ = self._grow(min(until - self.expansions, self._expansions - self._spent))
+    def _finds_drive(self, end: int, until: float = math.inf) -> bool:
+        """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
+
+        A level ends when it has had all its expansions, or nothing is left to open.
+        """
+        while self.expansions < end and not self.is_over and perf_counter() < until:
+            level_ends = self._expansions - self._spent
+            found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:
-                self._keep()
-                if for_one:
-                    return
-            elif self.expansions < until:
-                self._next_level()
+                return True
+            if used == 0 or used == level_ends:
+                self._level, self._spent = self._level + 1, 0
+                self._begin()
+        return False
 
     @property
     def kept(self) -> list[Other]:
@@ -244,10 +250,6 @@ class Manoeuvring:
         steps = int(drive.counts[0])
         plan = Plan(drive.states[: steps + 1].copy(), drive.controls[:steps].copy(), self._vehicle.dt)
         self._kept[keep_last(drive.ways)] = Other(plan, self.joined)
-
-    def _next_level(self) -> None:
-        self._level, self._spent = self._level + 1, 0
-        self._begin()
 
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)

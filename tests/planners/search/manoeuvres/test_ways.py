@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planners.optimisation import polish
+from planners.optimisation.interior import quickest
 from planners.optimisation.polish import polish_quickest
+from planners.search import anytime, lattice
 from planners.search.anytime import search_and_polish
+from planners.search.manoeuvres import manoeuvring
 from planners.search.manoeuvres.endings import endings_of
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Outcome
@@ -21,8 +25,10 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
 from planners.world.workspace import Workspace
+from tests.planners.clock import ticks
 
 WORKSPACE = Workspace()
+SOON = 30  # looks at the clock after the time is up, one for each thing that is not begun any more
 
 
 def asked(
@@ -63,6 +69,43 @@ def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
         first = searched(problem, CAR, False).expansions
         for most in (first, first + 7, first + 100):
             assert searched(problem, CAR, True, Limits(expansions=most)).expansions <= most
+
+
+def test_the_first_plan_comes_as_it_was_found_when_the_time_is_up_then() -> None:
+    for name, vehicle in (("parallel", CAR), ("lot", CAR), ("dock", VEHICLES["car-1-trailer"])):
+        for number in range(2):
+            problem = to_canonical(family(name, vehicle=vehicle).draw(6, number))[0]
+            first = searched(problem, vehicle, False, Limits(seconds=0.0))
+            query = replace(asked(problem, vehicle), limits=Limits(seconds=0.0))
+            whole, _ = search_and_polish("lattice", query, 0)
+            assert (whole.status, whole.expansions) == (first.status, first.expansions)
+            assert (whole.plan is None) == (first.plan is None)
+            if first.plan is not None and whole.plan is not None:
+                assert np.array_equal(whole.plan.controls, first.plan.controls)
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "lot"])
+def test_the_clock_is_looked_at_all_the_time_and_ends_all_soon(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn = (to_canonical(family(name).draw(6, number))[0] for number in range(20))
+    soon = Limits(seconds=0.0)
+    problem = next(each for each in drawn if searched(each, CAR, False, soon).plan is not None)
+    whole = search_and_polish("lattice", asked(problem), 0)[0].plan
+    first = searched(problem, CAR, False).plan
+    assert whole is not None
+    assert first is not None
+    for looks in (0, 3, 10, 30, 100, 10**9):
+        now = ticks(1.0)
+        for module in (anytime, lattice, manoeuvring, polish, quickest):
+            monkeypatch.setattr(module, "perf_counter", now)
+        query = replace(asked(problem), limits=Limits(seconds=looks))
+        found = search_and_polish("lattice", query, 0)[0].plan
+        assert found is not None
+        assert faults(problem, found, CAR) == []
+        assert whole.duration_s <= found.duration_s <= first.duration_s
+        assert now() <= looks + SOON or looks == 10**9
+    assert np.array_equal(found.controls, whole.controls)
 
 
 def test_of_drives_with_known_endings_only_those_that_end_so_are_said_to() -> None:
