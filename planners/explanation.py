@@ -12,10 +12,10 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
+from planners.memory_answers import least_blocked
 from planners.search.help import PATIENCE
 from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
-from planners.solve import least_blocked
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
 from planners.world.problem import Problem, is_canonical

@@ -12,7 +12,7 @@ def early_help() -> Iterator[None]:
     """Inside, a memory helps after a single expansion of the planner's own search."""
     with (
         mock.patch("planners.search.help.PATIENCE", 0),
-        mock.patch("planners.solve.PATIENCE", 0),
+        mock.patch("planners.memory_answers.PATIENCE", 0),
         mock.patch("planners.search.search_loop.SLICE", 1),
     ):
         yield
