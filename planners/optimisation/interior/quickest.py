@@ -114,6 +114,7 @@ def quickest(
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     circles = circles_around(scene)
     most, used = iterations * len(guesses), 0
+    number, best = -1, None
     for firmness in ATTEMPTS:
         pushing = barrier._replace(strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m)
         aim = _drawn_in(goal, firmness.tolerance)
@@ -126,16 +127,20 @@ def quickest(
             dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
             used += spent
             guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
-        number, best = -1, None
+        left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
             below = NEVER if best is None else len(best.controls)
             found, spent = _in_whole_steps(drive, guesses[k], vehicle, below, most - used)
             used += spent
             if found is not None:
                 number, best = k, found
-        if best is not None or used >= most or perf_counter() > until:
-            return number, best, used
-    return -1, None, used
+            else:
+                left[k] = guesses[k]
+        longest = math.inf if best is None else best.duration_s - vehicle.dt
+        guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
+        if not guesses or used >= most or perf_counter() > until:
+            break
+    return number, best, used
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:

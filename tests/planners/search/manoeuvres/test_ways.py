@@ -152,6 +152,23 @@ def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
         assert polished.plan.duration_s <= min(plan.duration_s for plan in plans)
 
 
+@pytest.mark.parametrize(
+    ("name", "difficulty", "number"),
+    [("parallel", "hard", 0), ("perpendicular", "hard", 27), ("lot", "standard", 44)],
+)
+def test_a_drive_that_takes_several_attempts_is_not_lost_beside_another(
+    name: str, difficulty: str, number: int
+) -> None:
+    problem = to_canonical(family(name, difficulty).draw(5, number))[0]
+    found, scene = searched(problem, CAR, True), scene_of(problem)
+    assert found.plan is not None
+    plans = [found.plan, *(other.plan for other in found.others)]
+    together = polish_quickest(problem, plans, CAR, scene, WORKSPACE)[1].plan
+    alone = [polish.polish(problem, plan, CAR, scene, WORKSPACE).plan for plan in plans]
+    assert together is not None
+    assert together.duration_s <= min(plan.duration_s for plan in alone if plan is not None)
+
+
 def test_one_way_of_each_kind_is_kept_and_the_slowest_gives_way() -> None:
     ways, best = allocate_ways(), dict[int, float]()
     forget_ways(ways)
