@@ -52,7 +52,7 @@ class LatticeSettings(NamedTuple):
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
-    further: int = 400  # expansions of the search for manoeuvres, for drives of other kinds
+    further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     for_one: int = 2000  # as long as it has found none
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 

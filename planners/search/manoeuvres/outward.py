@@ -24,6 +24,7 @@ from planners.search.manoeuvres.pose_tree import (
     seconds_after,
 )
 from planners.search.manoeuvres.shots import FromStart, shoot
+from planners.search.manoeuvres.ways import slowest_kept
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
 from planners.world.arrays import Floats, Integers
@@ -69,13 +70,19 @@ def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scen
 
 
 @inlined
-def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
+def _least_seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
+    """The time from the start if nothing is in the way."""
     x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
     if known.outward:
-        turns = seconds_from(x, y, heading, (state[0], state[1], state[2]), known.table, vehicle.max_speed)
-    else:
-        turns = seconds_from(state[0], state[1], state[2], (x, y, heading), known.table, vehicle.max_speed)
-    return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)
+        pose = (state[0], state[1], state[2])
+        return float(seconds_from(x, y, heading, pose, known.table, vehicle.max_speed))
+    return float(seconds_from(state[0], state[1], state[2], (x, y, heading), known.table, vehicle.max_speed))
+
+
+@inlined
+def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
+    around = metres_to_go(state[0], state[1], known.go) / vehicle.max_speed
+    return max(_least_seconds_from_start(state, known, vehicle), around)
 
 
 @lean
@@ -201,6 +208,9 @@ def grow_outward(
         key = cell_of(state, tree.metres[node], tree, cell, settings.headings, vehicle)
         if was_reached(tree.frontier, key):
             continue
+        least = tree.seconds[node] + _least_seconds_from_start(state, known, vehicle)
+        if least >= slowest_kept(drive.ways):
+            continue  # no way over it is worth driving
         reach(tree.frontier, key)
         expansions += 1
         if len(state) > 5:  # decided when compiling

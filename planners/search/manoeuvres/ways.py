@@ -113,12 +113,12 @@ def _joined_seconds(
 
 
 @inlined
-def _is_quick(ways: Ways, seconds: float) -> bool:
-    """Whether a way takes less than the slowest that is kept: no other is worth a look at its legs."""
+def slowest_kept(ways: Ways) -> float:
+    """The seconds below which a way is worth a look at its legs; infinite while a kind is missing."""
     worst = 0.0
     for k in range(KEPT):
         worst = max(worst, ways.seconds[k])
-    return bool(seconds < worst)
+    return float(worst)
 
 
 @inlined
@@ -154,7 +154,7 @@ def word_is_worth(
         _add_leg(ways, part, word[k] * word[PARTS + k])
     seconds += _run(metres, gear, vehicle)
     seconds = _joined_seconds(tree, node, metres, gear, seconds, vehicle)
-    if not _is_quick(ways, seconds):
+    if seconds >= slowest_kept(ways):
         return False
     _add_legs_to_root(ways, tree, node, -1.0)
     return _is_worth(ways, seconds)
@@ -167,7 +167,7 @@ def meeting_is_worth(
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
     gear = 1.0 if before.metres[last] > 0.0 else -1.0
     seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
-    if not _is_quick(ways, seconds):
+    if seconds >= slowest_kept(ways):
         return False
     ways.counts[0] = 0
     _add_legs_to_root(ways, before, last, 1.0)
