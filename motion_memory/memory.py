@@ -26,6 +26,7 @@ from planners.world.alignment import from_canonical, scaled, shifted, to_canonic
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import checked_problem
+from planners.world.classes.families import families_of, family
 from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -278,15 +279,25 @@ def load(
 
 
 def _warmed(ready: Memory) -> Memory:
-    """Plan to a place and to a pose to compile and index everything; return ``ready``."""
+    """Plan to places and poses to compile and index everything; return ``ready``."""
     scale = ready.stored.scales[0]
-    away = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
+    start, goal = (0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE)
     bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
-    for asked in (ready, replace(ready, assist="none")):  # recall, then search
-        for arrival in (None, Arrival(0.5 * math.pi, 0.1)):  # a place, then a pose
-            asked.plan_arrays(
-                *((0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE), away, np.array([0, 3])),
-                *(scale * GOAL_RADIUS, bounds, scale),
-                arrival=arrival,
-            )
+    aside = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
+    wall = scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]])  # no way leads past it
+
+    def ask(planner: Memory, obstacle: Floats = aside, arrival: Arrival | None = None) -> None:
+        planner.plan_arrays(
+            *(start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale),
+            arrival=arrival,
+        )
+
+    alone = replace(ready, assist="none")
+    narrow = family(families_of(ready.vehicle)[0], "easy", ready.vehicle).draw(0, 0)
+    for each in (ready, alone):  # recall, then search
+        ask(each)
+        ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
+        each.plan(narrow)
+    ask(alone, wall)
+    ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
     return ready

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from planners.search.guides.sampling import uniform
 from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.search.structures.cost_to_go import (
@@ -193,6 +192,5 @@ def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
 
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:
     """Another lattice, drawn at random: whoever wants a better plan than before must look at other states."""
-    bits = query.rng.bit_generator
-    steps = max(lattice.steps + int(3.0 * uniform(bits)) - 1, 1)
-    return lattice._replace(greed=greed, steps=steps, turn=0.7 + 0.6 * uniform(bits))
+    steps = max(lattice.steps + int(3.0 * query.rng.random()) - 1, 1)
+    return lattice._replace(greed=greed, steps=steps, turn=0.7 + 0.6 * query.rng.random())

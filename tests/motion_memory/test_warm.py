@@ -1,0 +1,35 @@
+"""A memory that is loaded is ready: no question waits for a compiler."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from planners.memory.library.plan_library import gathered_library
+from planners.solve import solve
+from planners.world.vehicles.vehicle import VEHICLES
+from storage.archives.libraries import save_library
+from tasks.attempts.compile_assists import EMPTY
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("name", ["car", "car-1-trailer"])
+def test_no_question_needs_a_kernel_that_loading_did_not(name: str, tmp_path: Path) -> None:
+    found = solve(EMPTY, "lattice", vehicle=VEHICLES[name]).plan
+    assert found is not None
+    library = tmp_path / "library"
+    save_library(library, gathered_library("one", VEHICLES[name], [("one", found)]))
+    said = subprocess.run(
+        [sys.executable, "-m", "tests.motion_memory.kernels_after_load", str(library)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert said.returncode == 0, said.stderr
+    first, *rest = said.stdout.splitlines()
+    assert int(first.split()[0]) > 0
+    assert rest == []
