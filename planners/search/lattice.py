@@ -101,8 +101,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         if manoeuvring is None:
             grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
             return
-        hard = manoeuvring.is_tight or manoeuvring.meets
-        here, there = settings.if_tight if hard else settings.by_turns
+        here, there = settings.if_tight if manoeuvring.is_hard else settings.by_turns
         now = here
         if counts[trees.EXPANSIONS] == 0:
             now = 0 if manoeuvring.is_tight else settings.alone
@@ -126,7 +125,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     def explore(tree: trees.Tree, goal: Floats, until: int) -> None:
         """RRT, or where it has small hopes the search for manoeuvres."""
         counts = tree.counts
-        if manoeuvring is None or not (manoeuvring.is_tight or manoeuvring.meets):
+        if manoeuvring is None or not manoeuvring.is_hard:
             at_random(tree, goal, until)
         elif not join(tree, manoeuvring.is_tight):
             manoeuvre(tree, manoeuvring, until - int(counts[trees.EXPANSIONS]))

@@ -19,6 +19,7 @@ SECTIONS: Final = {
     "planners": "tests.speed.planners",
     "vehicles": "tests.speed.vehicles",
     "manoeuvres": "tests.speed.manoeuvres",
+    "kin": "tests.speed.kin",
     "peers": "tests.speed.peers.comparison",
     "assists": "tests.speed.assists",
     "latency": "tests.speed.latency",

@@ -26,23 +26,53 @@ from planners.world.vehicles.vehicle import Vehicle
 @lean
 def drive_to_goal(
     drive: Drive,
+    before: PoseTree,
+    last: int,
     tree: PoseTree,
     node: int,
     word: int,
-    start: Floats,
     endings: Endings,
     goal: Floats,
     vehicle: Vehicle,
     scene: Scene,
 ) -> bool:
-    """Drive from the start over a word to a node, and from there over the tree's arcs to the goal.
+    """Drive from the start over arcs, then over a word to a node, and from there over arcs to the goal.
 
-    Returns whether that leads to the goal, and nothing is in the way. The drive lies in ``drive`` then.
+    The first arcs lead to node ``last`` of ``before``, the tree out of the start. Returns whether that leads
+    to the goal, and nothing is in the way. The drive lies in ``drive`` then.
     """
-    begin(drive, start)
-    if not drive_word(drive, word, vehicle, scene):
+    begin(drive, before.states)
+    if not (_drive_out(drive, before, last, vehicle, scene) and drive_word(drive, word, vehicle, scene)):
         return False
     return _drive_in(drive, tree, node, endings, goal, vehicle, scene)
+
+
+@lean
+def _drive_out(drive: Drive, before: PoseTree, last: int, vehicle: Vehicle, scene: Scene) -> bool:
+    """Drive over the arcs of the tree out of the start to a node."""
+    chain = drive.join.chain
+    links = 0
+    while last > 0:
+        if links == chain.shape[0]:
+            return False
+        chain[links] = last
+        links += 1
+        last = before.parents[last]
+    metres = 0.0
+    for k in range(links - 1, -1, -1):
+        link = chain[k]
+        metres += before.metres[link]
+        if (
+            k > 0
+            and before.bends[chain[k - 1]] == before.bends[link]
+            and before.metres[chain[k - 1]] * metres > 0.0
+        ):
+            continue  # the next arc goes on
+        gear = 1.0 if metres > 0.0 else -1.0
+        if not drive_arc(drive, gear, before.bends[link], abs(metres), vehicle, scene):
+            return False
+        metres = 0.0
+    return True
 
 
 @lean

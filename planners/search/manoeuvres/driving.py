@@ -230,12 +230,13 @@ def drive_arc(drive: Drive, gear: float, bend: float, metres: float, vehicle: Ve
 
 @lean
 def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
-    """Drive a word of the connection: in one go if it is free at some speed, else from arc to arc."""
+    """Drive on over a word of the connection: in one go if it is free at some speed, else from arc to arc."""
     c = drive.connection
-    at_rest = vehicle.first_order or drive.states[0, 3] == 0.0
+    at = drive.counts[0]
+    at_rest = vehicle.first_order or drive.states[at, 3] == 0.0
     for share in (1.0, 0.5, 0.25):
         for k in range(c.states.shape[1]):
-            c.states[0, k] = drive.states[0, k]
+            c.states[0, k] = drive.states[at, k]
         top = share * vehicle.max_speed
         if radius_at(top, vehicle) != radius_at(vehicle.max_speed, vehicle):
             break

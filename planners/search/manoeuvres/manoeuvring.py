@@ -27,7 +27,14 @@ from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
-from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import (
+    Car,
+    CarWithTrailers,
+    DifferentialDrive,
+    Vehicle,
+    state_size,
+    trailers_of,
+)
 
 # greedier, then finer: for how many expansions, unless nothing is left before, and the greed with trailers
 LEVELS: Final = (
@@ -42,6 +49,8 @@ MEETING: Final = 3  # times as many for each trailer: trees meet where they are 
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
 SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
+BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
+SPOT: Final = 0.25  # of a body's length: the radius in which it turns nearly on the spot
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -111,12 +120,20 @@ def _alone(vehicle: Vehicle) -> Vehicle:
 
 
 def _suited(number: int, vehicle: Vehicle) -> Outward:
-    """A level; with bends in which trailers follow for long, and the tightest, in which they fold."""
+    """A level, with the bends that suit a vehicle.
+
+    With trailers these are bends in which they follow for long, and the tightest, in which they fold. Who can
+    turn on the spot nearly does so, too: words turn as widely as at full speed.
+    """
     _, level, greed = LEVELS[number]
-    if not isinstance(vehicle, CarWithTrailers):
-        return level
-    share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
-    return level._replace(bends=(1.0, share, 0.0, -share, -1.0), greed=greed)
+    if isinstance(vehicle, CarWithTrailers):
+        share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
+        return level._replace(bends=(1.0, share, 0.0, -share, -1.0), greed=greed)
+    if isinstance(vehicle, DifferentialDrive) and vehicle.min_speed <= 0.0:
+        share = word_radius(vehicle) / (SPOT * (vehicle.front + vehicle.rear))
+        if share > 1.0:
+            return level._replace(bends=(1.0, share, 0.0, -share, -1.0))
+    return level
 
 
 def allocate_way_from_start() -> CostToGo:
@@ -162,11 +179,16 @@ class Manoeuvring:
         forget_ways(self._drive.ways)
         self._kept: list[Other | None] = [None] * KEPT
         self.meets = meets(start[0], vehicle)
+        self._stands = vehicle.min_speed <= 0.0 and bool(vehicle.first_order or start[0, 3] == 0.0)
         self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
-        self._level = self._spent = self.expansions = 0
-        self._begin_at_coarsest()
         known_tight = query.is_tight
         self.is_tight = is_tight(goal, vehicle, query.scene) if known_tight is None else known_tight
+        self._from_start = (
+            self._stands and not self.is_tight and room_around(start, vehicle, vehicle, query.scene) < TIGHT
+        )
+        self._level = self._spent = self.expansions = 0
+        self._begin_at_coarsest()
+        self.is_hard = self.is_tight or self.meets or self._from_start
         self._grow(0)  # compiled, if need be, before the planner's clock runs
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
@@ -227,14 +249,16 @@ class Manoeuvring:
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
 
-        A level ends when it has had all its expansions, or nothing is left to open.
+        A level ends when it has had all its expansions, or nothing is left to open. Where only the start is
+        too narrow for it, too, but for the last.
         """
         while self.expansions < end and not self.is_over and perf_counter() < until:
             level_ends = self._expansions - self._spent
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:
                 return True
-            if used == 0 or used == level_ends:
+            ended = self._ended and self._level + 1 < len(LEVELS)  # nothing is left to open at the start
+            if used == 0 or used == level_ends or ended:
                 self._level, self._spent = self._level + 1, 0
                 self._begin()
         return False
@@ -266,15 +290,19 @@ class Manoeuvring:
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
 
     def _grow(self, most: int) -> tuple[bool, int]:
-        """Grow the trees by some expansions at most; whether there is a drive, and how many they were."""
+        """Grow the trees by some expansions at most; whether there is a drive, and how many they were.
+
+        Without trailers the tree out of the start grows, too, if only that is tight, or later.
+        """
         level = _suited(self._level, self._vehicle)
         settings = self._goal, self._drive, level
         driven = self._vehicle, self._scene
-        found, used = False, 0
-        if self.meets:
+        found, used, both = False, 0, self._grows_both
+        if both:
             found, used = grow_outward(
                 self._other, self._tree, most // 2, self._known_there, *settings, self._vehicle, *driven
             )
+        self._ended = both and not self.meets and used < most // 2 and not self.kept
         if not found:
             found, more = grow_outward(
                 self._tree, self._other, most - used, self._known, *settings, self._outgoing, *driven
@@ -283,6 +311,10 @@ class Manoeuvring:
         self.expansions += used
         self._spent += used
         return found, used
+
+    @property
+    def _grows_both(self) -> bool:
+        return self.meets or self._from_start or (self._stands and self._level >= BOTH_FROM[self.is_tight])
 
     @property
     def checks(self) -> int:

@@ -15,6 +15,7 @@ from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
 from planners.search.manoeuvres.pose_tree import (
     CHECKS,
+    LAST,
     SIZE,
     PoseTree,
     add_node,
@@ -23,7 +24,7 @@ from planners.search.manoeuvres.pose_tree import (
     node_near,
     seconds_after,
 )
-from planners.search.manoeuvres.shots import FromStart, shoot
+from planners.search.manoeuvres.shots import FromStart, shoot, shoot_between
 from planners.search.manoeuvres.ways import slowest_kept
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
@@ -213,16 +214,17 @@ def grow_outward(
             continue  # no way over it is worth driving
         reach(tree.frontier, key)
         expansions += 1
+        tree.counts[LAST] = node
         if len(state) > 5:  # decided when compiling
             near = node_near(other, state, known.origin, vehicle)
             if known.outward:
                 if near >= 0 and meet(other, near, tree, node, known.endings, goal, drive, vehicle, scene):
                     return True, expansions
-                if shoot(tree, node, known, goal, drive, vehicle, scene):
+                if shoot(other, 0, tree, node, known, goal, drive, vehicle, scene):
                     return True, expansions
             elif near >= 0 and meet(tree, node, other, near, known.endings, goal, drive, vehicle, scene):
                 return True, expansions
-        elif shoot(tree, node, known, goal, drive, vehicle, scene):
+        elif shoot_between(tree, node, other, known, goal, drive, vehicle, scene):
             return True, expansions
         open_node(tree, other, node, longest == 1, known, settings, outgoing, vehicle, scene)
     return False, expansions

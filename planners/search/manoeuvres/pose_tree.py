@@ -13,7 +13,7 @@ from planners.world.arrays import Floats, Indices, Integers
 from planners.world.goal import HEADING, HITCHES, X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
-from planners.world.vehicles.dynamics import State, bend_rate, control_limits, load, store
+from planners.world.vehicles.dynamics import State, bend_rate, control_limits, load, store, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 NODES: Final = 1 << 17
@@ -24,7 +24,7 @@ _FIBONACCI: Final = 0x9E3779B1
 HITCH_CELLS: Final = 5.0  # a radian
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
 # indices into PoseTree.counts
-SIZE, CHECKS = range(2)
+SIZE, CHECKS, LAST = range(3)
 
 
 class PoseTree(NamedTuple):
@@ -39,7 +39,7 @@ class PoseTree(NamedTuple):
     known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
     places: Integers  # [PLACES] a node in the place that falls into this slot; -1: none
     frontier: Frontier
-    counts: Indices  # [2]
+    counts: Indices  # [3] nodes; looks at obstacles; the node that was opened last
 
 
 def allocate_pose_tree(state_size: int) -> PoseTree:
@@ -54,7 +54,7 @@ def allocate_pose_tree(state_size: int) -> PoseTree:
         np.zeros(NODES, np.int64),
         np.zeros(PLACES, np.int32),
         allocate_frontier(),
-        np.zeros(2, np.int64),
+        np.zeros(3, np.int64),
     )
 
 
@@ -73,6 +73,7 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
     tree.places.fill(-1)
     push(tree.frontier, 0.0, 0, 0)
     tree.counts[SIZE] = 1
+    tree.counts[LAST] = 0
     for k in range(tree.states.shape[1]):
         tree.states[0, k] = root[k]
     tree.parents[0] = -1
@@ -98,6 +99,7 @@ def seconds_after(
     ``top`` is the largest speed on the arc, in m/s.
     """
     turning = abs(bend - tree.bends[node]) / bend_rate(vehicle.max_speed, vehicle)
+    turning = min(turning, 2.0 * turn_limit(vehicle) / control_limits(vehicle)[1])  # in tight bends
     seconds = tree.seconds[node]
     if tree.metres[node] * metres > 0.0:
         run = tree.runs[node]

@@ -18,7 +18,7 @@ from planners.search.manoeuvres.arcs import stride_along, stride_of
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal, drive_to_goal
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.joining import arcs_are_free, close, take_word, trailers_are_off
-from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
+from planners.search.manoeuvres.pose_tree import CHECKS, LAST, PoseTree
 from planners.search.manoeuvres.ways import word_is_worth
 from planners.search.query import Endings
 from planners.search.structures.cost_to_go import CostToGo
@@ -75,6 +75,8 @@ def word_is_free(
 
 @lean
 def _shoot_alone(
+    before: PoseTree,
+    last: int,
     tree: PoseTree,
     node: int,
     known: FromStart,
@@ -86,21 +88,24 @@ def _shoot_alone(
     """Try words to a node without trailers."""
     c = drive.connection
     for k in range(c.states.shape[1]):
-        c.states[0, k] = known.start[0, k]
+        c.states[0, k] = before.states[last, k]
     target = drive.target
     target[0] = tree.states[node, 0]
     target[1] = tree.states[node, 1]
     target[3] = tree.states[node, 2]
     top = vehicle.max_speed
+    radius = radius_at(top, vehicle)
     count = list_connections(c, target, top, vehicle)
     for _ in range(OUTLINES):
         word = next_word(c, count, math.inf)
         if word < 0:
             return False
-        if not word_is_worth(drive.ways, c.words[word], radius_at(top, vehicle), tree, node, vehicle):
+        if not word_is_worth(drive.ways, before, last, c.words[word], radius, tree, node, vehicle):
             continue
         if word_is_free(c, word, top, vehicle, scene, tree):
-            arrives = drive_to_goal(drive, tree, node, word, known.start, known.endings, goal, vehicle, scene)
+            arrives = drive_to_goal(
+                drive, before, last, tree, node, word, known.endings, goal, vehicle, scene
+            )
             tree.counts[CHECKS] += drive.counts[1]
             return bool(arrives)
     return False
@@ -108,6 +113,7 @@ def _shoot_alone(
 
 @lean
 def _shoot_with_trailers(
+    before: PoseTree,
     tree: PoseTree,
     node: int,
     known: FromStart,
@@ -133,7 +139,7 @@ def _shoot_with_trailers(
         word = next_word(c, count, math.inf)
         if word < 0 or closed == CLOSED:
             return False
-        if not word_is_worth(drive.ways, c.words[word], radius, tree, node, vehicle):
+        if not word_is_worth(drive.ways, before, 0, c.words[word], radius, tree, node, vehicle):
             continue
         if not outline_is_free(c.words[word], radius, x, y, heading, vehicle, scene):
             continue
@@ -154,6 +160,8 @@ def _shoot_with_trailers(
 
 @lean
 def shoot(
+    before: PoseTree,
+    last: int,
     tree: PoseTree,
     node: int,
     known: FromStart,
@@ -162,8 +170,35 @@ def shoot(
     vehicle: Vehicle,
     scene: Scene,
 ) -> bool:
-    """Try words from the start to a node, and drive the first that is free, and on to the goal."""
+    """Try words to a node of the tree out of the goal, and drive the first that is free, and on to the goal.
+
+    The words begin at node ``last`` of the tree out of the start; with trailers at the start itself.
+    """
     if len(load(tree.states, node, vehicle)) > 5:  # decided when compiling
-        return _shoot_with_trailers(tree, node, known, goal, drive, vehicle, scene)
+        return _shoot_with_trailers(before, tree, node, known, goal, drive, vehicle, scene)
     else:
-        return _shoot_alone(tree, node, known, goal, drive, vehicle, scene)
+        return _shoot_alone(before, last, tree, node, known, goal, drive, vehicle, scene)
+
+
+@lean
+def shoot_between(
+    tree: PoseTree,
+    node: int,
+    other: PoseTree,
+    known: FromStart,
+    goal: Floats,
+    drive: Drive,
+    vehicle: Vehicle,
+    scene: Scene,
+) -> bool:
+    """Shoot between a node of one tree and the other tree: its root, and the node that it opened last."""
+    for last in (0, other.counts[LAST]):
+        if known.outward:
+            arrives = shoot(other, last, tree, node, known, goal, drive, vehicle, scene)
+        else:
+            arrives = shoot(tree, node, other, last, known, goal, drive, vehicle, scene)
+        if arrives:
+            return True
+        if other.counts[LAST] == 0:
+            break
+    return False

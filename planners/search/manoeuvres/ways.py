@@ -80,6 +80,18 @@ def _add_legs_to_root(ways: Ways, tree: PoseTree, node: int, sign: float) -> Non
 
 
 @inlined
+def _list_legs_from_root(ways: Ways, before: PoseTree, last: int) -> None:
+    """List the legs to a node of a tree out of the start, and no others."""
+    ways.counts[0] = 0
+    _add_legs_to_root(ways, before, last, 1.0)
+    count = ways.counts[0]
+    for i in range(count // 2):  # from the root now
+        other = count - 1 - i
+        for c in range(2):
+            ways.legs[i, c], ways.legs[other, c] = ways.legs[other, c], ways.legs[i, c]
+
+
+@inlined
 def _kind(ways: Ways) -> int:
     """A number for the sequence of gears and turns of the legs."""
     kind = 0
@@ -135,13 +147,22 @@ def _is_worth(ways: Ways, seconds: float) -> bool:
 
 @lean
 def word_is_worth(
-    ways: Ways, word: Floats, radius: float, tree: PoseTree, node: int, vehicle: Vehicle
+    ways: Ways,
+    before: PoseTree,
+    last: int,
+    word: Floats,
+    radius: float,
+    tree: PoseTree,
+    node: int,
+    vehicle: Vehicle,
 ) -> bool:
-    """Whether a word ``[2 PARTS]`` to a node of a goal tree is worth driving, with what follows it."""
-    ways.counts[0] = 0
-    seconds = 0.0
-    metres = 0.0
-    gear = 0.0
+    """Whether a word ``[2 PARTS]`` is worth driving, with what leads to it and what follows it.
+
+    It leads from node ``last`` of a tree out of the start, ``before``, to a ``node`` of one out of the goal.
+    """
+    metres = before.runs[last]
+    gear = 0.0 if last == 0 else (1.0 if before.metres[last] > 0.0 else -1.0)
+    seconds = before.seconds[last] - _run(metres, gear, vehicle)
     for k in range(PARTS):
         part = radius * word[PARTS + k]
         if part == 0.0:
@@ -151,11 +172,13 @@ def word_is_worth(
             metres = 0.0
         gear = 1.0 if part > 0.0 else -1.0
         metres += abs(part)
-        _add_leg(ways, part, word[k] * word[PARTS + k])
     seconds += _run(metres, gear, vehicle)
     seconds = _joined_seconds(tree, node, metres, gear, seconds, vehicle)
     if seconds >= slowest_kept(ways):
         return False
+    _list_legs_from_root(ways, before, last)
+    for k in range(PARTS):
+        _add_leg(ways, radius * word[PARTS + k], word[k] * word[PARTS + k])
     _add_legs_to_root(ways, tree, node, -1.0)
     return _is_worth(ways, seconds)
 
@@ -169,12 +192,6 @@ def meeting_is_worth(
     seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
     if seconds >= slowest_kept(ways):
         return False
-    ways.counts[0] = 0
-    _add_legs_to_root(ways, before, last, 1.0)
-    count = ways.counts[0]
-    for i in range(count // 2):  # from the root now
-        other = count - 1 - i
-        for c in range(2):
-            ways.legs[i, c], ways.legs[other, c] = ways.legs[other, c], ways.legs[i, c]
+    _list_legs_from_root(ways, before, last)
     _add_legs_to_root(ways, tree, node, -1.0)
     return _is_worth(ways, seconds)
