@@ -32,32 +32,34 @@ DAMPING: Final = 1e-7
 COARSE: Final = 4.0  # strides of a step here: nothing is looked at
 EXACT: Final = 1e-5  # metres and radians
 WIDEST: Final = 0.5  # radians or metres: who is farther off is not corrected
+# indices into Join.counts
+ARCS, BEFORE = range(2)
 
 
 class Join(NamedTuple):
     """Arcs from the start to a node, and the buffers that correct them."""
 
     arcs: Floats  # [3, MOST_ARCS] gear (1 or -1), bend, length in metres
-    ends: Floats  # [2, S] where the arcs lead, and where they should
-    effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on the end: x, y, heading, hitches
+    ends: Floats  # [3, S] where the arcs before the meeting lead; where all should; where those after begin
+    effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on what is missing: x, y, heading, hitches
     squares: Floats  # [6, 7] the equations of a correction
     free: Floats  # [2 MOST_ARCS] 0 for what the last round would have moved beyond its limit, else 1
     chain: Indices  # [MOST_CHAIN] nodes of a tree, the last one first
     base: Floats  # [1, S] where the arcs begin
-    counts: Indices  # [1] how many arcs there are
+    counts: Indices  # [2] how many arcs there are; of these before the meeting
 
 
 def allocate_join(state_size: int) -> Join:
     """Buffers for states of ``state_size`` numbers."""
     return Join(
         np.zeros((3, MOST_ARCS)),
-        np.zeros((2, state_size)),
+        np.zeros((3, state_size)),
         np.zeros((6, 2 * MOST_ARCS)),
         np.zeros((6, 7)),
         np.zeros(2 * MOST_ARCS),
         np.zeros(MOST_CHAIN, np.int64),
         np.zeros((1, state_size)),
-        np.zeros(1, np.int64),
+        np.zeros(2, np.int64),
     )
 
 
@@ -73,25 +75,35 @@ def _along(state: State, gear: float, bend: float, metres: float, vehicle: Vehic
     return state
 
 
+@inlined
+def _along_number(state: State, join: Join, k: int, sign: float, changed: int, vehicle: Vehicle) -> State:
+    """The end of arc number ``k``, driven on (``sign`` 1) or back (-1); ``changed`` as in ``_ends``."""
+    bend = join.arcs[1, k] + (NUDGE if changed == 2 * k else 0.0)
+    metres = join.arcs[2, k] + (NUDGE if changed == 2 * k + 1 else 0.0)
+    return _along(state, sign * join.arcs[0, k], bend, metres, vehicle)
+
+
 @lean
-def _end(start: Floats, join: Join, changed: int, vehicle: Vehicle) -> None:
-    """Find the end of all arcs; of number ``changed`` bend or length is nudged, of none if it is negative."""
+def _ends(start: Floats, join: Join, changed: int, vehicle: Vehicle) -> None:
+    """Find both ends at the meeting. The bend or length of number ``changed`` is nudged, none if negative."""
     state = load(start, 0, vehicle)
-    for k in range(join.counts[0]):
-        bend = join.arcs[1, k] + (NUDGE if changed == 2 * k else 0.0)
-        metres = join.arcs[2, k] + (NUDGE if changed == 2 * k + 1 else 0.0)
-        state = _along(state, join.arcs[0, k], bend, metres, vehicle)
+    for k in range(join.counts[BEFORE]):
+        state = _along_number(state, join, k, 1.0, changed, vehicle)
     store(join.ends, 0, state)
+    state = load(join.ends, 1, vehicle)
+    for k in range(join.counts[ARCS] - 1, join.counts[BEFORE] - 1, -1):
+        state = _along_number(state, join, k, -1.0, changed, vehicle)
+    store(join.ends, 2, state)
 
 
 @inlined
 def _off(join: Join, row: int) -> float:
-    """How much is missing at the end: x and y (m), heading, and each hitch (rad)."""
+    """How much is missing at the meeting: x and y (m), heading, and each hitch (rad)."""
     if row < 2:
-        return float(join.ends[1, row] - join.ends[0, row])
+        return float(join.ends[2, row] - join.ends[0, row])
     if row == 2:
-        return wrapped(join.ends[1, 2] - join.ends[0, 2])
-    return float(join.ends[1, row + 2] - join.ends[0, row + 2])
+        return wrapped(join.ends[2, 2] - join.ends[0, 2])
+    return float(join.ends[2, row + 2] - join.ends[0, row + 2])
 
 
 @inlined
@@ -117,14 +129,17 @@ def _solve(squares: Floats, rows: int) -> None:
 
 @lean
 def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
-    """Correct the arcs until they lead from ``start [1, S]`` to ``join.ends[1]``. Returns whether they do."""
+    """Correct the arcs until they lead from ``start [1, S]`` to ``join.ends[1]``. Returns whether they do.
+
+    Arcs after the meeting are followed from their end back to it: errors do not grow along them.
+    """
     rows = join.ends.shape[1] - 2
-    columns = 2 * join.counts[0]
+    columns = 2 * join.counts[ARCS]
     for column in range(columns):
         join.free[column] = 1.0
     limit = tightest_bend(vehicle.max_speed, vehicle)
     size = vehicle.front + vehicle.rear
-    _end(start, join, -1, vehicle)
+    _ends(start, join, -1, vehicle)
     for _ in range(ROUNDS):
         worst = _worst(join)
         if worst < EXACT:
@@ -135,7 +150,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
             join.squares[row, rows] = _off(join, row)
         for column in range(columns):
             weight = BEND_SHARE * limit if column % 2 == 0 else LENGTH_SHARE * size
-            _end(start, join, column, vehicle)
+            _ends(start, join, column, vehicle)
             for row in range(rows):
                 effect = join.squares[row, rows] - _off(join, row)
                 join.effects[row, column] = join.free[column] * weight * effect / NUDGE
@@ -165,7 +180,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
                 join.arcs[2, arc] = max(metres, 0.0)
                 fits = metres >= 0.0
             join.free[column] = 1.0 if fits else 0.0
-        _end(start, join, -1, vehicle)
+        _ends(start, join, -1, vehicle)
     return False
 
 
@@ -194,13 +209,13 @@ def take_word(join: Join, word: Floats, radius: float, vehicle: Vehicle) -> None
         arcs[2, longest] -= after
         arcs[2, longest + 1] = after
         count += 1
-    join.counts[0] = count
+    join.counts[ARCS] = join.counts[BEFORE] = count
 
 
 @lean
 def trailers_are_off(start: Floats, join: Join, most: float, vehicle: Vehicle) -> bool:
     """Whether the arcs leave a trailer more than ``most`` radians from where it should be."""
-    _end(start, join, -1, vehicle)
+    _ends(start, join, -1, vehicle)
     for row in range(3, join.ends.shape[1] - 2):  # noqa: SIM110 Numba has no generators for any()
         if not abs(_off(join, row)) <= most:
             return True
@@ -212,7 +227,7 @@ def arcs_are_free(start: Floats, join: Join, vehicle: Vehicle, scene: Scene) -> 
     """Whether the arcs are free, and how often obstacles were looked at."""
     state = load(start, 0, vehicle)
     looks = 0
-    for k in range(join.counts[0]):
+    for k in range(join.counts[ARCS]):
         gear = join.arcs[0, k]
         count = math.ceil(join.arcs[2, k] / stride_of(gear, vehicle))
         for _ in range(count):

@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from planners.search.connection.connection import radius_at
 from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
@@ -17,6 +16,13 @@ from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.variants import (
+    at_its_slowest,
+    less_folded,
+    time_reversed,
+    without_trailers,
+    word_radius,
+)
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Other
 from planners.search.query import Endings, Query
@@ -28,7 +34,6 @@ from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import (
-    Car,
     CarWithTrailers,
     DifferentialDrive,
     Vehicle,
@@ -39,16 +44,14 @@ from planners.world.vehicles.vehicle import (
 # greedier, then finer: for how many expansions, unless nothing is left before, and the greed with trailers
 LEVELS: Final = (
     (500, Outward(cell=0.2, headings=48, greed=2.5), 2.5),
-    (2000, Outward(cell=0.2, headings=64, greed=3.0), 6.0),
+    (2000, Outward(cell=0.2, headings=64, greed=3.0, worst=True), 6.0),
     (2000, Outward(cell=0.2, headings=64, greed=6.0), 12.0),
-    (5000, Outward(cell=0.1, headings=64, greed=12.0), 12.0),
+    (5000, Outward(cell=0.1, headings=64, greed=12.0, worst=True), 12.0),
     (10000, Outward(cell=0.05, headings=96, greed=12.0), 12.0),
-    (1 << 30, Outward(cell=0.02, headings=128, greed=12.0), 12.0),
+    (1 << 30, Outward(cell=0.02, headings=128, greed=12.0, worst=True), 12.0),
 )
-MEETING: Final = 3  # times as many for each trailer: trees meet where they are wide
+MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
-HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
-SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
 SPOT: Final = 0.25  # of a body's length: the radius in which it turns nearly on the spot
 TIGHT: Final = 0.6  # a goal with less room around it is tight
@@ -66,7 +69,7 @@ def suits(goal: Floats, vehicle: Vehicle) -> bool:
     slowest = max(vehicle.min_speed, 0.0)
     return bool(
         goal[HEADING_TOLERANCE] < np.inf
-        and goal[LEAST_SPEED] <= _at_its_slowest(vehicle).max_speed
+        and goal[LEAST_SPEED] <= at_its_slowest(vehicle).max_speed
         and goal[MOST_SPEED] >= slowest
         and (slowest > 0.0 or goal[LEAST_SPEED] <= 0.0)
     )
@@ -78,12 +81,7 @@ def is_tight(goal: Floats, vehicle: Vehicle, scene: Scene) -> bool:
     Who cannot stand has no room to try again.
     """
     root = pose_of(goal, state_size(vehicle))[np.newaxis]
-    return bool(vehicle.min_speed > 0.0 or room_around(root, _reversed(vehicle), vehicle, scene) < TIGHT)
-
-
-def _reversed(vehicle: Vehicle) -> Vehicle:
-    """The vehicle with time reversed: a drive of it out of a goal is one into it."""
-    return vehicle._replace(min_speed=-vehicle.max_speed, max_speed=-vehicle.min_speed)
+    return bool(vehicle.min_speed > 0.0 or room_around(root, time_reversed(vehicle), vehicle, scene) < TIGHT)
 
 
 def meets(start: Floats, vehicle: Vehicle) -> bool:
@@ -92,31 +90,6 @@ def meets(start: Floats, vehicle: Vehicle) -> bool:
     With trailers it does, if the vehicle stands, or can at once.
     """
     return bool(trailers_of(vehicle)) and bool(vehicle.first_order or start[3] == 0.0)
-
-
-def word_radius(vehicle: Vehicle) -> float:
-    """The radius in metres of words: so large that trailers keep well within their hitches."""
-    least = 0.0
-    for trailer in reversed(trailers_of(vehicle)):
-        length = trailer.hitch_length
-        least = max(length / math.sin(HITCH_SHARE * trailer.max_hitch), math.hypot(least, length))
-    return max(least, float(radius_at(vehicle.max_speed, vehicle)))
-
-
-def _at_its_slowest(vehicle: Vehicle) -> Vehicle:
-    """Who cannot stand turns most sharply at its least speed, and what leads there can be driven faster."""
-    if vehicle.min_speed <= 0.0:
-        return vehicle
-    return vehicle._replace(max_speed=min(SLOWLY * vehicle.min_speed, vehicle.max_speed))
-
-
-def _alone(vehicle: Vehicle) -> Vehicle:
-    """The vehicle without its trailers, which turns no more sharply than words do with them."""
-    if not isinstance(vehicle, CarWithTrailers):
-        return vehicle
-    fields = vehicle._asdict()
-    del fields["trailers"]
-    return Car(**fields)._replace(max_steering=math.atan(vehicle.wheelbase / word_radius(vehicle)))
 
 
 def _suited(number: int, vehicle: Vehicle) -> Outward:
@@ -157,10 +130,12 @@ class Manoeuvring:
             goal: that of ``goal_of``; it has to suit.
             occupied: ``[64]`` the cells of the problem's window that are not free.
         """
-        problem, vehicle = query.problem, _at_its_slowest(query.vehicle)
+        problem, vehicle = query.problem, at_its_slowest(query.vehicle)
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
-        self._outgoing = _reversed(vehicle)
+        ends = np.abs([start_state(problem, vehicle)[5:], pose_of(goal, size)[5:]]).max(0)
+        self._leaving = less_folded(vehicle, ends)
+        self._outgoing = time_reversed(self._leaving)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
         self._drive = query.workspace.buffers(allocate_drive, size)
         self._drive.target[[LEAST_SPEED, MOST_SPEED]] = -SLACK, SLACK
@@ -172,7 +147,7 @@ class Manoeuvring:
         go = query.workspace.buffers(allocate_way_from_start)
         fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
         start = start_state(problem, vehicle)[np.newaxis]
-        known = seconds_to_pose(_alone(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
+        known = seconds_to_pose(without_trailers(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
         self._known = FromStart(start, go, *known, outward=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
@@ -180,7 +155,7 @@ class Manoeuvring:
         self._kept: list[Other | None] = [None] * KEPT
         self.meets = meets(start[0], vehicle)
         self._stands = vehicle.min_speed <= 0.0 and bool(vehicle.first_order or start[0, 3] == 0.0)
-        self._longer = MEETING ** len(trailers_of(vehicle)) if self.meets else 1
+        self._longer = MEETING if self.meets else 1
         known_tight = query.is_tight
         self.is_tight = is_tight(goal, vehicle, query.scene) if known_tight is None else known_tight
         self._from_start = (
@@ -300,7 +275,7 @@ class Manoeuvring:
         found, used, both = False, 0, self._grows_both
         if both:
             found, used = grow_outward(
-                self._other, self._tree, most // 2, self._known_there, *settings, self._vehicle, *driven
+                self._other, self._tree, most // 2, self._known_there, *settings, self._leaving, *driven
             )
         self._ended = both and not self.meets and used < most // 2 and not self.kept
         if not found:

@@ -6,7 +6,7 @@ from typing import Final
 
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal
 from planners.search.manoeuvres.driving import Drive
-from planners.search.manoeuvres.joining import MOST_ARCS, arcs_are_free, close
+from planners.search.manoeuvres.joining import ARCS, BEFORE, MOST_ARCS, arcs_are_free, close
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
 from planners.search.manoeuvres.ways import meeting_is_worth
 from planners.search.query import Endings
@@ -64,21 +64,24 @@ def meet(
     base = join.chain[straight - 1] if straight > 0 else 0
     for k in range(join.base.shape[1]):
         join.base[0, k] = before.states[base, k]
-    join.counts[0] = links - straight
+    join.counts[ARCS] = join.counts[BEFORE] = links - straight
     for k in range(links - straight):
         each = join.chain[straight + k]
         join.arcs[0, k] = 1.0 if before.metres[each] > 0.0 else -1.0
         join.arcs[1, k] = before.bends[each]
         join.arcs[2, k] = abs(before.metres[each])
-    while join.counts[0] < links - straight + BENT and node > 0 and tree.known[node] < 0:
-        k = join.counts[0]
+    while join.counts[ARCS] < links - straight + BENT and node > 0 and tree.known[node] < 0:
+        k = join.counts[ARCS]
         join.arcs[0, k] = 1.0 if tree.metres[node] < 0.0 else -1.0
         join.arcs[1, k] = tree.bends[node]
         join.arcs[2, k] = abs(tree.metres[node])
-        join.counts[0] += 1
+        join.counts[ARCS] += 1
         node = tree.parents[node]
     for k in range(join.base.shape[1]):
         join.ends[1, k] = tree.states[node, k]
+    if not close(join.base, join, vehicle):
+        return False
+    join.counts[BEFORE] = join.counts[ARCS]  # once more, exactly as it is driven
     if not close(join.base, join, vehicle):
         return False
     free, checks = arcs_are_free(join.base, join, vehicle, scene)

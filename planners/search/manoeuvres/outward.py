@@ -28,11 +28,12 @@ from planners.search.manoeuvres.shots import FromStart, shoot, shoot_between
 from planners.search.manoeuvres.ways import slowest_kept
 from planners.search.structures.cost_to_go import metres_to_go
 from planners.search.structures.frontier import is_empty, pop, push, reach, was_reached
-from planners.world.arrays import Floats, Integers
+from planners.world.arrays import Floats, Integers, Pose
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
+from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load, tightest_bend
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
 GEARS: Final = (1.0, -1.0)
@@ -46,6 +47,7 @@ class Outward(NamedTuple):
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, 128 at most
     greed: float = 1.5  # weight of the time from the start
+    worst: bool = False  # with trailers that of the first or last body, whichever is longer, not the mean
 
 
 @lean
@@ -71,19 +73,41 @@ def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scen
 
 
 @inlined
-def _least_seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
-    """The time from the start if nothing is in the way."""
-    x, y, heading = known.start[0, 0], known.start[0, 1], known.start[0, 2]
-    if known.outward:
-        pose = (state[0], state[1], state[2])
-        return float(seconds_from(x, y, heading, pose, known.table, vehicle.max_speed))
-    return float(seconds_from(state[0], state[1], state[2], (x, y, heading), known.table, vehicle.max_speed))
+def _last_body(state: State, vehicle: CarWithTrailers) -> Pose:
+    """The pose of the last trailer."""
+    x, y, heading = state[0], state[1], state[2]
+    for k in range(len(vehicle.trailers)):
+        heading -= state[5 + k]
+        sin, cos = sincos(heading)
+        x -= vehicle.trailers[k].hitch_length * cos
+        y -= vehicle.trailers[k].hitch_length * sin
+    return x, y, heading
 
 
 @inlined
-def _seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
-    around = metres_to_go(state[0], state[1], known.go) / vehicle.max_speed
-    return max(_least_seconds_from_start(state, known, vehicle), around)
+def _seconds_of_body(root: Pose, pose: Pose, known: FromStart, vehicle: Vehicle) -> float:
+    """The time from the start to a pose, or from that to the goal, if nothing is in the way."""
+    if not known.outward:
+        root, pose = pose, root
+    return float(seconds_from(root[0], root[1], root[2], pose, known.table, vehicle.max_speed))
+
+
+@inlined
+def _least_seconds_from_start(state: State, known: FromStart, vehicle: Vehicle) -> float:
+    """The time from the start if nothing is in the way."""
+    root = known.start[0, 0], known.start[0, 1], known.start[0, 2]
+    return _seconds_of_body(root, (state[0], state[1], state[2]), known, vehicle)
+
+
+@inlined
+def _seconds_from_start(state: State, known: FromStart, settings: Outward, vehicle: Vehicle) -> float:
+    turns = _least_seconds_from_start(state, known, vehicle)
+    if len(state) > 5:  # decided when compiling
+        root = load(known.start, 0, vehicle)
+        there, here = _last_body(root, vehicle), _last_body(state, vehicle)  # type: ignore[arg-type]
+        last = _seconds_of_body(there, here, known, vehicle)
+        turns = max(turns, last) if settings.worst else 0.5 * (turns + last)
+    return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)
 
 
 @lean
@@ -96,7 +120,7 @@ def begin_outward(
     for k in range(nodes.shape[0]):
         if nodes[k] >= 0:
             mark_place(tree, nodes[k], known.origin, vehicle)
-            left = _seconds_from_start(load(tree.states, nodes[k], vehicle), known, vehicle)
+            left = _seconds_from_start(load(tree.states, nodes[k], vehicle), known, settings, vehicle)
             push(tree.frontier, KNOWN * tree.seconds[nodes[k]] + settings.greed * left, nodes[k], 1)
 
 
@@ -171,7 +195,7 @@ def _wait(
     ):
         return
     seconds = seconds_after(tree, node, bend, metres, top_speed(metres, bend, outgoing), vehicle)
-    left = _seconds_from_start(state, known, vehicle)
+    left = _seconds_from_start(state, known, settings, vehicle)
     estimate = seconds + settings.greed * left
     new = add_node(tree, node, state, bend, metres, seconds)
     if len(state) > 5:  # decided when compiling

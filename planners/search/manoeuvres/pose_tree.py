@@ -18,10 +18,11 @@ from planners.world.vehicles.vehicle import Vehicle
 
 NODES: Final = 1 << 17
 PLACES: Final = 1 << 16
-PLACE: Final = 0.2  # side of a place, in the first body's length ...
-PLACE_HEADINGS: Final = 48  # ... and how many headings are told apart there
+PLACE: Final = 0.3  # side of a place, in the first body's length ...
+PLACE_HEADINGS: Final = 36  # ... how many headings are told apart there ...
+PLACE_HITCHES: Final = 3.0  # ... and cells of a hitch, a radian
 _FIBONACCI: Final = 0x9E3779B1
-HITCH_CELLS: Final = 5.0  # a radian
+HITCH_CELLS: Final = 5.0  # of hitches, a radian
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
 # indices into PoseTree.counts
 SIZE, CHECKS, LAST = range(3)
@@ -158,7 +159,7 @@ def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
     key = key << 16 | (math.floor((state[0] - origin[0]) / cell) & 0xFFFF)
     key = key << 7 | int((wrapped(state[2]) + math.pi) * (PLACE_HEADINGS / (2.0 * math.pi)))
     for k in range(5, len(state)):
-        key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
+        key = key << 5 | (math.floor(state[k] * PLACE_HITCHES) & 31)
     return int(key)
 
 

@@ -10,10 +10,10 @@ import pytest
 from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.driving import allocate_drive, begin, drive_arc, turn_wheels
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.manoeuvring import word_radius
 from planners.search.manoeuvres.outward import Outward, open_node
 from planners.search.manoeuvres.pose_tree import SIZE, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.variants import word_radius
 from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go

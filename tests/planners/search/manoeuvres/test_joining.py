@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planners.search.connection.words import MOST_WORDS, PARTS, list_words
-from planners.search.manoeuvres.joining import Join, allocate_join, close, take_word
+from planners.search.manoeuvres.joining import ARCS, BEFORE, Join, allocate_join, close, take_word
 from planners.world.arrays import Floats
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR_1_TRAILER, CarWithTrailers, state_size
@@ -35,9 +35,27 @@ def test_arcs_lead_to_a_state_with_its_hitch() -> None:
     assert closed > 0
 
 
+def test_arcs_close_a_gap_where_they_meet_and_back_on_from_there() -> None:
+    vehicle = CAR_1_TRAILER
+    join = allocate_join(state_size(vehicle))
+    start = np.zeros((1, state_size(vehicle)))
+    join.arcs[:, :6] = [[1, 1, 1, -1, -1, -1], [0.1, 0.2, 0.1, -0.1, 0.1, 0.0], [2, 2, 2, 3, 3, 3]]
+    join.counts[[ARCS, BEFORE]] = 6, 3
+    join.ends[1] = driven(start[0], join, vehicle)
+    join.arcs[1, :6] += [0.05, -0.03, 0.04, 0.02, -0.03, 0.01]
+    assert close(start, join, vehicle)
+    after = allocate_join(state_size(vehicle))
+    after.arcs[:, :3] = join.arcs[:, 5:2:-1] * [[-1], [1], [1]]
+    after.counts[ARCS] = 3
+    join.counts[ARCS] = 3
+    there = driven(start[0], join, vehicle)
+    back = driven(join.ends[1], after, vehicle)
+    assert np.allclose(there[[0, 1, 2, 5]], back[[0, 1, 2, 5]], atol=1e-3)
+
+
 def driven(state: Floats, join: Join, vehicle: CarWithTrailers) -> Floats:
     """Where the arcs lead, in centimetres."""
-    for k in range(int(join.counts[0])):
+    for k in range(int(join.counts[ARCS])):
         gear, bend, metres = join.arcs[:, k]
         steps = int(np.ceil(metres / 1e-2))
         state = state.copy()

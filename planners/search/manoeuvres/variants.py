@@ -1,0 +1,58 @@
+"""Vehicles as a search for manoeuvres takes them: reversed, slow, less folded, without trailers."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from planners.search.connection.connection import radius_at
+from planners.world.arrays import Floats
+from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, trailers_of
+
+HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
+UNFOLDED: Final = 0.01  # radians: who drives an arc more slowly than the tree may fold so much sooner
+SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
+
+
+def time_reversed(vehicle: Vehicle) -> Vehicle:
+    """The vehicle with time reversed: a drive of it out of a goal is one into it."""
+    return vehicle._replace(min_speed=-vehicle.max_speed, max_speed=-vehicle.min_speed)
+
+
+def at_its_slowest(vehicle: Vehicle) -> Vehicle:
+    """Who cannot stand turns most sharply at its least speed, and what leads there can be driven faster."""
+    if vehicle.min_speed <= 0.0:
+        return vehicle
+    return vehicle._replace(max_speed=min(SLOWLY * vehicle.min_speed, vehicle.max_speed))
+
+
+def less_folded(vehicle: Vehicle, ends: Floats) -> Vehicle:
+    """The vehicle as trees grow, with hitches that fold a little less far than those of who drives.
+
+    ``ends [H]`` are the largest angles at start and goal, to which they fold in any case.
+    """
+    if not isinstance(vehicle, CarWithTrailers):
+        return vehicle
+    trailers = (
+        each._replace(max_hitch=max(each.max_hitch - UNFOLDED, float(least)))
+        for each, least in zip(vehicle.trailers, ends, strict=True)
+    )
+    return vehicle._replace(trailers=tuple(trailers))
+
+
+def word_radius(vehicle: Vehicle) -> float:
+    """The radius in metres of words: so large that trailers keep well within their hitches."""
+    least = 0.0
+    for trailer in reversed(trailers_of(vehicle)):
+        length = trailer.hitch_length
+        least = max(length / math.sin(HITCH_SHARE * trailer.max_hitch), math.hypot(least, length))
+    return max(least, float(radius_at(vehicle.max_speed, vehicle)))
+
+
+def without_trailers(vehicle: Vehicle) -> Vehicle:
+    """The vehicle without its trailers, which turns no more sharply than words do with them."""
+    if not isinstance(vehicle, CarWithTrailers):
+        return vehicle
+    fields = vehicle._asdict()
+    del fields["trailers"]
+    return Car(**fields)._replace(max_steering=math.atan(vehicle.wheelbase / word_radius(vehicle)))
