@@ -140,10 +140,8 @@ class Manoeuvring:
         self._drive = query.workspace.buffers(allocate_drive, size)
         self._drive.target[[LEAST_SPEED, MOST_SPEED]] = -SLACK, SLACK
         if vehicle.min_speed > 0.0:
-            self._drive.target[[LEAST_SPEED, MOST_SPEED]] = (
-                vehicle.min_speed - SLACK,
-                vehicle.max_speed + SLACK,
-            )
+            speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
+            self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
         go = query.workspace.buffers(allocate_way_from_start)
         fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
         start = start_state(problem, vehicle)[np.newaxis]
