@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from time import perf_counter
 from typing import Final, NamedTuple
 
 from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
@@ -20,6 +19,7 @@ from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
+from planners.world.jit import working_clock
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of
@@ -29,6 +29,7 @@ ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 700  # where a drive must arrive as asked; some 60 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
+MUCH: Final = 0.97  # of its steps: who is pressed to so few may get quicker from there
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
 # strength, range and least gain in metres: obstacles push from far and softly first, then only close to them
@@ -86,8 +87,30 @@ def polish_quickest(
     Returns:
         The number of the plan that got quickest, and what it is now.
     """
-    iterations = most_iterations(problem) if iterations is None else iterations
-    until = perf_counter() + seconds
+    most = most_iterations(problem) if iterations is None else iterations
+    around = vehicle, scene, workspace
+    until = working_clock() + seconds
+    number, best, was_pressed = _polished_once(problem, plans, *around, most, margin_m, until)
+    left = most
+    while was_pressed and best.plan is not None and left > 0 and working_clock() < until:
+        _, better, was_pressed = _polished_once(problem, [best.plan], *around, left, margin_m, until)
+        left -= better.iterations
+        is_better = better.plan is not None and better.plan.duration_s < best.plan.duration_s
+        best = Polished(better.plan if is_better else best.plan, best.iterations + better.iterations)
+    return number, best
+
+
+def _polished_once(
+    problem: Problem,
+    plans: Sequence[Plan],
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    iterations: int,
+    margin_m: float,
+    until: float,
+) -> tuple[int, Polished, bool]:
+    """As ``polish_quickest``; and whether pressing made it much quicker, so that more may come of it."""
     most = max(len(plan.controls) for plan in plans)
     model, goal = _ready(problem, most + ROOM, vehicle, workspace)
     drives = [simulate(start_state(problem, vehicle), plan.controls, vehicle) for plan in plans]
@@ -95,7 +118,7 @@ def polish_quickest(
     for k, states in enumerate(drives):
         arrived = int(steps_to_goal(states, len(states) - 1, goal, vehicle))
         if arrived == 0:
-            return k, Polished(plans[k], 0)
+            return k, Polished(plans[k], 0), False
         drives[k] = states = states[: arrived + 1] if arrived > 0 else states
         is_plan = arrived > 0 and count_free_prefix(states, vehicle, scene) == len(states)
         lengths.append(arrived if is_plan else NEVER)
@@ -110,24 +133,26 @@ def polish_quickest(
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         around = goal, vehicle, scene, barrier
         number, moved, used = quickest(drives, model, interior, *around, iterations, until)
-        given = [min(given, key=lambda each: each[3])]
-        if moved is not None and len(moved.controls) < given[0][3]:
+        shortest = min(given, key=lambda each: each[3])
+        if moved is not None and len(moved.controls) < shortest[3]:
             if isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
-                return number, Polished(moved, used)  # which pressing makes hardly any quicker
-            given.insert(0, (number, moved.states, moved.controls, len(moved.controls)))
+                return number, Polished(moved, used), False  # which pressing makes hardly any quicker
+            given = [(number, moved.states, moved.controls, len(moved.controls)), shortest]
     lower = _shortened if arriving else _descended
     left = iterations - used // len(plans)
     number, better = given[0][0], None
+    enough = MUCH * min(length for *_, length in given)
     for k, states, controls, length in given:
         steps = len(controls)
         model.states[: steps + 1] = model.best_states[: steps + 1] = states
         model.controls[:steps] = model.best_controls[:steps] = controls
         least, more = lower(model, steps, length, goal, barrier, vehicle, scene, left, until)
-        used, left = used + more, left - more
+        used += more
         if least < (NEVER if better is None else len(better.controls)):
             states, controls = model.best_states[: least + 1].copy(), model.best_controls[:least].copy()
             number, better = k, Plan(states, controls, vehicle.dt)
-    return number, Polished(better, used)
+    was_pressed = arriving and better is not None and len(better.controls) <= enough
+    return number, Polished(better, used), was_pressed
 
 
 def driven_near(
@@ -201,7 +226,7 @@ def _descended(
     for strength, range_m, least_gain in STAGES:
         stage = Stage(barrier._replace(strength=strength, range_m=range_m, contact=strength), least_gain)
         ended = False
-        while not ended and used < iterations and perf_counter() < until:
+        while not ended and used < iterations and working_clock() < until:
             most = min(SLICE, iterations - used)
             steps, more, best, ended = descend(
                 *(model, steps, goal, stage, most, best, vehicle, scene, circles)
@@ -226,7 +251,9 @@ def _shortened(
     leaps = LEAPS if best < NEVER else (0,)
     fewer, growing = leaps[0], True
     used = in_vain = number = 0
-    while used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and perf_counter() < until:
+    while (
+        used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and working_clock() < until
+    ):
         way = WAYS[number]
         pushed = barrier._replace(strength=way.strength, range_m=RANGE_M, contact=way.strength)
         most = min(MOST_TRIES, iterations - used)

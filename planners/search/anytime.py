@@ -23,6 +23,7 @@ from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.goal import goal_of
+from planners.world.jit import working_clock
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
@@ -165,7 +166,7 @@ def search_and_polish(
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
         with the work and the time of all; and whether it is the given plan.
     """
-    until = perf_counter() + query.limits.seconds
+    until = working_clock() + query.limits.seconds
     goal, vehicle = goal_of(query.problem), query.vehicle
     if planner == "lattice" and suits(goal, vehicle):
         query = replace(query, is_tight=is_tight(goal, vehicle, query.scene))
@@ -184,7 +185,7 @@ def search_and_polish(
         limits = replace(
             query.limits,
             expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
-            seconds=until - perf_counter(),
+            seconds=until - working_clock(),
             bound_s=min(SHORTER * plan.duration_s, query.limits.bound_s),
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
@@ -198,7 +199,7 @@ def search_and_polish(
         return found[0], False
     number, polished = polish_quickest(
         *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
-        seconds=until - perf_counter(),
+        seconds=until - working_clock(),
     )
     best, given_best = solved[number]
     plan = polished.plan or given_best

@@ -29,6 +29,7 @@ from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
 from planners.world.arrays import Floats
 from planners.world.geometry.occupancy import drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
+from planners.world.jit import working_clock
 from planners.world.problem import Plan, is_canonical
 
 
@@ -62,7 +63,7 @@ NOWHERE = place(0.0, 0.0, 0.0)
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     """Plan from the problem's start to its goal. A guide is not looked at."""
-    until = perf_counter() + query.limits.seconds
+    until = working_clock() + query.limits.seconds
     go = query.workspace.buffers(allocate_cost_to_go)
     frontier = query.workspace.buffers(allocate_frontier)
     vehicle, scene = query.vehicle, query.scene

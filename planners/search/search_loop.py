@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from time import perf_counter
 
@@ -15,7 +14,7 @@ from planners.search.structures.unreachable import is_unreachable
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, bodies_are_free, point_is_free
 from planners.world.goal import goal_of, reaches
-from planners.world.jit import lean
+from planners.world.jit import lean, working_clock
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -67,8 +66,8 @@ def attempt(
         follow_guide: grows the first tree for ``GUIDED`` expansions, after which it is mostly solved.
         explore_from: the first trial that explores.
     """
-    began = perf_counter()
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
+    began, latest = perf_counter(), working_clock() + limits.seconds
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
     goal = goal_of(problem)
     prefix = query.prefix
@@ -93,7 +92,6 @@ def attempt(
         trial = 0
         extend_tree = grow
         restart_at = int(counts[trees.EXPANSIONS]) + restart_after
-        running_since = math.inf  # the clock starts after the first slice, which may have to be compiled
         while status is Status.BUDGET_SPENT and counts[trees.EXPANSIONS] < limits.expansions:
             if counts[trees.EXPANSIONS] >= restart_at or counts[trees.SIZE] >= limits.nodes:
                 trial += 1
@@ -110,12 +108,11 @@ def attempt(
             extend_tree(tree, goal, until)
             if counts[trees.EXPANSIONS] < until:
                 restart_at = int(counts[trees.EXPANSIONS])  # nothing is left to extend
-            running_since = min(running_since, perf_counter())
             if counts[trees.GOAL_VERTEX] < 0 and query.beside is not None:
                 found = query.beside(work_of(int(counts[trees.CHECKS]), int(counts[trees.EXPANSIONS])))
             if counts[trees.GOAL_VERTEX] >= 0 or found is not None:
                 status = Status.SOLVED
-            elif perf_counter() - running_since > limits.seconds:
+            elif working_clock() > latest:
                 status = Status.TIME_SPENT
     if status is Status.SOLVED and found is None:
         found = trees.plan_to_goal(tree, vehicle.dt)

@@ -190,7 +190,7 @@ class _Told(event.Listener):
 
     def __init__(self) -> None:
         self._depth = 0  # kernels that wait for those that they call
-        self._seconds = 0.0  # of kernels that are done
+        self.seconds = 0.0  # of kernels that are done
         self._began = 0.0
         self._is_told = False
 
@@ -206,10 +206,10 @@ class _Told(event.Listener):
             self._tell()
             self._depth -= 1
             if self._depth == 0:
-                self._seconds += time.monotonic() - self._began
+                self.seconds += time.monotonic() - self._began
 
     def _tell(self) -> None:
-        if not self._is_told and self._seconds + time.monotonic() - self._began >= TOLD_AFTER:
+        if not self._is_told and self.seconds + time.monotonic() - self._began >= TOLD_AFTER:
             self._is_told = True
             _LOG.info("Compiling the planners for this machine, once: may take some 30 s.")
 
@@ -218,8 +218,15 @@ def _is_kernel(event: event.Event) -> bool:
     return isinstance(getattr(event.data["dispatcher"], "_cache", None), _KernelCache)
 
 
+_TOLD = _Told()
 event.register("numba:compile", _NoCollection())
-event.register("numba:compile", _Told())
+event.register("numba:compile", _TOLD)
+
+
+def working_clock() -> float:
+    """Seconds of a clock that stands still while kernels are compiled: limits are for work, not for that."""
+    return time.perf_counter() - _TOLD.seconds
+
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

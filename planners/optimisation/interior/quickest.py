@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from time import perf_counter
 from typing import Final, NamedTuple
 
-import numpy as np
-
-from planners.optimisation.descent import steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.guesses import resampled
 from planners.optimisation.interior.buffers import (
@@ -22,15 +18,15 @@ from planners.optimisation.interior.buffers import (
     begin_inside,
 )
 from planners.optimisation.interior.costs import try_change
+from planners.optimisation.interior.drivable import driven
 from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS, SLACK
-from planners.world.jit import jit
+from planners.world.geometry.collision import Scene
+from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
+from planners.world.jit import working_clock
 from planners.world.problem import Plan
-from planners.world.vehicles.dynamics import admissible, control_limits, load, simulate, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
@@ -103,22 +99,51 @@ def quickest(
         scene: what must not be met.
         barrier: its margin and hitch count.
         iterations: at most, for each way.
-        until: when to end, by ``perf_counter``.
+        until: when to end, by ``working_clock``.
 
     Returns:
         The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
         the iterations used.
     """
+    around = model, interior, goal, vehicle, scene, barrier
+    most = iterations * len(ways)
+    number, best, used, settled = _found(ways, *around, most, until)
+    while best is not None and not settled and used < most and working_clock() < until:
+        _, better, more, settled = _found([best.states], *around, most - used, until)
+        used += more
+        if better is None or len(better.controls) >= len(best.controls):
+            break
+        best = better
+    return number, best, used
+
+
+def _found(
+    ways: Sequence[Floats],
+    model: Model,
+    interior: Interior,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+    barrier: Barrier,
+    most: int,
+    until: float,
+) -> tuple[int, Plan | None, int, bool]:
+    """As ``quickest``, with ``most`` iterations in all.
+
+    The last of what is returned says whether the drive is settled: found at once, when little was left to
+    gain. Else it may become quicker from where it is.
+    """
     given = [Plan(*retimed(way, vehicle), vehicle.dt) for way in ways]
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     circles = circles_around(scene)
-    most, used = iterations * len(guesses), 0
+    used, settled = 0, True
     number, best = -1, None
     for firmness in ATTEMPTS:
         pushing = barrier._replace(strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m)
         aim = _drawn_in(goal, firmness.tolerance)
         drive = _Drive(model, interior, aim, goal, scene, circles, pushing, until)
+        hurried = set()  # whose iterations ended first
         for k in guesses:
             guess = given[k] if firmness.afresh else guesses[k]
             steps = len(guess.controls)
@@ -126,6 +151,8 @@ def quickest(
             first = min(MOST_FIRST, most - used)
             dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
             used += spent
+            if spent == first:
+                hurried.add(k)
             guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
         left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
@@ -134,13 +161,14 @@ def quickest(
             used += spent
             if found is not None:
                 number, best = k, found
+                settled = firmness is ATTEMPTS[0] and k not in hurried
             else:
                 left[k] = guesses[k]
         longest = math.inf if best is None else best.duration_s - vehicle.dt
         guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
-        if not guesses or used >= most or perf_counter() > until:
+        if not guesses or used >= most or working_clock() > until:
             break
-    return number, best, used
+    return number, best, used, settled
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:
@@ -164,7 +192,7 @@ def _in_whole_steps(
         steps = least + more
         if min(len(drive.model.controls), below - 1) < steps or used >= iterations:
             break
-        if perf_counter() > drive.until:
+        if working_clock() > drive.until:
             break
         _fill(drive, resampled(guess, steps), guess.states[0])
         _, spent, found = _descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
@@ -195,7 +223,7 @@ def _descend(
     tried, cost_tried, gaps_tried = vehicle, math.inf, math.inf
     begin_inside(model, interior, steps, strength, vehicle)
     for iteration in range(iterations):
-        if perf_counter() > drive.until:
+        if working_clock() > drive.until:
             return vehicle.dt, iteration, None
         longer = vehicle._replace(dt=vehicle.dt * (1.0 + LITTLE_LONGER))
         damping, longer_s, share, cost, slope, gaps, dearest = direction(
@@ -242,44 +270,5 @@ def _descend(
 
 def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     """The drive that the controls in ``drive.model`` lead to, if it is free and arrives as asked."""
-    start = drive.model.states[0].copy()
-    controls = drive.model.controls[:steps].copy()
-    states = _keep_within(controls, start, vehicle)
-    controls = at_asked_speed(controls, float(states[-1, 3]), drive.asked, vehicle)
-    states = simulate(start, controls, vehicle)
-    arrives = steps_to_goal(states[-1:], 0, drive.asked, vehicle) == 0
-    if not arrives or count_free_prefix(states, vehicle, drive.scene) <= steps:
-        return None
-    return Plan(states, controls, vehicle.dt)
-
-
-def at_asked_speed(controls: Floats, speed: float, goal: Floats, vehicle: Vehicle) -> Floats:
-    """Controls ``[T - 1, 2]`` that end at a speed that is asked for, where these end at ``speed`` (m/s).
-
-    Rounding leaves a little speed, which the last steps take away. What they are to leave lies within what is
-    asked by its slack, so that rounding again does no harm.
-    """
-    most = control_limits(vehicle)[0]
-    asked = min(max(speed, goal[LEAST_SPEED] + SLACK), goal[MOST_SPEED] - SLACK)
-    missing = (asked - speed) / vehicle.dt
-    controls = controls.copy()
-    for k in range(len(controls) - 1, -1, -1):
-        before = controls[k, 0]
-        controls[k, 0] = min(max(before + missing, -most), most)
-        missing -= controls[k, 0] - before
-        if missing == 0.0:
-            break
-    return controls
-
-
-@jit
-def _keep_within(controls: Floats, start: Floats, vehicle: Vehicle) -> Floats:
-    """Reduce ``controls [T - 1, 2]`` that lead past a limit, and return the states ``[T, S]``."""
-    states = np.empty((controls.shape[0] + 1, start.shape[0]))
-    for c in range(start.shape[0]):
-        states[0, c] = start[c]
-    for k in range(controls.shape[0]):
-        state = load(states, k, vehicle)
-        controls[k, 0], controls[k, 1] = admissible(state, controls[k, 0], controls[k, 1], vehicle)
-        store(states, k + 1, step(state, controls[k, 0], controls[k, 1], vehicle))
-    return states
+    model = drive.model
+    return driven(model.states[0].copy(), model.controls[:steps], drive.asked, vehicle, drive.scene)

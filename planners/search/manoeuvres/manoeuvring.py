@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from time import perf_counter
 from typing import Final
 
 import numpy as np
@@ -32,6 +31,7 @@ from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
+from planners.world.jit import working_clock
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import (
     CarWithTrailers,
@@ -206,7 +206,7 @@ class Manoeuvring:
             most: expansions.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
-            until: when to end, by ``perf_counter``.
+            until: when to end, by ``working_clock``.
 
         Returns:
             How many expansions are left of those.
@@ -225,7 +225,7 @@ class Manoeuvring:
         A level ends when it has had all its expansions, or nothing is left to open. Where only the start is
         too narrow for it, too, but for the last.
         """
-        while self.expansions < end and not self.is_over and perf_counter() < until:
+        while self.expansions < end and not self.is_over and working_clock() < until:
             level_ends = self._expansions - self._spent
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
+from planners.optimisation.interior.drivable import at_asked_speed
 from planners.optimisation.interior.newton import direction
-from planners.optimisation.interior.quickest import at_asked_speed
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import polish

@@ -87,6 +87,29 @@ def test_kernels_work_alike_called_by_python_and_by_others_compiled_and_from_dis
     assert loaded == ["[0, 0, 0]", "[0, 0, 1]", "[1, 1, 1]"]
 
 
+CLOCK = """
+import time
+from planners.world.jit import jit, working_clock
+
+@jit
+def tripled(value):
+    return 3.0 * value
+
+began, working = time.perf_counter(), working_clock()
+assert tripled(2.0) == 6.0
+assert working_clock() - working < time.perf_counter() - began
+"""
+
+
+def test_the_working_clock_does_not_count_compiling(tmp_path, monkeypatch):
+    script = tmp_path / "clock.py"
+    script.write_text(CLOCK)
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.fixture
 def collecting() -> Iterator[None]:
     yield
