@@ -59,11 +59,12 @@ class LatticeSettings(NamedTuple):
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
+UNPOLISHED = 0.5  # share of the seconds that are left after a first drive that is kept for polishing
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     """Plan from the problem's start to its goal. A guide is not looked at."""
-    until = working_clock() + query.limits.seconds
+    latest = working_clock() + query.limits.seconds
     go = query.workspace.buffers(allocate_cost_to_go)
     frontier = query.workspace.buffers(allocate_frontier)
     vehicle, scene = query.vehicle, query.scene
@@ -149,10 +150,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     if query.others and outcome.plan is not None and manoeuvring is not None:
         began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
-        left = manoeuvring.further(settings.further, settings.for_one, left, until)
+        ends = latest - UNPOLISHED * (latest - working_clock())
+        left = manoeuvring.further(settings.further, settings.for_one, left, ends)
         kept = manoeuvring.kept
         if joining is not None:
-            joining.further(settings.further, settings.further, left, until)
+            joining.further(settings.further, settings.further, left, ends)
             kept += joining.kept
         outcome = replace(
             outcome,

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from time import perf_counter
-
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.geometry.occupancy import Bits, Drawing, drawing_of
+from planners.world.jit import working_clock
 from planners.world.problem import Problem
 from planners.world.workspace import Workspace
 
@@ -20,13 +19,13 @@ class View:
         self.problem = problem
         self.workspace = workspace or Workspace()
         self.seconds: dict[str, float] = {}  # spent so far, by part of the attempt
-        self.began = self._last = perf_counter()
+        self.began = self._last = working_clock()
         self._drawing: Drawing | None = None
         self._scene: Scene | None = None
 
     def lap(self, part: str) -> None:
         """Add the time since the last lap to ``part``."""
-        now = perf_counter()
+        now = working_clock()
         self.seconds[part] = self.seconds.get(part, 0.0) + now - self._last
         self._last = now
 

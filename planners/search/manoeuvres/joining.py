@@ -197,7 +197,7 @@ def take_word(join: Join, word: Floats, radius: float, vehicle: Vehicle) -> None
             arcs[1, count] = bend * word[k]
             arcs[2, count] = abs(metres)
             count += 1
-    while count < join.ends.shape[1] - 2:
+    while 0 < count < join.ends.shape[1] - 2:
         longest = 0
         for k in range(count):
             if arcs[2, k] > arcs[2, longest]:

@@ -173,6 +173,8 @@ def is_unreachable(problem: Problem, scene: Scene, vehicle: Vehicle, workspace: 
     x, y, heading = problem.start
     begin = (x + ahead * math.cos(heading), y + ahead * math.sin(heading))
     reach = problem.goal_radius + abs(ahead) + SLACK_M
+    if max(abs(problem.goal[0] - begin[0]), abs(problem.goal[1] - begin[1])) <= reach + SLACK_M + cell_m:
+        return False  # cells of the start may be cells of the goal
     _enter(floor, *problem.goal, reach, *frame, FROM_GOAL)
     queued = _enter(floor, *begin, SLACK_M, *frame, FROM_START)
     found, border = _spread(floor, queued, FROM_START, FROM_GOAL)

@@ -35,6 +35,13 @@ def test_arcs_lead_to_a_state_with_its_hitch() -> None:
     assert closed > 0
 
 
+def test_a_word_that_leads_nowhere_has_no_arcs() -> None:
+    join = allocate_join(state_size(CAR_1_TRAILER))
+    join.arcs.fill(7.0)  # of a word before
+    take_word(join, np.zeros(2 * PARTS), RADIUS, CAR_1_TRAILER)
+    assert join.counts[ARCS] == 0
+
+
 def test_arcs_close_a_gap_where_they_meet_and_back_on_from_there() -> None:
     vehicle = CAR_1_TRAILER
     join = allocate_join(state_size(vehicle))

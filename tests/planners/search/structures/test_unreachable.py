@@ -16,7 +16,7 @@ from planners.search.structures.unreachable import is_unreachable
 from planners.world.alignment import to_canonical
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import scene_of
-from planners.world.problem import Problem
+from planners.world.problem import Arrival, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
 from planners.world.workspace import Workspace
@@ -53,6 +53,16 @@ def test_a_gap_is_closed_only_if_the_vehicle_is_wider(name: str, gap: float, thi
         assert gap < 0.9
     else:
         assert gap > 0.2
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_who_has_to_turn_at_the_start_is_not_said_to_have_no_drive(name: str) -> None:
+    x, y, _ = problem_of([]).start
+    bounds = (x - 8.0, y - 8.0, x + 8.0, y + 8.0)
+    for heading in (0.5, 3.1):
+        there = replace(problem_of([]), goal=(x, y), goal_radius=0.02, bounds=bounds)
+        turned = replace(there, arrival=Arrival(there.start[2] + heading, 0.02, 0.0, 0.0))
+        assert not unreachable(turned, VEHICLES[name])
 
 
 @settings(max_examples=15)
