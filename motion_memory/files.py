@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from planners.world.problem import Problem
+from storage.errors import StorageError
 from storage.exchange import problems as problem_files
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 
@@ -45,7 +46,7 @@ def read_worlds(
         seed: decides where problems are cut from a map.
 
     Raises:
-        StorageError: Nothing can be read.
+        StorageError: Nothing can be read, or no world that is there can be used.
     """
     from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
     from storage.worlds.sources import source_at
@@ -58,7 +59,10 @@ def read_worlds(
         scale=scale_for_vehicle(scale, driven),
         resolution=resolution,
     )
-    return import_part(source_at(Path(path)), part, settings).problems
+    imported = import_part(source_at(Path(path)), part, settings)
+    if imported.skipped and not imported.problems:
+        raise StorageError(f"{path} holds no usable problem for part {part} ({imported.explained()}).")
+    return imported.problems
 
 
 def solve_many(

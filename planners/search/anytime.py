@@ -158,7 +158,7 @@ def search_and_polish(
 
     Args:
         planner: one of ``PLANNERS``.
-        query: what it is asked; its limits are those of all searches together, the seconds those of all.
+        query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
 

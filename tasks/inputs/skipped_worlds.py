@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 NAMED: Final = 3  # worlds that are named for each reason
-_NUMBER: Final = re.compile(r"[+-]?\d[\d.]*")
+_NUMBER: Final = re.compile(r"(?<!\w)[+-]?\d[\d.]*\b")  # but not in names
 
 
 def summed_up(skipped: Sequence[tuple[str, str]]) -> str:

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, get_args
 
 from dashboards.cells import CellTable, decimal
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import VEHICLES, Vehicle, name_of
 from storage.exchange.problem_files import FORMATS as PROBLEM_FORMATS
 from storage.exchange.problems import write_problems
 from storage.places.files import whole_folder
@@ -32,6 +32,7 @@ from tasks.settings.errors import RunError, UsageError
 
 PROBLEMS_FILE: Final = "problems.parquet"  # in the folder of each part
 BOTH: Final = "both"
+MEANT_FOR: Final = {"tpcap": "tpcap-car", "bench-mr": "bench-mr-car"}  # vehicles of formats that name none
 ONLY_OF_MAPS: Final = {"tolerance_m": 0.0, "seed": 1}  # options with their defaults
 
 HEADINGS: Final = ("class", "part", "problems", "skipped", "pieces", "a problem", "seconds")
@@ -139,6 +140,7 @@ def import_worlds(
     _write(out, imported_parts, settings.vehicle)
     if drawing is not None:
         _draw(source, settings, imported_parts, drawing)
+    _warn_of_built_in(source, settings.vehicle)
     _warn_of_skipped([line for imported in imported_parts.values() for line in imported.skipped])
     return CellTable("", HEADINGS, [[row] for row in rows], "import", FIELDS)
 
@@ -203,6 +205,15 @@ def _cells(source: Source, part: str, imported: Imported, seconds: float) -> lis
         decimal(mean, 1),
         decimal(seconds, 1),
     ]
+
+
+def _warn_of_built_in(source: Source, vehicle: Vehicle) -> None:
+    if source.format in MEANT_FOR and vehicle in VEHICLES.values():
+        meant = MEANT_FOR[source.format]
+        _LOG.warning(
+            f"These are read for {name_of(vehicle)}, but were written for {meant}: to compare with what "
+            f"others published give --vehicle docs/vehicles/benchmarks/{meant}.yaml."
+        )
 
 
 def _warn_of_skipped(skipped: list[tuple[str, str]]) -> None:

@@ -108,6 +108,12 @@ def test_problems_are_cut_from_a_map(tmp_path: Path) -> None:
     assert len(cut) == 2
 
 
+def test_a_file_of_which_nothing_can_be_used_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "cut.json").write_text('{"start": [0, 0')
+    with pytest.raises(motion_memory.StorageError, match="holds no usable problem"):
+        motion_memory.read_worlds(tmp_path / "cut.json")
+
+
 def test_importing_it_needs_nothing_that_a_robot_has_not() -> None:
     code = f"import motion_memory, sys; print([m for m in {NOT_FOR_ROBOTS} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

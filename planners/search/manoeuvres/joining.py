@@ -44,7 +44,7 @@ class Join(NamedTuple):
     effects: Floats  # [6, 2 MOST_ARCS] of bends and lengths on what is missing: x, y, heading, hitches
     squares: Floats  # [6, 7] the equations of a correction
     free: Floats  # [2 MOST_ARCS] 0 for what the last round would have moved beyond its limit, else 1
-    chain: Indices  # [MOST_CHAIN] nodes of a tree, the last one first
+    chain: Indices  # [MOST_CHAIN] nodes between a node of a tree and its root
     base: Floats  # [1, S] where the arcs begin
     counts: Indices  # [2] how many arcs there are; of these before the meeting
 

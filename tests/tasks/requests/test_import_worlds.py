@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ def test_a_map_becomes_a_file_of_problems_and_a_picture(
     asked = ["import-worlds", str(town), "--out", str(out), "--problems", "4", "--picture", str(picture)]
     assert call(asked) == 0
     told = capsys.readouterr()
-    assert told.err == ""
+    assert "skipped" not in told.err
     assert str(out) in told.out.replace("\n", "")
     assert [line.split()[:4] for line in told.out.splitlines() if line.startswith(" town")] == [
         ["town", "train", "4", "0"],
@@ -156,6 +157,19 @@ def test_skipped_worlds_are_listed_and_under_strict_stop(
     assert call(["import-worlds", str(tmp_path / "yard"), "--out", str(out), "--strict"]) == 1
     assert "2.txt cannot be planned in" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_a_car_other_than_the_one_that_cases_were_written_for_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = {"id": "a", "start": [0, 0, 0], "goal": [9, 0, 0], "obstacles": []}
+    (tmp_path / "cases.json").write_text(json.dumps({"cases": [case]}))
+    command = ["import-worlds", str(tmp_path / "cases.json"), "--format", "tpcap", "--part", "train", "--out"]
+    assert call([*command, str(tmp_path / "a.jsonl")]) == 0
+    assert "tpcap-car.yaml" in capsys.readouterr().err
+    theirs = ["--vehicle", "docs/vehicles/benchmarks/tpcap-car.yaml"]
+    assert call([*command, str(tmp_path / "b.jsonl"), *theirs]) == 0
+    assert "tpcap-car.yaml" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", ["map", "folder"])
