@@ -284,20 +284,17 @@ def _warmed(ready: Memory) -> Memory:
     start, goal = (0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE)
     bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
     aside = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
-    wall = scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]])  # no way leads past it
 
     def ask(planner: Memory, obstacle: Floats = aside, arrival: Arrival | None = None) -> None:
-        planner.plan_arrays(
-            *(start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale),
-            arrival=arrival,
-        )
+        around = start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale
+        planner.plan_arrays(*around, arrival=arrival)
 
     alone = replace(ready, assist="none")
-    narrow = family(families_of(ready.vehicle)[0], "easy", ready.vehicle).draw(0, 0)
+    narrow = family(families_of(ready.vehicle)[0], "easy", ready.vehicle)
     for each in (ready, alone):  # recall, then search
         ask(each)
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
-        each.plan(narrow)
-    ask(alone, wall)
+        each.plan(narrow.draw(0, 0))
+    ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
     ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
     return ready

@@ -25,7 +25,7 @@ from planners.search.outcome import Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.arrays import Integers
-from planners.world.jit import working_clock
+from planners.world.compiling import working_clock
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.reach import least_scale

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from planners.world import jit
+from planners.world import compiling
 
 np.seterr(all="raise", under="ignore")
-jit.TOLD_AFTER = math.inf  # or which test's error stream told of compiling would be left to chance
+compiling.TOLD_AFTER = math.inf  # or which test's error stream told of compiling would be left to chance
 # no times: compiling a kernel takes seconds, and the machine may be busy
 _STRICT = settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("strict", _STRICT, max_examples=25)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 LOGGERS: Final = ("tasks", "storage")
 PROGRESS: Final = "tasks.fan_out.progress"
-COMPILING: Final = "planners.world.jit"  # logs that kernels are being compiled
+COMPILING: Final = "planners.world.compiling"  # logs that kernels are being compiled
 DETAILS: Final = ("tasks.fan_out.workload",)  # these notices are for operators and for ``--verbose``
 RESULTS: Final = ("tasks.reports", "tasks.session.command_session")  # a run's findings, and where they are
 SHORT: Final = 3  # exit code: done, but with less than was asked for

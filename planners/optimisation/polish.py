@@ -17,9 +17,9 @@ from planners.optimisation.interior.quickest import NEVER, quickest
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
-from planners.world.jit import working_clock
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state_size, trailers_of

@@ -21,9 +21,9 @@ from planners.search.manoeuvres.manoeuvring import is_tight, meets, suits
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.goal import goal_of
-from planners.world.jit import working_clock
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle

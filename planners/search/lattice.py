@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from time import perf_counter
 from typing import NamedTuple
 
 from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
@@ -27,9 +26,9 @@ from planners.search.structures.frontier import (
 )
 from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
-from planners.world.jit import working_clock
 from planners.world.problem import Plan, is_canonical
 
 
@@ -148,7 +147,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
     outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
     if query.others and outcome.plan is not None and manoeuvring is not None:
-        began, checks, expansions = perf_counter(), manoeuvring.checks, manoeuvring.expansions
+        began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
         ends = latest - UNPOLISHED * (latest - working_clock())
         left = manoeuvring.further(settings.further, settings.for_one, left, ends)
@@ -161,7 +160,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             others=tuple(_differing(kept, outcome.plan)),
             expansions=outcome.expansions + manoeuvring.expansions - expansions,
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
-            search_seconds=outcome.search_seconds + perf_counter() - began,
+            search_seconds=outcome.search_seconds + working_clock() - began,
         )
     if joining is None:
         return outcome

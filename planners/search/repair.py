@@ -11,7 +11,6 @@ around is long, and when it has cost its budget.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from planners.search.outcome import Outcome, Status, work_of
 from planners.search.query import Query
 from planners.search.tracking import ARRIVED, TRACKING, Tracking, track
 from planners.world.arrays import Flags, Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
 from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import RADIUS, X, Y, goal_of, place
@@ -144,7 +144,7 @@ def repair(
     Returns:
         The repaired plan with status ``SOLVED``, or no plan with ``BUDGET_SPENT``.
     """
-    began = perf_counter()
+    began = working_clock()
     problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
     reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
@@ -199,5 +199,5 @@ def repair(
         expansions=expansions,
         nodes=nodes,
         roadmap_seconds=0.0,
-        search_seconds=perf_counter() - began,
+        search_seconds=working_clock() - began,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
 
 import numpy as np
 
@@ -12,9 +11,10 @@ from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.search.structures.unreachable import is_unreachable
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, bodies_are_free, point_is_free
 from planners.world.goal import goal_of, reaches
-from planners.world.jit import lean, working_clock
+from planners.world.jit import lean
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import Vehicle, state_size
@@ -67,7 +67,7 @@ def attempt(
         explore_from: the first trial that explores.
     """
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
-    began, latest = perf_counter(), working_clock() + limits.seconds
+    began = working_clock()
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
     goal = goal_of(problem)
     prefix = query.prefix
@@ -85,9 +85,9 @@ def attempt(
         if follow_guide is not None:
             follow_guide(tree, goal, min(GUIDED, limits.expansions))
         if counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < limits.expansions:
-            preparing = perf_counter()
+            preparing = working_clock()
             prepare(tree, goal, 0)
-            roadmap_seconds = perf_counter() - preparing
+            roadmap_seconds = working_clock() - preparing
         status = Status.BUDGET_SPENT if counts[trees.GOAL_VERTEX] < 0 else Status.SOLVED
         trial = 0
         extend_tree = grow
@@ -112,7 +112,7 @@ def attempt(
                 found = query.beside(work_of(int(counts[trees.CHECKS]), int(counts[trees.EXPANSIONS])))
             if counts[trees.GOAL_VERTEX] >= 0 or found is not None:
                 status = Status.SOLVED
-            elif working_clock() > latest:
+            elif working_clock() - began > limits.seconds:
                 status = Status.TIME_SPENT
     if status is Status.SOLVED and found is None:
         found = trees.plan_to_goal(tree, vehicle.dt)
@@ -123,5 +123,5 @@ def attempt(
         expansions=int(counts[trees.EXPANSIONS]),
         nodes=int(counts[trees.SIZE]),
         roadmap_seconds=roadmap_seconds,
-        search_seconds=perf_counter() - began - roadmap_seconds,
+        search_seconds=working_clock() - began - roadmap_seconds,
     )

@@ -8,10 +8,7 @@ their own would never run.
 from __future__ import annotations
 
 import functools
-import gc
 import hashlib
-import logging
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -25,8 +22,8 @@ from numba.core.compiler import Compiler, compile_result
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload, typeof_impl
 
-TOLD_AFTER: float = 2.0  # seconds of compiling, from which on it is worth a line
-_LOG = logging.getLogger(__name__)
+from planners.world.compiling import listen
+
 _SOURCES = Path(__file__).parents[1]
 
 
@@ -162,71 +159,11 @@ class _Kernel(CPUDispatcher):
         super().add_overload(cres)
 
 
-class _NoCollection(event.Listener):
-    """Pauses Python's garbage collector while a kernel is compiled.
-
-    The compiler makes millions of objects that live until it is done; looking through them again and again
-    would take a quarter of its time.
-    """
-
-    def __init__(self) -> None:
-        self._resume: list[bool] = []  # for each kernel that waits for those that it calls
-
-    def on_start(self, event: event.Event) -> None:
-        if _is_kernel(event):
-            self._resume.append(gc.isenabled())
-            gc.disable()
-
-    def on_end(self, event: event.Event) -> None:
-        if _is_kernel(event) and self._resume.pop():
-            gc.enable()
-
-
-class _Told(event.Listener):
-    """Logs a line, once a process, when kernels have been compiled for ``TOLD_AFTER`` seconds in all.
-
-    A large kernel calls many others, each of which is compiled first and shows that time has passed.
-    """
-
-    def __init__(self) -> None:
-        self._depth = 0  # kernels that wait for those that they call
-        self.seconds = 0.0  # of kernels that are done
-        self._began = 0.0
-        self._is_told = False
-
-    def on_start(self, event: event.Event) -> None:
-        if _is_kernel(event):
-            if self._depth == 0:
-                self._began = time.monotonic()
-            self._depth += 1
-            self._tell()
-
-    def on_end(self, event: event.Event) -> None:
-        if _is_kernel(event):
-            self._tell()
-            self._depth -= 1
-            if self._depth == 0:
-                self.seconds += time.monotonic() - self._began
-
-    def _tell(self) -> None:
-        if not self._is_told and self.seconds + time.monotonic() - self._began >= TOLD_AFTER:
-            self._is_told = True
-            _LOG.info("Compiling the planners for this machine, once: may take some 30 s.")
-
-
 def _is_kernel(event: event.Event) -> bool:
     return isinstance(getattr(event.data["dispatcher"], "_cache", None), _KernelCache)
 
 
-_TOLD = _Told()
-event.register("numba:compile", _NoCollection())
-event.register("numba:compile", _TOLD)
-
-
-def working_clock() -> float:
-    """Seconds of a clock that stands still while kernels are compiled: limits are for work, not for that."""
-    return time.perf_counter() - _TOLD.seconds
-
+listen(_is_kernel)
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

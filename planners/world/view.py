@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.geometry.occupancy import Bits, Drawing, drawing_of
-from planners.world.jit import working_clock
 from planners.world.problem import Problem
 from planners.world.workspace import Workspace
 

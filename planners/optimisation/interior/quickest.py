@@ -23,9 +23,9 @@ from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
-from planners.world.jit import working_clock
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -105,11 +105,11 @@ def quickest(
         The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
         the iterations used.
     """
-    around = model, interior, goal, vehicle, scene, barrier
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), barrier, until)
     most = iterations * len(ways)
-    number, best, used, settled = _found(ways, *around, most, until)
+    number, best, used, settled = _found(ways, drive, vehicle, most)
     while best is not None and not settled and used < most and working_clock() < until:
-        _, better, more, settled = _found([best.states], *around, most - used, until)
+        _, better, more, settled = _found([best.states], drive, vehicle, most - used)
         used += more
         if better is None or len(better.controls) >= len(best.controls):
             break
@@ -118,31 +118,26 @@ def quickest(
 
 
 def _found(
-    ways: Sequence[Floats],
-    model: Model,
-    interior: Interior,
-    goal: Floats,
-    vehicle: Vehicle,
-    scene: Scene,
-    barrier: Barrier,
-    most: int,
-    until: float,
+    ways: Sequence[Floats], around: _Drive, vehicle: Vehicle, most: int
 ) -> tuple[int, Plan | None, int, bool]:
     """As ``quickest``, with ``most`` iterations in all.
 
     The last of what is returned says whether the drive is settled: found at once, when little was left to
     gain. Else it may become quicker from where it is.
     """
+    model = around.model
     given = [Plan(*retimed(way, vehicle), vehicle.dt) for way in ways]
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
-    circles = circles_around(scene)
     used, settled = 0, True
     number, best = -1, None
     for firmness in ATTEMPTS:
-        pushing = barrier._replace(strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m)
-        aim = _drawn_in(goal, firmness.tolerance)
-        drive = _Drive(model, interior, aim, goal, scene, circles, pushing, until)
+        drive = around._replace(
+            goal=_drawn_in(around.asked, firmness.tolerance),
+            barrier=around.barrier._replace(
+                strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m
+            ),
+        )
         hurried = set()  # whose iterations ended first
         for k in guesses:
             guess = given[k] if firmness.afresh else guesses[k]
@@ -166,7 +161,7 @@ def _found(
                 left[k] = guesses[k]
         longest = math.inf if best is None else best.duration_s - vehicle.dt
         guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
-        if not guesses or used >= most or working_clock() > until:
+        if not guesses or used >= most or working_clock() > drive.until:
             break
     return number, best, used, settled
 

@@ -82,7 +82,6 @@ def drive_arcs_to_goal(
     links: int,
     tree: PoseTree,
     node: int,
-    start: Floats,
     endings: Endings,
     goal: Floats,
     vehicle: Vehicle,
@@ -93,7 +92,7 @@ def drive_arcs_to_goal(
     Before these arcs those of the first ``links`` nodes of ``drive.join.chain`` are driven, of the tree
     ``before`` that grew out of the start. Returns the same as ``drive_to_goal``.
     """
-    begin(drive, start)
+    begin(drive, before.states)
     for k in range(links):
         link = drive.join.chain[k]
         gear = 1.0 if before.metres[link] > 0.0 else -1.0

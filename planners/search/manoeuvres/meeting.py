@@ -87,5 +87,5 @@ def meet(
     free, checks = arcs_are_free(join.base, join, vehicle, scene)
     tree.counts[CHECKS] += checks
     return free and bool(
-        drive_arcs_to_goal(drive, before, straight, tree, node, before.states, endings, goal, vehicle, scene)
+        drive_arcs_to_goal(drive, before, straight, tree, node, endings, goal, vehicle, scene)
     )

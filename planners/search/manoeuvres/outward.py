@@ -104,7 +104,7 @@ def _seconds_from_start(state: State, known: FromStart, settings: Outward, vehic
     turns = _least_seconds_from_start(state, known, vehicle)
     if len(state) > 5:  # decided when compiling
         root = load(known.start, 0, vehicle)
-        there, here = _last_body(root, vehicle), _last_body(state, vehicle)  # type: ignore[arg-type]
+        there, here = _last_body(root, vehicle), _last_body(state, vehicle)  # type: ignore[arg-type]  # the state of a car is shorter
         last = _seconds_of_body(there, here, known, vehicle)
         turns = max(turns, last) if settings.worst else 0.5 * (turns + last)
     return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)

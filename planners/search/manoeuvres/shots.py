@@ -151,9 +151,7 @@ def _shoot_with_trailers(
             continue
         free, checks = arcs_are_free(known.start, drive.join, vehicle, scene)
         tree.counts[CHECKS] += checks
-        if free and drive_arcs_to_goal(
-            drive, tree, 0, tree, node, known.start, known.endings, goal, vehicle, scene
-        ):
+        if free and drive_arcs_to_goal(drive, before, 0, tree, node, known.endings, goal, vehicle, scene):
             return True
     return False
 

@@ -11,7 +11,7 @@ import pytest
 
 KERNELS = """
 import sys
-from planners.world import jit
+from planners.world import compiling, jit
 from flows.cli.document import Document
 from flows.cli.terminal import notices_shown, telling, write_document
 
@@ -23,7 +23,7 @@ def twice(x):
 def four_times(x):
     return twice(twice(x))
 
-jit.TOLD_AFTER = float(sys.argv[1])
+compiling.TOLD_AFTER = float(sys.argv[1])
 if sys.argv[2] == "no command":
     sys.exit(four_times(1.0) != 4.0)
 with notices_shown():

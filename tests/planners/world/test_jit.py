@@ -89,7 +89,8 @@ def test_kernels_work_alike_called_by_python_and_by_others_compiled_and_from_dis
 
 CLOCK = """
 import time
-from planners.world.jit import jit, working_clock
+from planners.world.compiling import working_clock
+from planners.world.jit import jit
 
 @jit
 def tripled(value):

@@ -1,0 +1,90 @@
+"""While kernels are compiled: no collection of garbage, a line that says so, a clock that stands still."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import time
+from collections.abc import Callable
+
+from numba.core import event
+
+TOLD_AFTER: float = 2.0  # seconds of compiling, from which on it is worth a line
+Predicate = Callable[[event.Event], bool]  # whether what is compiled is a kernel of ours
+_LOG = logging.getLogger(__name__)
+
+
+class _Listener(event.Listener):
+    """Told when Numba begins and ends to compile a function."""
+
+    def __init__(self, is_kernel: Predicate) -> None:
+        self._is_kernel = is_kernel
+
+
+class _NoCollection(_Listener):
+    """Pauses Python's garbage collector while a kernel is compiled.
+
+    The compiler makes millions of objects that live until it is done; looking through them again and again
+    would take a quarter of its time.
+    """
+
+    def __init__(self, is_kernel: Predicate) -> None:
+        super().__init__(is_kernel)
+        self._resume: list[bool] = []  # for each kernel that waits for those that it calls
+
+    def on_start(self, event: event.Event) -> None:
+        if self._is_kernel(event):
+            self._resume.append(gc.isenabled())
+            gc.disable()
+
+    def on_end(self, event: event.Event) -> None:
+        if self._is_kernel(event) and self._resume.pop():
+            gc.enable()
+
+
+class _Told(_Listener):
+    """Logs a line, once a process, when kernels have been compiled for ``TOLD_AFTER`` seconds in all.
+
+    A large kernel calls many others, each of which is compiled first and shows that time has passed.
+    """
+
+    def __init__(self, is_kernel: Predicate) -> None:
+        super().__init__(is_kernel)
+        self._depth = 0  # kernels that wait for those that they call
+        self.seconds = 0.0  # of kernels that are done
+        self._began = 0.0
+        self._is_told = False
+
+    def on_start(self, event: event.Event) -> None:
+        if self._is_kernel(event):
+            if self._depth == 0:
+                self._began = time.monotonic()
+            self._depth += 1
+            self._tell()
+
+    def on_end(self, event: event.Event) -> None:
+        if self._is_kernel(event):
+            self._tell()
+            self._depth -= 1
+            if self._depth == 0:
+                self.seconds += time.monotonic() - self._began
+
+    def _tell(self) -> None:
+        if not self._is_told and self.seconds + time.monotonic() - self._began >= TOLD_AFTER:
+            self._is_told = True
+            _LOG.info("Compiling the planners for this machine, once: may take some 30 s.")
+
+
+_told: list[_Told] = []
+
+
+def listen(is_kernel: Predicate) -> None:
+    """Do all of that from now on."""
+    _told.append(_Told(is_kernel))
+    event.register("numba:compile", _NoCollection(is_kernel))
+    event.register("numba:compile", _told[-1])
+
+
+def working_clock() -> float:
+    """Seconds of a clock that stands still while kernels are compiled: limits are for work, not for that."""
+    return time.perf_counter() - sum(each.seconds for each in _told)
