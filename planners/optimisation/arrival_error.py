@@ -20,46 +20,48 @@ from planners.world.goal import (
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length, wrapped
 
-OFF: Final = 0.25  # metres; what it costs to be ``EDGE`` off the aim
-EDGE: Final = 0.05  # metres or radians that the aim lies inside of what is tolerated; half, if that is less
+OFF: Final = 0.25  # metres; what it costs to be off the aim by the usual share of what is tolerated
+USUAL: Final = 0.5  # share of what is tolerated by which the aim lies inside of it
+WIDE: Final = 0.1  # metres or radians; more is not counted as tolerated here
 
 
 @inlined
-def _edge(tolerance: float) -> float:
-    return max(min(0.5 * tolerance, EDGE), 1e-9)
+def _edge(tolerance: float, inside: float) -> float:
+    return max(inside * min(tolerance, WIDE), 1e-9)
 
 
 @inlined
 def bend_of_error(tolerance: float) -> float:
     """What it costs to be one metre or radian off the aim, twice."""
-    return OFF / (_edge(tolerance) * _edge(tolerance))
+    edge = _edge(tolerance, USUAL)
+    return OFF / (edge * edge)
 
 
 @lean
-def aim_near(end: Floats, goal: Floats, aim: Floats) -> None:
-    """Aim at a last state ``[S]``, or at what is next to it well inside of what is asked."""
+def aim_near(end: Floats, goal: Floats, aim: Floats, inside: float) -> None:
+    """Aim at a last state ``[S]``, or at what is next to it and by a share ``inside`` of what is asked."""
     for c in range(aim.shape[0]):
         aim[c] = end[c]
     dx = end[0] - goal[X]
     dy = end[1] - goal[Y]
-    inside = min((goal[RADIUS] - _edge(goal[RADIUS])) / max(length(dx, dy), 1e-9), 1.0)
-    aim[0] = goal[X] + inside * dx
-    aim[1] = goal[Y] + inside * dy
+    share = min((goal[RADIUS] - _edge(goal[RADIUS], inside)) / max(length(dx, dy), 1e-9), 1.0)
+    aim[0] = goal[X] + share * dx
+    aim[1] = goal[Y] + share * dy
     if goal[HEADING_TOLERANCE] < math.inf:
-        inside = goal[HEADING_TOLERANCE] - _edge(goal[HEADING_TOLERANCE])
+        most = goal[HEADING_TOLERANCE] - _edge(goal[HEADING_TOLERANCE], inside)
         off = wrapped(end[2] - goal[HEADING])
-        aim[2] = end[2] - off + min(max(off, -inside), inside)
+        aim[2] = end[2] - off + min(max(off, -most), most)
     aim[3] = min(max(end[3], goal[LEAST_SPEED]), goal[MOST_SPEED])
     for k in range((goal.shape[0] - HITCHES) // 2):
-        inside = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1])
+        most = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1], inside)
         off = end[5 + k] - goal[HITCHES + 2 * k]
-        aim[5 + k] = goal[HITCHES + 2 * k] + min(max(off, -inside), inside)
+        aim[5 + k] = goal[HITCHES + 2 * k] + min(max(off, -most), most)
 
 
 @lean
 def aim_at(model: Model, steps: int, goal: Floats) -> None:
     """Aim at the end of ``model.best_states``, as ``aim_near`` does."""
-    aim_near(model.best_states[steps], goal, model.vectors[5])
+    aim_near(model.best_states[steps], goal, model.vectors[5], USUAL)
 
 
 @inlined

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 from planners.optimisation.arrival_error import aim_near, bend_of_error
 from planners.optimisation.gains import effort
@@ -25,20 +25,29 @@ from planners.world.vehicles.vehicle import Vehicle
 SPEED_OFF: Final = 500.0  # metres; what it costs to be full speed off the speed that is asked at the end
 
 
+class Hold(NamedTuple):
+    """How firmly a drive is held off obstacles and to its goal, against the time that this takes."""
+
+    barrier: Barrier
+    inside: float  # share of what is tolerated at the goal by which the aim lies inside of it
+    pull: float  # times as much as ``bend_of_error`` that being off the aim costs
+
+
 @inlined
-def weight_of_error(c: int, goal: Floats, vehicle: Vehicle) -> float:
+def weight_of_error(c: int, goal: Floats, hold: Hold, vehicle: Vehicle) -> float:
     """What it costs that number ``c`` of the last state is not the aim, for its square and twice."""
     if c < 2:
-        return bend_of_error(goal[RADIUS])
+        return hold.pull * bend_of_error(goal[RADIUS])
     elif c == 2:
-        return bend_of_error(goal[HEADING_TOLERANCE]) if goal[HEADING_TOLERANCE] < math.inf else 0.0
+        asked = goal[HEADING_TOLERANCE] < math.inf
+        return hold.pull * bend_of_error(goal[HEADING_TOLERANCE]) if asked else 0.0
     elif c == 3:
         asked = goal[MOST_SPEED] - goal[LEAST_SPEED] < math.inf
         return 2.0 * SPEED_OFF / (vehicle.max_speed * vehicle.max_speed) if asked else 0.0
     elif c == 4 or c - 5 >= (goal.shape[0] - HITCHES) // 2:
         return 0.0
     else:
-        return bend_of_error(goal[HITCHES + 2 * (c - 5) + 1])
+        return hold.pull * bend_of_error(goal[HITCHES + 2 * (c - 5) + 1])
 
 
 @lean
@@ -53,7 +62,7 @@ def cost_of(
     vehicle: Vehicle,
     scene: Scene,
     circles: Floats,
-    barrier: Barrier,
+    hold: Hold,
 ) -> float:
     """What a drive costs in metres, gaps apart; infinite where a number is not inside its limits.
 
@@ -68,7 +77,7 @@ def cost_of(
         vehicle: what is driven; its ``dt`` is the length of a step here.
         scene: what must not be met.
         circles: ``[P, 3]`` around the scene's pieces.
-        barrier: how obstacles push.
+        hold: how firmly it is held.
     """
     cost = time_counts * steps * vehicle.dt * vehicle.max_speed
     for k in range(steps):
@@ -81,12 +90,12 @@ def cost_of(
                 return math.inf
             product *= (value - low) * (high - value) / ((high - low) * (high - low))
         cost -= strength * math.log(product)
-        cost += nearness_cost(states, k + 1, vehicle, scene, circles, barrier)
-    aim_near(states[steps], goal, aim)
+        cost += nearness_cost(states, k + 1, vehicle, scene, circles, hold.barrier)
+    aim_near(states[steps], goal, aim, hold.inside)
     for c in range(states.shape[1]):
         off = states[steps, c] - aim[c]
         if off != 0.0:
-            cost += 0.5 * weight_of_error(c, goal, vehicle) * off * off
+            cost += 0.5 * weight_of_error(c, goal, hold, vehicle) * off * off
     return cost
 
 
@@ -102,7 +111,7 @@ def try_change(
     vehicle: Vehicle,
     scene: Scene,
     circles: Floats,
-    barrier: Barrier,
+    hold: Hold,
 ) -> tuple[float, float]:
     """Fill in ``model.tried_states`` with a share of the change. Returns its cost and the sum of its gaps."""
     states, controls = model.tried_states, model.tried_controls
@@ -116,13 +125,14 @@ def try_change(
             states[k + 1, c] = model.states[k + 1, c] + share * interior.change[k + 1, c]
     cost = cost_of(
         *(states, controls, steps, goal, interior.aim, strength, time_counts),
-        *(vehicle, scene, circles, barrier),
+        *(vehicle, scene, circles, hold),
     )
     gaps = 0.0
     for k in range(steps):
         after = step(load(states, k, vehicle), controls[k, 0], controls[k, 1], vehicle)
         for c in range(size):
-            gaps += abs(after[c] - states[k + 1, c])
+            reached = states[k, c] + vehicle.dt * controls[k, c - 3] if 3 <= c < 5 else after[c]
+            gaps += abs(reached - states[k + 1, c])  # speed and steering as if ``step`` did not clamp them
     return cost, gaps
 
 
@@ -147,8 +157,13 @@ def differentiate(
         after = step(here, first, second, vehicle)
         later = step(here, first, second, longer)
         for c in range(size):
-            model.gaps[k, c] = after[c] - model.states[k + 1, c]
-            interior.by_time[k, c] = (later[c] - after[c]) / (longer.dt - vehicle.dt)
+            if 3 <= c < 5:  # linear, whatever ``step`` clamps
+                control = model.controls[k, c - 3]
+                model.gaps[k, c] = model.states[k, c] + vehicle.dt * control - model.states[k + 1, c]
+                interior.by_time[k, c] = control
+            else:
+                model.gaps[k, c] = after[c] - model.states[k + 1, c]
+                interior.by_time[k, c] = (later[c] - after[c]) / (longer.dt - vehicle.dt)
         differentiate_nearness(model, k + 1, vehicle, scene, circles, barrier)
     for r in range(size):
         model.gradient[0, r] = 0.0

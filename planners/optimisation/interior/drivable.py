@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
@@ -14,12 +15,12 @@ from planners.world.vehicles.dynamics import admissible, control_limits, load, s
 from planners.world.vehicles.vehicle import Vehicle
 
 
-def driven(start: Floats, controls: Floats, goal: Floats, vehicle: Vehicle, scene: Scene) -> Plan | None:
-    """The drive that ``controls [T - 1, 2]`` lead to from ``start [S]``, if it is free and arrives."""
-    controls = controls.copy()
-    states = _keep_within(controls, start, vehicle)
+def driven(model: Model, steps: int, goal: Floats, vehicle: Vehicle, scene: Scene) -> Plan | None:
+    """The drive that the controls in ``model`` lead to, with its feedback, if it is free and arrives."""
+    controls: Floats = np.empty((steps, 2))
+    states = _follow(model, controls, vehicle)
     controls = at_asked_speed(controls, float(states[-1, 3]), goal, vehicle)
-    states = simulate(start, controls, vehicle)
+    states = simulate(states[0], controls, vehicle)
     arrives = steps_to_goal(states[-1:], 0, goal, vehicle) == 0
     if not arrives or count_free_prefix(states, vehicle, scene) <= len(controls):
         return None
@@ -46,13 +47,23 @@ def at_asked_speed(controls: Floats, speed: float, goal: Floats, vehicle: Vehicl
 
 
 @jit
-def _keep_within(controls: Floats, start: Floats, vehicle: Vehicle) -> Floats:
-    """Reduce ``controls [T - 1, 2]`` that lead past a limit, and return the states ``[T, S]``."""
-    states = np.empty((controls.shape[0] + 1, start.shape[0]))
-    for c in range(start.shape[0]):
-        states[0, c] = start[c]
+def _follow(model: Model, controls: Floats, vehicle: Vehicle) -> Floats:
+    """Fill in ``controls [T - 1, 2]`` that follow the drive of a model, within all limits; its states."""
+    size = model.states.shape[1]
+    most_0, most_1 = control_limits(vehicle)
+    states = np.empty((controls.shape[0] + 1, size))
+    for c in range(size):
+        states[0, c] = model.states[0, c]
     for k in range(controls.shape[0]):
+        first = model.controls[k, 0]
+        second = model.controls[k, 1]
+        for c in range(size):
+            off = states[k, c] - model.states[k, c]
+            first += model.feedback[k, 0, c] * off
+            second += model.feedback[k, 1, c] * off
         state = load(states, k, vehicle)
-        controls[k, 0], controls[k, 1] = admissible(state, controls[k, 0], controls[k, 1], vehicle)
+        first = min(max(first, -most_0), most_0)
+        second = min(max(second, -most_1), most_1)
+        controls[k, 0], controls[k, 1] = admissible(state, first, second, vehicle)
         store(states, k + 1, step(state, controls[k, 0], controls[k, 1], vehicle))
     return states

@@ -10,9 +10,8 @@ from typing import Final
 
 from planners.optimisation.arrival_error import aim_near
 from planners.optimisation.gains import EFFORT, GENTLE
-from planners.optimisation.gaps import Barrier
 from planners.optimisation.interior.buffers import LIMITED, Interior, limits_of, value_of
-from planners.optimisation.interior.costs import cost_of, differentiate, weight_of_error
+from planners.optimisation.interior.costs import Hold, cost_of, differentiate, weight_of_error
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
@@ -51,6 +50,7 @@ def _sweep_back(
     strength: float,
     time_counts: float,
     damping: float,
+    hold: Hold,
     vehicle: Vehicle,
 ) -> tuple[bool, float]:
     """Fill in how controls change with what goes before; whether that is a least cost, and the time's change.
@@ -66,7 +66,7 @@ def _sweep_back(
     for r in range(size):
         for c in range(size):
             hessian[r, c] = model.curvature[steps, r, c]
-        weight = weight_of_error(r, goal, vehicle)
+        weight = weight_of_error(r, goal, hold, vehicle)
         hessian[r, r] += weight
         gradient[r] = model.gradient[steps, r] + weight * (model.states[steps, r] - interior.aim[r])
         mixed[r] = 0.0
@@ -215,7 +215,7 @@ def direction(
     longer: Vehicle,
     scene: Scene,
     circles: Floats,
-    barrier: Barrier,
+    hold: Hold,
 ) -> tuple[float, float, float, float, float, float, float]:
     """Fill in ``interior.change`` and ``interior.change_controls``.
 
@@ -231,22 +231,24 @@ def direction(
         longer: the same with a step that is a little longer.
         scene: what must not be met.
         circles: ``[P, 3]`` around the scene's pieces.
-        barrier: how obstacles push.
+        hold: how firmly the drive is held.
 
     Returns:
         The damping that was needed; by how many seconds a step gets longer; the share of the change that
         keeps within all limits, 0 if there is no direction; the cost; its slope along the change; the sum of
         the gaps; and what a gap of 1 costs at most.
     """
-    differentiate(model, interior, steps, vehicle, longer, scene, circles, barrier)
+    differentiate(model, interior, steps, vehicle, longer, scene, circles, hold.barrier)
     cost = cost_of(
         *(model.states, model.controls, steps, goal, interior.aim, strength, time_counts),
-        *(vehicle, scene, circles, barrier),
+        *(vehicle, scene, circles, hold),
     )
     found = False
     longer_s = 0.0
     for _ in range(DAMPINGS):
-        found, longer_s = _sweep_back(model, interior, steps, goal, strength, time_counts, damping, vehicle)
+        found, longer_s = _sweep_back(
+            model, interior, steps, goal, strength, time_counts, damping, hold, vehicle
+        )
         if found:
             break
         damping = max(MORE_DAMPING * damping, LEAST_DAMPING)
@@ -271,11 +273,11 @@ def direction(
         for c in range(size):
             slope += interior.change[k + 1, c] * model.gradient[k + 1, c]
             gaps += abs(model.gaps[k, c])
-    aim_near(model.states[steps], goal, interior.aim)
+    aim_near(model.states[steps], goal, interior.aim, hold.inside)
     for c in range(size):
         off = model.states[steps, c] - interior.aim[c]
         if off != 0.0:
-            slope += interior.change[steps, c] * weight_of_error(c, goal, vehicle) * off
+            slope += interior.change[steps, c] * weight_of_error(c, goal, hold, vehicle) * off
     if longer_s < 0.0:
         share = min(share, SHORTER * vehicle.dt / -longer_s)
     elif longer_s > 0.0:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.guesses import resampled
 from planners.optimisation.interior.buffers import (
@@ -17,7 +18,7 @@ from planners.optimisation.interior.buffers import (
     accept_change,
     begin_inside,
 )
-from planners.optimisation.interior.costs import try_change
+from planners.optimisation.interior.costs import Hold, try_change
 from planners.optimisation.interior.drivable import driven
 from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
@@ -39,7 +40,8 @@ TRIES: Final = 8  # shares of a change that are tried
 IN_VAIN: Final = 5  # changes one after another after which there is no hope
 LITTLE_S: Final = 0.05  # seconds to gain, with which a stage ends
 SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radians and more
-NO_GAPS: Final = 1e-6  # and when the last one does
+NO_GAPS: Final = 1e-6  # their sum when the last part cannot close them better ...
+NO_GAIN: Final = 1e-2  # ... if so little is left to gain, in metres
 MOST_FIRST: Final = 60  # iterations while time counts
 MOST_LAST: Final = 15  # and of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
@@ -47,21 +49,25 @@ NEVER: Final = 1 << 30  # steps
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
 
 
-class Firmness(NamedTuple):
-    """How firmly a drive is held to its goal and off obstacles, against the time that this takes."""
+class Attempt(NamedTuple):
+    """How softly a drive is held at first, so that it comes free; later all are held firmly."""
 
-    tolerance: float  # share of what is tolerated at the goal: the less, the firmer a drive is drawn into it
+    tolerance: float  # share of what is tolerated at the goal that is aimed at
     strength: float  # of obstacles, and ...
     contact_m: float  # ... where they push hardest, as of ``Barrier``
     afresh: bool  # begins with the given drive again, not with what came of the attempt before
 
 
 ATTEMPTS: Final = (  # one after another, until a drive is found
-    Firmness(1.0, 0.01, 0.003, afresh=True),
-    Firmness(0.5, 0.01, 0.003, afresh=False),
-    Firmness(0.25, 0.01, 0.001, afresh=True),
-    Firmness(0.25, 0.03, 0.001, afresh=True),
+    Attempt(1.0, 0.01, 0.003, afresh=True),
+    Attempt(0.5, 0.01, 0.003, afresh=False),
+    Attempt(0.25, 0.01, 0.001, afresh=True),
+    Attempt(0.25, 0.03, 0.001, afresh=True),
 )
+FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
+FIRM_CONTACT_M: Final = 0.0005  # ... close to them, but hard
+FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the goal is used ...
+FIRM_PULL: Final = 30.0  # ... and no more
 
 
 class _Drive(NamedTuple):
@@ -73,7 +79,8 @@ class _Drive(NamedTuple):
     asked: Floats  # and that has to be reached
     scene: Scene
     circles: Floats
-    barrier: Barrier
+    soft: Hold  # at first
+    firm: Hold  # when little is left to gain
     until: float  # of the clock
 
 
@@ -105,7 +112,9 @@ def quickest(
         The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
         the iterations used.
     """
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), barrier, until)
+    firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
+    soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
     most = iterations * len(ways)
     number, best, used, settled = _found(ways, drive, vehicle, most)
     while best is not None and not settled and used < most and working_clock() < until:
@@ -131,16 +140,14 @@ def _found(
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used, settled = 0, True
     number, best = -1, None
-    for firmness in ATTEMPTS:
+    for attempt in ATTEMPTS:
+        barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
-            goal=_drawn_in(around.asked, firmness.tolerance),
-            barrier=around.barrier._replace(
-                strength=firmness.strength, range_m=RANGE_M, contact=firmness.contact_m
-            ),
+            goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
         hurried = set()  # whose iterations ended first
         for k in guesses:
-            guess = given[k] if firmness.afresh else guesses[k]
+            guess = given[k] if attempt.afresh else guesses[k]
             steps = len(guess.controls)
             _fill(drive, guess, ways[k][0])
             first = min(MOST_FIRST, most - used)
@@ -156,7 +163,7 @@ def _found(
             used += spent
             if found is not None:
                 number, best = k, found
-                settled = firmness is ATTEMPTS[0] and k not in hurried
+                settled = attempt is ATTEMPTS[0] and k not in hurried
             else:
                 left[k] = guesses[k]
         longest = math.inf if best is None else best.duration_s - vehicle.dt
@@ -211,7 +218,8 @@ def _descend(
     Returns the length of a step, the iterations used, and a drive where time does not count and one is found.
     """
     model, interior = drive.model, drive.interior
-    around = drive.scene, drive.circles, drive.barrier
+    hold = drive.soft if time_counts else drive.firm
+    around = drive.scene, drive.circles
     counts = 1.0 if time_counts else 0.0
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
     damping, price, in_vain = FIRST_DAMPING, 1.0, 0
@@ -222,7 +230,7 @@ def _descend(
             return vehicle.dt, iteration, None
         longer = vehicle._replace(dt=vehicle.dt * (1.0 + LITTLE_LONGER))
         damping, longer_s, share, cost, slope, gaps, dearest = direction(
-            *(model, interior, steps, drive.goal, strength, counts, damping, vehicle, longer, *around)
+            *(model, interior, steps, drive.goal, strength, counts, damping, vehicle, longer, *around, hold)
         )
         price = max(min(price, 10.0 * dearest), dearest)
         gained = False
@@ -231,7 +239,7 @@ def _descend(
                 break
             tried = vehicle._replace(dt=vehicle.dt + share * longer_s)
             cost_tried, gaps_tried = try_change(
-                *(model, interior, steps, share, drive.goal, strength, counts, tried, *around)
+                *(model, interior, steps, share, drive.goal, strength, counts, tried, *around, hold)
             )
             expected = 1e-4 * share * min(slope - price * gaps, 0.0)
             if cost_tried + price * gaps_tried <= cost + price * gaps + expected + 1e-9:
@@ -247,9 +255,9 @@ def _descend(
         in_vain = 0
         vehicle = tried
         accept_change(model, interior, steps, strength, vehicle)
-        if not time_counts and gaps_tried < NO_GAPS:
+        if not time_counts and gaps_tried < SMALL_GAPS:
             found = _driven(drive, steps, vehicle)
-            if found is not None:
+            if found is not None or (gaps_tried < NO_GAPS and abs(slope) < NO_GAIN):
                 return vehicle.dt, iteration + 1, found
         if share > 0.5:
             damping = max(0.25 * damping, LEAST_DAMPING)
@@ -260,10 +268,11 @@ def _descend(
             if time_counts and strength <= LAST_STRENGTH and gaps_tried < SMALL_GAPS:
                 return vehicle.dt, iteration + 1, None
             strength = max(WEAKER * strength, LAST_STRENGTH)
+            hold = drive.firm
     return vehicle.dt, iterations, None if time_counts else _driven(drive, steps, vehicle)
 
 
 def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
     """The drive that the controls in ``drive.model`` lead to, if it is free and arrives as asked."""
     model = drive.model
-    return driven(model.states[0].copy(), model.controls[:steps], drive.asked, vehicle, drive.scene)
+    return driven(model, steps, drive.asked, vehicle, drive.scene)

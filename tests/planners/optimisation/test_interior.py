@@ -10,9 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
+from planners.optimisation.interior.costs import Hold, try_change
 from planners.optimisation.interior.drivable import at_asked_speed
+from planners.optimisation.interior.drivable import driven as driven_after
 from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
@@ -22,8 +25,8 @@ from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.goal import goal_of, reaches
 from planners.world.problem import Arrival, Plan, Problem, start_state
-from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.vehicles.dynamics import control_limits, simulate, turn_limit
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from tests.planners.world.motions import KINDS
 from tests.worlds import box, problem_of
@@ -37,7 +40,7 @@ FIRST_ORDER: dict[str, Vehicle] = {
     "train": TRAIN,
 }
 MORE: dict[str, Vehicle] = FIRST_ORDER | {"differential-drive": DIFFERENTIAL_DRIVE}
-BARRIER = Barrier(0.01, 0.3, 0.0, math.inf, 0.003)
+HOLD = Hold(Barrier(0.01, 0.3, 0.0, math.inf, 0.003), USUAL, 1.0)
 
 
 def driven(controls: Floats, *obstacles: np.ndarray, vehicle: Vehicle = CAR) -> tuple[Problem, Plan]:
@@ -71,7 +74,7 @@ def test_the_direction_solves_newtons_equations(seed: int, time_counts: float) -
     longer = CAR._replace(dt=CAR.dt * (1.0 + 1e-6))
     damping, longer_s, _, _, slope, gaps, _ = direction(
         *(model, interior, steps, goal, STRENGTH, time_counts, 0.1, CAR, longer, scene),
-        *(circles_around(scene), BARRIER),
+        *(circles_around(scene), HOLD),
     )
     change = np.concatenate(
         [interior.change[1:].ravel(), interior.change_controls.ravel(), np.array([longer_s])]
@@ -90,6 +93,29 @@ def test_the_direction_solves_newtons_equations(seed: int, time_counts: float) -
     at_least = keeps.T @ (gradient + hessian @ change)
     np.testing.assert_allclose(at_least, 0.0, atol=1e-6 * max(1.0, np.abs(gradient).max()))
     assert slope == pytest.approx(gradient @ change, rel=1e-6, abs=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), vehicle=st.sampled_from([CAR, DIFFERENTIAL_DRIVE, *FIRST_ORDER.values()]))
+def test_controls_that_pass_a_limit_leave_gaps(seed: int, vehicle: Vehicle) -> None:
+    """Speed and turn change by the controls, whatever the simulation clamps: a full change closes that."""
+    rng = np.random.default_rng(seed)
+    steps, size = 6, 5 + len(trailers_of(vehicle))
+    problem, _ = driven(np.zeros((steps, 2)), vehicle=vehicle)
+    goal, scene = goal_of(problem), scene_of(problem)
+    model, interior = allocate_model(steps, size), allocate_interior(steps, size)
+    model.states[:] = start_state(problem, vehicle)
+    most = np.array([vehicle.max_speed, turn_limit(vehicle)])
+    model.states[:, 3:5] = rng.uniform(0.9, 1.0, (steps + 1, 2)) * most
+    model.controls[:] = rng.uniform(0.5, 1.0, (steps, 2)) * np.array(control_limits(vehicle))
+    begin_inside(model, interior, steps, STRENGTH, vehicle)
+    around = scene, circles_around(scene), HOLD
+    longer = vehicle._replace(dt=vehicle.dt * (1.0 + 1e-6))
+    *_, gaps, _ = direction(*(model, interior, steps, goal, STRENGTH, 0.0, 0.1, vehicle, longer), *around)
+    led_to = model.states[:-1, 3:5] + vehicle.dt * model.controls
+    np.testing.assert_allclose(model.gaps[:, 3:5], led_to - model.states[1:, 3:5], atol=1e-12)
+    _, same = try_change(model, interior, steps, 0.0, goal, STRENGTH, 0.0, vehicle, *around)
+    assert same == pytest.approx(gaps)
 
 
 def cost_model(model, interior, goal, damping, time_counts) -> tuple[Floats, Floats]:
@@ -225,6 +251,23 @@ def test_a_retimed_drive_goes_the_same_way_within_all_limits(turns: int, waits: 
     assert (states[:, 3] >= CAR.min_speed).all()
     apart = np.hypot(*(states[:, None, :2] - plan.states[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() <= CAR.dt * CAR.max_speed
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10**6), off=st.floats(0.0, 0.3), vehicle=st.sampled_from([CAR, *MORE.values()]))
+def test_feedback_keeps_a_drive_within_all_limits(seed: int, off: float, vehicle: Vehicle) -> None:
+    rng = np.random.default_rng(seed)
+    controls = rng.uniform(-1.0, 1.0, (8, 2)) * np.array(control_limits(vehicle))
+    problem, plan = driven(np.zeros((8, 2)), vehicle=vehicle)
+    problem = replace(problem, goal_radius=20.0, arrival=None)
+    model = allocate_model(8, plan.states.shape[1])
+    model.states[:] = simulate(start_state(problem, vehicle), controls, vehicle)
+    model.states[1:] += rng.normal(0.0, off, model.states[1:].shape)
+    model.controls[:] = controls
+    model.feedback[:] = rng.normal(0.0, 20.0, model.feedback.shape)
+    found = driven_after(model, 8, goal_of(problem), vehicle, scene_of(problem))
+    assert found is not None
+    assert faults(problem, found, vehicle) == []
 
 
 @settings(max_examples=50, deadline=None)
