@@ -12,7 +12,8 @@ from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.outward import Outward, begin_outward, grow_outward, room_around
+from planners.search.manoeuvres.levels import LEVELS, suited
+from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.variants import (
@@ -34,26 +35,14 @@ from planners.world.geometry.occupancy import Bits, window_of
 from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import (
-    CarWithTrailers,
-    DifferentialDrive,
     Vehicle,
     state_size,
     trailers_of,
 )
 
-# greedier, then finer: for how many expansions, unless nothing is left before, and the greed with trailers
-LEVELS: Final = (
-    (500, Outward(cell=0.2, headings=48, greed=2.5), 2.5),
-    (2000, Outward(cell=0.2, headings=64, greed=3.0, worst=True), 6.0),
-    (2000, Outward(cell=0.2, headings=64, greed=6.0), 12.0),
-    (5000, Outward(cell=0.1, headings=64, greed=12.0, worst=True), 12.0),
-    (10000, Outward(cell=0.05, headings=96, greed=12.0), 12.0),
-    (1 << 30, Outward(cell=0.02, headings=128, greed=12.0, worst=True), 12.0),
-)
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
-SPOT: Final = 0.25  # of a body's length: the radius in which it turns nearly on the spot
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
@@ -90,23 +79,6 @@ def meets(start: Floats, vehicle: Vehicle) -> bool:
     With trailers it does, if the vehicle stands, or can at once.
     """
     return bool(trailers_of(vehicle)) and bool(vehicle.first_order or start[3] == 0.0)
-
-
-def _suited(number: int, vehicle: Vehicle) -> Outward:
-    """A level, with the bends that suit a vehicle.
-
-    With trailers these are bends in which they follow for long, and the tightest, in which they fold. Who can
-    turn on the spot nearly does so, too: words turn as widely as at full speed.
-    """
-    _, level, greed = LEVELS[number]
-    if isinstance(vehicle, CarWithTrailers):
-        share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
-        return level._replace(bends=(1.0, share, 0.0, -share, -1.0), greed=greed)
-    if isinstance(vehicle, DifferentialDrive) and vehicle.min_speed <= 0.0:
-        share = word_radius(vehicle) / (SPOT * (vehicle.front + vehicle.rear))
-        if share > 1.0:
-            return level._replace(bends=(1.0, share, 0.0, -share, -1.0))
-    return level
 
 
 def allocate_way_from_start() -> CostToGo:
@@ -259,7 +231,7 @@ class Manoeuvring:
         if not self.is_over:
             plant_root(self._tree, self._known_there.start[0])
             plant_root(self._other, self._known.start[0])
-            level = _suited(self._level, self._vehicle)
+            level = suited(self._level, self._vehicle)
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
 
     def _grow(self, most: int) -> tuple[bool, int]:
@@ -267,7 +239,7 @@ class Manoeuvring:
 
         Without trailers the tree out of the start grows, too, if only that is tight, or later.
         """
-        level = _suited(self._level, self._vehicle)
+        level = suited(self._level, self._vehicle)
         settings = self._goal, self._drive, level
         driven = self._vehicle, self._scene
         found, used, both = False, 0, self._grows_both

@@ -22,6 +22,7 @@ from planners.search.manoeuvres.pose_tree import (
     cell_of,
     mark_place,
     node_near,
+    region_of,
     seconds_after,
 )
 from planners.search.manoeuvres.shots import FromStart, shoot, shoot_between
@@ -36,6 +37,7 @@ from planners.world.vehicles.dynamics import State, load, tightest_bend
 from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
+FEW: Final = 4  # nodes that were opened in a region beyond those that an estimate counts
 GEARS: Final = (1.0, -1.0)
 
 
@@ -47,6 +49,7 @@ class Outward(NamedTuple):
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, 128 at most
     greed: float = 1.5  # weight of the time from the start
+    crowding: float = 0.0  # seconds by which a node counts as farther for each opened in its region
     worst: bool = False  # with trailers that of the first or last body, whichever is longer, not the mean
 
 
@@ -110,6 +113,26 @@ def _seconds_from_start(state: State, known: FromStart, settings: Outward, vehic
     return max(turns, metres_to_go(state[0], state[1], known.go) / vehicle.max_speed)
 
 
+@inlined
+def _let_wait(
+    tree: PoseTree,
+    node: int,
+    state: State,
+    estimate: float,
+    longest: int,
+    settings: Outward,
+    vehicle: Vehicle,
+) -> None:
+    """Let a node wait, the longer the more nodes of its region were opened that ``estimate`` does not count.
+
+    Else a search that leads nowhere goes on among thousands of states that hardly differ.
+    """
+    opened = tree.opened[region_of(state, tree, vehicle)]
+    more = settings.crowding * settings.greed * (opened - tree.crowds[node])
+    tree.crowds[node] = opened
+    push(tree.frontier, estimate + more, node, longest)
+
+
 @lean
 def begin_outward(
     tree: PoseTree, known: FromStart, nodes: Integers, settings: Outward, vehicle: Vehicle, scene: Scene
@@ -120,8 +143,10 @@ def begin_outward(
     for k in range(nodes.shape[0]):
         if nodes[k] >= 0:
             mark_place(tree, nodes[k], known.origin, vehicle)
-            left = _seconds_from_start(load(tree.states, nodes[k], vehicle), known, settings, vehicle)
-            push(tree.frontier, KNOWN * tree.seconds[nodes[k]] + settings.greed * left, nodes[k], 1)
+            state = load(tree.states, nodes[k], vehicle)
+            left = _seconds_from_start(state, known, settings, vehicle)
+            estimate = KNOWN * tree.seconds[nodes[k]] + settings.greed * left
+            _let_wait(tree, nodes[k], state, estimate, 1, settings, vehicle)
 
 
 @lean
@@ -203,7 +228,7 @@ def _wait(
         near = node_near(other, state, known.origin, vehicle)
         if near >= 0:
             estimate = min(estimate, seconds + other.seconds[near])
-    push(tree.frontier, estimate, new, 1 if longest else 0)
+    _let_wait(tree, new, state, estimate, 1 if longest else 0, settings, vehicle)
 
 
 @lean
@@ -228,8 +253,13 @@ def grow_outward(
     expansions = 0
     cell = settings.cell * (vehicle.front + vehicle.rear)
     while expansions < most and not is_empty(tree.frontier):
+        estimate = tree.frontier.estimates[0]
         node, longest = pop(tree.frontier)
         state = load(tree.states, node, vehicle)
+        region = region_of(state, tree, vehicle)
+        if settings.crowding > 0.0 and tree.opened[region] - tree.crowds[node] >= FEW:
+            _let_wait(tree, node, state, estimate, longest, settings, vehicle)
+            continue
         key = cell_of(state, tree.metres[node], tree, cell, settings.headings, vehicle)
         if was_reached(tree.frontier, key):
             continue
@@ -239,6 +269,7 @@ def grow_outward(
         reach(tree.frontier, key)
         expansions += 1
         tree.counts[LAST] = node
+        tree.opened[region] += 1
         if len(state) > 5:  # decided when compiling
             near = node_near(other, state, known.origin, vehicle)
             if known.outward:

@@ -21,6 +21,9 @@ PLACES: Final = 1 << 16
 PLACE: Final = 0.3  # side of a place, in the first body's length ...
 PLACE_HEADINGS: Final = 36  # ... how many headings are told apart there ...
 PLACE_HITCHES: Final = 3.0  # ... and cells of a hitch, a radian
+REGIONS: Final = 1 << 14
+REGION: Final = 1.0  # side of a region, in the first body's length ...
+REGION_HEADINGS: Final = 8  # ... and how many headings are told apart there; of each hitch three parts
 _FIBONACCI: Final = 0x9E3779B1
 HITCH_CELLS: Final = 5.0  # of hitches, a radian
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
@@ -39,6 +42,8 @@ class PoseTree(NamedTuple):
     seconds: Floats  # [NODES] estimated driving time from the node to the goal
     known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
     places: Integers  # [PLACES] a node in the place that falls into this slot; -1: none
+    opened: Integers  # [REGIONS] how many nodes of the region that falls into this slot were opened
+    crowds: Integers  # [NODES] how many of those a waiting node's estimate counts
     frontier: Frontier
     counts: Indices  # [3] nodes; looks at obstacles; the node that was opened last
 
@@ -54,6 +59,8 @@ def allocate_pose_tree(state_size: int) -> PoseTree:
         np.zeros(NODES),
         np.zeros(NODES, np.int64),
         np.zeros(PLACES, np.int32),
+        np.zeros(REGIONS, np.int32),
+        np.zeros(NODES, np.int32),
         allocate_frontier(),
         np.zeros(3, np.int64),
     )
@@ -72,6 +79,8 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
     """Begin a tree at a state ``[S]``."""
     clear_frontier(tree.frontier)
     tree.places.fill(-1)
+    tree.opened.fill(0)
+    tree.crowds[0] = 0
     push(tree.frontier, 0.0, 0, 0)
     tree.counts[SIZE] = 1
     tree.counts[LAST] = 0
@@ -124,6 +133,7 @@ def add_node(tree: PoseTree, parent: int, state: State, bend: float, metres: flo
     tree.metres[new] = metres
     tree.seconds[new] = seconds
     tree.known[new] = -1
+    tree.crowds[new] = 0
     same = tree.metres[parent] * metres > 0.0
     tree.runs[new] = abs(metres) + (tree.runs[parent] if same else 0.0)
     return int(new)
@@ -161,6 +171,18 @@ def place_of(state: State, origin: Floats, vehicle: Vehicle) -> int:
     for k in range(5, len(state)):
         key = key << 5 | (math.floor(state[k] * PLACE_HITCHES) & 31)
     return int(key)
+
+
+@inlined
+def region_of(state: State, tree: PoseTree, vehicle: Vehicle) -> int:
+    """The slot in ``opened`` of a region: a length, an eighth of all headings, a radian of each hitch."""
+    cell = REGION * (vehicle.front + vehicle.rear)
+    key = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
+    key = key << 16 | (math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF)
+    key = key << 4 | int((wrapped(state[2]) + math.pi) * (REGION_HEADINGS / (2.0 * math.pi)))
+    for k in range(5, len(state)):
+        key = key << 3 | (math.floor(state[k] + 0.5) & 7)
+    return int((key * _FIBONACCI >> 20) & (REGIONS - 1))
 
 
 @inlined
