@@ -44,6 +44,7 @@ MEETING: Final = 3  # times as many with trailers: trees meet where they are wid
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
 TIGHT: Final = 0.6  # a goal with less room around it is tight
+PER_SQUARE_SECOND: Final = 10  # of the quickest drive found: expansions that looking for others is worth
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
@@ -123,6 +124,7 @@ class Manoeuvring:
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)
         forget_ways(self._drive.ways)
         self._kept: list[Other | None] = [None] * KEPT
+        self._soon: list[Other] = []
         self.meets = meets(start[0], vehicle)
         self._stands = vehicle.min_speed <= 0.0 and bool(vehicle.first_order or start[0, 3] == 0.0)
         self._longer = MEETING if self.meets else 1
@@ -142,7 +144,7 @@ class Manoeuvring:
         size = state_size(query.vehicle)
         other._tree, other._other = query.workspace.buffers(allocate_trees, size, 1)
         other._drive = other._drive._replace(ways=allocate_ways())
-        other._kept = [None] * KEPT
+        other._kept, other._soon = [None] * KEPT, []
         other._known = self._known._replace(endings=endings)
         other._known_there = self._known_there._replace(endings=endings)
         other._begin_at_coarsest()
@@ -171,11 +173,14 @@ class Manoeuvring:
                 return True
         return False
 
-    def further(self, most: int, for_one: int, within: int, until: float) -> int:
+    def further(self, most: int, longest: int, for_one: int, within: int, until: float) -> int:
         """Search on for drives of other kinds, or quicker ones; they are kept.
+
+        The longer the quickest of them takes, the more may be gained: then the search goes on for longer.
 
         Args:
             most: expansions.
+            longest: expansions while all that was found takes long; without trailers.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
             until: when to end, by ``working_clock``.
@@ -186,10 +191,18 @@ class Manoeuvring:
         last = self.expansions + within
         if not self.kept and self._finds_drive(min(self.expansions + for_one, last), until):
             self._keep()
-        end = min(self.expansions + most, last)
-        while self._finds_drive(end, until):
+        began = self.expansions
+        while self._finds_drive(min(began + most, last), until):
+            self._keep()
+        self._soon = [other for other in self._kept if other is not None]
+        while not self.meets and self._finds_drive(min(began + self._worth(longest), last), until):
             self._keep()
         return last - self.expansions
+
+    def _worth(self, longest: int) -> int:
+        """How many expansions, ``longest`` at most, the quickest drive is worth that was found."""
+        seconds = float(self._drive.ways.seconds.min())
+        return int(min(PER_SQUARE_SECOND * seconds * seconds, longest)) if self.kept else 0
 
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
@@ -210,9 +223,13 @@ class Manoeuvring:
 
     @property
     def kept(self) -> list[Other]:
-        """The drives of different kinds that were found, the one first that is estimated quickest."""
+        """The drives of different kinds that were found, the one first that is estimated quickest.
+
+        Then follow those that were found soon, and later gave way to others: estimates may be wrong.
+        """
         seconds = self._drive.ways.seconds
-        return [other for k in np.argsort(seconds, kind="stable") if (other := self._kept[k]) is not None]
+        kept = [other for k in np.argsort(seconds, kind="stable") if (other := self._kept[k]) is not None]
+        return kept + [other for other in self._soon if all(other is not each for each in kept)]
 
     def _keep(self) -> None:
         drive = self._drive

@@ -12,6 +12,7 @@ from planners.optimisation.interior import quickest
 from planners.optimisation.polish import polish_quickest
 from planners.search import anytime, lattice
 from planners.search.anytime import search_and_polish
+from planners.search.lattice import LatticeSettings
 from planners.search.manoeuvres import manoeuvring
 from planners.search.manoeuvres.endings import endings_of
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
@@ -58,9 +59,31 @@ def test_others_are_plans_that_differ_and_the_first_stays(name: str, vehicle: st
         plans = [several.plan, *(other.plan for other in several.others)]
         assert [fault for plan in plans for fault in faults(problem, plan, driven)] == []
         assert len({plan.controls.tobytes() for plan in plans}) == len(plans)
-        assert len(plans) <= KEPT + 1
+        assert len(plans) <= 2 * KEPT + 1
         found += len(several.others)
     assert found >= 3  # in most of them
+
+
+def quickest_of(problem: Problem, found: Outcome) -> float:
+    """The driving time of the plan that gets quickest when polished, in seconds."""
+    assert found.plan is not None
+    plans = [found.plan, *(other.plan for other in found.others)]
+    plan = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE)[1].plan
+    assert plan is not None
+    return plan.duration_s
+
+
+def test_after_a_long_drive_the_search_goes_on_and_keeps_what_it_had() -> None:
+    drawn, longer, saved = family("lot"), {}, {}
+    for number in (0, 17):
+        query = asked(to_canonical(drawn.draw(11, number))[0])
+        soon, whole = lattice.lattice(query, LatticeSettings(longest=0)), PLANNERS["lattice"](query)
+        found = {other.plan.controls.tobytes() for other in whole.others}
+        assert found >= {other.plan.controls.tobytes() for other in soon.others}
+        longer[number] = whole.expansions - soon.expansions
+        saved[number] = quickest_of(query.problem, soon) - quickest_of(query.problem, whole)
+    assert longer[0] == 0  # its drive is short
+    assert saved[17] > 2.0
 
 
 def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
