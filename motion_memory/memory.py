@@ -27,7 +27,15 @@ from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import checked_problem
 from planners.world.classes.families import families_of, family
-from planners.world.problem import BOUNDS, CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, Plan, Problem
+from planners.world.problem import (
+    BOUNDS,
+    CANONICAL_DISTANCE,
+    GOAL_RADIUS,
+    Arrival,
+    Plan,
+    Problem,
+    obstacles_of,
+)
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_memory_or_library, vehicle_of
@@ -289,12 +297,25 @@ def _warmed(ready: Memory) -> Memory:
         around = start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale
         planner.plan_arrays(*around, arrival=arrival)
 
+    library = ready.stored if isinstance(ready.stored, PlanLibrary) else ready.stored.library
+
     alone = replace(ready, assist="none")
     narrow = family(families_of(ready.vehicle)[0], "easy", ready.vehicle)
     for each in (ready, alone):  # recall, then search
         ask(each)
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
         each.plan(narrow.draw(0, 0))
+    if len(library.drives.plans):  # the question that a stored drive answered, without obstacles
+        states = library.plans[int(library.drives.plans[0])].states
+        (x, y, heading), last = states[0, :3].tolist(), states[-1].tolist()
+        reach = np.abs(states[:, :2]).max() + 30.0
+        ready.plan(
+            Problem(
+                *("warm", "warm", (x, y, heading), (last[0], last[1]), 0.1, (-reach, -reach, reach, reach)),
+                *(obstacles_of([]), scale, tuple(states[0, 3:].tolist())),
+                arrival=Arrival(last[2], 0.05, 0.0, 0.0),
+            )
+        )
     ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
     ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
     return ready

@@ -6,7 +6,8 @@ from dataclasses import dataclass, fields
 
 from planners.world.problem import Plan
 
-SUB_PLANS = "sub-plans"  # what recall from a library is called
+SUB_PLANS = "sub-plans"  # what recall from a library is called ...
+DRIVES = "drives"  # ... if a whole plan of it was moved to the problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +18,7 @@ class Attempt:
     problem_class: str
     planner: str
     assist: str
-    recall: str | None  # the strategy, one of ``RECALLS``, or ``SUB_PLANS``; None without
+    recall: str | None  # the strategy, one of ``RECALLS``, ``SUB_PLANS``, ``DRIVES``; None without
     top_k: int  # 0 without memory
     status: str
     solved: bool

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import Attempt
+from planners.attempt import DRIVES, Attempt
+from planners.drive_answers import DriveAnswer, drive_answer
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
@@ -82,14 +83,24 @@ def recollections(
     return looked_at
 
 
+def drive_found(
+    problem: Problem, attempt: Attempt, memory: Memory | PlanLibrary, vehicle: Vehicle
+) -> DriveAnswer | None:
+    """Look again at the whole stored drive that was moved to a canonical problem; None if none was."""
+    if attempt.recall != DRIVES:
+        return None
+    library = memory.library if isinstance(memory, Memory) else memory
+    return drive_answer(library, View(problem), vehicle, math.inf)
+
+
 def parts_found(
     problem: Problem, attempt: Attempt, memory: Memory | PlanLibrary, vehicle: Vehicle
 ) -> SubPlanAnswer | None:
     """Look again at what parts of stored plans had for a canonical problem, before an attempt searched.
 
-    None if whole plans of the memory are to answer the problem.
+    None if whole plans of the memory are to answer the problem, or one was moved to it.
     """
-    if isinstance(memory, Memory) and is_canonical(problem):
+    if attempt.recall == DRIVES or (isinstance(memory, Memory) and is_canonical(problem)):
         return None
     library = memory.library if isinstance(memory, Memory) else memory
     is_blind = attempt.assist.startswith("random-")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import SUB_PLANS
+from planners.attempt import DRIVES, SUB_PLANS
+from planners.drive_answers import asks_to_stand, drive_answer
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
@@ -22,7 +24,7 @@ from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
-JOINS = ("open", "repair", "join")  # the assists that aim a search at the ends of stored plans
+JOINS = ("open", "repair", "join")  # the assists that move stored plans, and aim a search at their ends
 
 
 class MemoryAnswer(NamedTuple):
@@ -30,12 +32,13 @@ class MemoryAnswer(NamedTuple):
 
     strategy: str | None = None  # of recall
     plan: Plan | None = None  # that fits
-    source: str = ""  # of the plan: "recalled", or "searched" if most of its steps are not stored
+    source: str = ""  # of the plan: "recalled", "repaired", or "searched" if most steps are not stored
     is_long: bool = False  # whether the plan seems a detour, so that a short search is worth it
     recalled: tuple[int, ...] = ()  # plans of the memory, best first
     checks: int = 0  # collision checks that this took
     endings: Endings | None = None  # of known plans, at which a search may aim
     knows_way: bool = False  # whether the workspace holds the distances to the goal now
+    is_polished: bool = False  # whether the plan is improved already, and needs no search unless it is long
 
 
 def answer_from(
@@ -49,8 +52,9 @@ def answer_from(
     assist: str,
     *,
     improves: bool,
+    until: float = math.inf,
 ) -> MemoryAnswer:
-    """Look for a whole plan that fits a problem, or put one together from parts of plans.
+    """Look for a whole plan that fits a problem or can be made to, or put one together from parts of plans.
 
     Args:
         memory: of the vehicle and of the problem's scale.
@@ -62,6 +66,7 @@ def answer_from(
         vehicle: what is driven.
         assist: one with a memory, as ``solve`` takes it.
         improves: whether the plan is improved anyway, and need not be a detour for that.
+        until: when to end moving whole drives to the problem, by ``working_clock``.
     """
     problem = view.problem
     use = assist.removeprefix("random-")
@@ -77,6 +82,14 @@ def answer_from(
         is_long = strategy != "centroid" and is_detour(plan, planner, view, vehicle)
         return answer._replace(plan=plan, source="recalled", is_long=is_long)
     library = memory if isinstance(memory, PlanLibrary) else memory.library
+    if improves and use in JOINS and asks_to_stand(problem):
+        drive = drive_answer(library, view, vehicle, until, blindly)
+        if drive.plan is not None:
+            return MemoryAnswer(
+                *(DRIVES if strategy == usual else strategy, drive.plan, "repaired", drive.is_long),
+                checks=drive.checks,
+                is_polished=True,
+            )
     parts = sub_plan_answer(library, view, vehicle, blindly)
     answer = MemoryAnswer(
         strategy,

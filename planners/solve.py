@@ -54,8 +54,9 @@ def solve(
     """Solve a problem: try stored plans first, as the assist says, then search.
 
     Memories hold plans for canonical problems. Other problems, and all that are put to a library of plans,
-    are answered by parts of plans where possible. If not, ``join`` (as ``open`` and ``repair`` do then) aims
-    the lattice's search for a pose at rest at every place from which the end of a stored plan leads there.
+    are answered by parts of plans where possible. For a pose at rest ``join`` (as ``open`` and ``repair`` do
+    then) first moves whole stored drives to the problem and polishes them. If that fails, it aims the search
+    of the lattice at every place from which the end of a stored plan leads to the pose.
 
     ``none``: search only. ``closed``: return a free plan of those that recall tries, the one that
     drives shortest, else search. A free plan that is a long detour is the answer only if a short search finds
@@ -96,10 +97,12 @@ def solve(
         memory, found = None, MemoryAnswer()
     else:
         found = answer_from(
-            *(memory, view, planner, top_k, seed, strategy, vehicle, assist), improves=improves
+            *(memory, view, planner, top_k, seed, strategy, vehicle, assist),
+            improves=improves,
+            until=view.began + (limits or Limits()).seconds,
         )
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
-    if found.plan is None or found.is_long or improves:
+    if found.plan is None or found.is_long or (improves and not found.is_polished):
         answer = _searched(view, planner, assist, memory, found, seed, limits or Limits(), vehicle, improves)
     planning_seconds = working_clock() - view.began
     plan = answer.plan
@@ -177,7 +180,7 @@ def _searched(
     """Search for a plan, or for a better one than the memory has; the better one is the answer."""
     problem = view.problem
     use = assist.removeprefix("random-")
-    if found.is_long:
+    if found.is_long and not found.is_polished:
         limits = replace(limits, expansions=min(limits.expansions, SECOND_LOOK))
     query = Query(
         *(problem, generator(seed, "search", problem.id, planner), view.scene, view.workspace),
@@ -202,7 +205,9 @@ def _searched(
         view.lap("guide")
     is_given = False  # whether the plan that comes of the search is that of the memory, polished
     if improves:
-        searched, is_given = search_and_polish(planner, query, seed, found.plan)
+        searched, is_given = search_and_polish(
+            planner, query, seed, None if found.is_polished else found.plan
+        )
     else:
         searched = PLANNERS[planner](query)
     work = np.array([searched.collision_checks + found.checks, searched.expansions, searched.nodes])

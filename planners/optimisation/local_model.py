@@ -61,7 +61,7 @@ def allocate_model(steps: int, size: int) -> Model:
 def differentiate_steps(model: Model, steps: int, vehicle: Vehicle) -> None:
     """Fill in the derivatives of all steps."""
     states, controls = model.states, model.controls
-    size = states.shape[1]
+    size = len(load(states, 0, vehicle))  # known when compiling, so that loops over it are unrolled
     nudged = model.nudged
     for k in range(steps):
         by_state = model.by_state[k]
@@ -127,7 +127,7 @@ def differentiate_nearness(
 ) -> None:
     """Fill in gradient and curvature (Gauss-Newton's) of ``nearness_cost`` in state ``i``."""
     states = model.states
-    size = states.shape[1]
+    size = len(load(states, 0, vehicle))
     gradient = model.gradient[i]
     curvature = model.curvature[i]
     for r in range(size):
@@ -168,7 +168,7 @@ def _add_gap(
     _, slope, bend = nearness(gap - barrier.margin_m, barrier)
     if bend == 0.0:
         return
-    size = model.states.shape[1]
+    size = len(load(model.states, 0, vehicle))
     nudged = model.nudged
     by_state = model.vectors[0]
     for c in range(size):

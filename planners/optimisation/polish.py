@@ -13,7 +13,7 @@ from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior
-from planners.optimisation.interior.quickest import NEVER, quickest
+from planners.optimisation.interior.quickest import NEVER, quickest, quickest_near
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
@@ -153,6 +153,34 @@ def _polished_once(
             number, better = k, Plan(states, controls, vehicle.dt)
     was_pressed = arriving and better is not None and len(better.controls) <= enough
     return number, Polished(better, used), was_pressed
+
+
+def polish_guesses(
+    problem: Problem,
+    guesses: Sequence[Plan],
+    vehicle: Vehicle,
+    scene: Scene,
+    workspace: Workspace,
+    until: float,
+) -> tuple[int, Polished]:
+    """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
+
+    Args:
+        problem: what the drive is for; it asks for a pose.
+        guesses: from the problem's start, maybe blocked; steps need not lead from state to state.
+        vehicle: what is driven.
+        scene: ``scene_of(problem)``.
+        workspace: the caller's buffers.
+        until: when to end, by ``working_clock``.
+
+    Returns:
+        The number of the guess, and the free drive near it that arrives as asked; or no plan.
+    """
+    model, goal = _ready(problem, max(len(guess.controls) for guess in guesses) + ROOM, vehicle, workspace)
+    interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
+    barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
+    number, plan, used = quickest_near(guesses, model, interior, goal, vehicle, scene, barrier, until)
+    return number, Polished(plan, used)
 
 
 def driven_near(

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any, Final, NamedTuple
 
 from planners.attempt import TIMED_PARTS, Attempt
-from planners.explanation import parts_found, recollections
+from planners.explanation import drive_found, parts_found, recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
@@ -249,7 +249,9 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
     ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
-    log_explanation(attempt, memory, list(zip(recollected, recalled, strict=True)), problem.scale, parts)
+    drive = None if memory is None else drive_found(canonical, attempt, memory, assistant.vehicle)
+    listed = list(zip(recollected, recalled, strict=True))
+    log_explanation(attempt, memory, listed, problem.scale, parts, drive)
     if memory is not None:
         with no_garbage_collection():
             log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))

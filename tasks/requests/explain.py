@@ -9,6 +9,7 @@ from typing import Final
 
 from dashboards.cells import NOTHING, Cell, CellTable
 from planners.attempt import Attempt
+from planners.drive_answers import DriveAnswer
 from planners.explanation import Recollection
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
@@ -36,6 +37,7 @@ def log_explanation(
     recalled: Sequence[tuple[Recollection, Plan]],
     scale: float,
     parts: SubPlanAnswer | None,
+    drive: DriveAnswer | None = None,
 ) -> None:
     """Log how the memory was used, a table of the recalled plans, the work done and the times.
 
@@ -45,8 +47,9 @@ def log_explanation(
         recalled: the recalled plans, best first; each ``Plan`` is in the frame of the problem.
         scale: how many metres of the problem are one canonical metre.
         parts: what parts of plans had for the problem; None if whole plans are to answer it.
+        drive: the whole drive of a library that was moved to the problem; None if none was.
     """
-    _LOG.info(_recall_line(attempt, memory, recalled, parts))
+    _LOG.info(_recall_line(attempt, memory, recalled, parts, drive))
     if recalled:
         _LOG.info(_table(recalled, scale))
     work = f"{attempt.collision_checks:,} collision checks, {attempt.expansions:,} expansions"
@@ -69,11 +72,18 @@ def _recall_line(
     memory: Memory | PlanLibrary | None,
     recalled: Sequence[tuple[Recollection, Plan]],
     parts: SubPlanAnswer | None,
+    drive: DriveAnswer | None,
 ) -> str:
     if memory is None:
         return f"recall   no memory was used ({attempt.assist}, {attempt.planner})"
     plans = f"{len(memory.plans):,} plans of {memory.class_name}"
     of_them = f"of {plans}"
+    if drive is not None and drive.plan is not None:
+        if attempt.source == "searched":
+            more = f"takes {drive.plan.duration_s:.1f} s; the search found a quicker drive"
+        else:
+            more = "is the answer; the search found no quicker one" if drive.is_long else "is the answer"
+        return f"recall   plan {drive.number} {of_them}, moved to this start and goal and polished, {more}"
     if not recalled:
         told = f"no plan {of_them} seemed likely to fit" if parts is None else _told_of(parts, attempt, plans)
         return f"recall   {told}"

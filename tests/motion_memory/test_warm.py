@@ -10,6 +10,8 @@ import pytest
 
 from planners.memory.library.plan_library import gathered_library
 from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.classes.families import families_of, family
 from planners.world.vehicles.vehicle import VEHICLES
 from storage.archives.libraries import save_library
 from tasks.attempts.compile_assists import EMPTY
@@ -19,10 +21,15 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize("name", ["car", "car-1-trailer"])
 def test_no_question_needs_a_kernel_that_loading_did_not(name: str, tmp_path: Path) -> None:
-    found = solve(EMPTY, "lattice", vehicle=VEHICLES[name]).plan
-    assert found is not None
+    vehicle = VEHICLES[name]
+    slot = to_canonical(family(families_of(vehicle)[0], "easy", vehicle).draw(1, 0))[0]
+    answered = []
+    for problem in (EMPTY, slot):
+        plan = solve(problem, "lattice", vehicle=vehicle).plan
+        assert plan is not None
+        answered.append((problem.id, plan))
     library = tmp_path / "library"
-    save_library(library, gathered_library("one", VEHICLES[name], [("one", found)]))
+    save_library(library, gathered_library("some", vehicle, answered))
     said = subprocess.run(
         [sys.executable, "-m", "tests.motion_memory.kernels_after_load", str(library)],
         cwd=ROOT,

@@ -47,6 +47,9 @@ def measured(
 ) -> dict[Peer, list[Row]]:
     """Rows of each planner, cold: other data fill the caches before each attempt."""
     workspace, other_work = Workspace(), OtherWork()
+    for peer in planners:
+        if (library := peer.library) is not None:  # what loading a memory makes, too
+            _ = library.sub_plans, library.stretches, library.endings, library.drives
     rows: dict[Peer, list[Row]] = {peer: [] for peer in planners}
     for name in planners:
         attempted(problems[0], name, vehicle, workspace, SEED + 1)  # compiles

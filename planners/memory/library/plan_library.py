@@ -6,6 +6,7 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from planners.memory.library.drives import Drives, drives_of
 from planners.memory.library.stretches import Stretches, stretches_of
 from planners.memory.library.sub_plans import SubPlans, index_of
 from planners.memory.plans.plan_arrays import StoredPlans, store_plans
@@ -49,6 +50,11 @@ class PlanLibrary:
     def endings(self) -> Endings:
         """The ways into a pose at rest that the plans end with, from the places where they stand."""
         return endings_of(((plan.states, plan.controls) for plan in self.plans), self.vehicle)
+
+    @functools.cached_property
+    def drives(self) -> Drives:
+        """The plans that end at rest, whole, and ready to be moved to other questions."""
+        return drives_of(self.plans)
 
     def __len__(self) -> int:
         """Count the plans."""

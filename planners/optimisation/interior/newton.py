@@ -16,7 +16,7 @@ from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import jit, lean
-from planners.world.vehicles.dynamics import control_limits
+from planners.world.vehicles.dynamics import control_limits, load
 from planners.world.vehicles.vehicle import Vehicle
 
 NEARLY: Final = 0.95  # the share of the way to a limit that a change goes at most
@@ -57,7 +57,7 @@ def _sweep_back(
 
     The change of the length of a step is the same for all, so it is carried along to the first state.
     """
-    size = model.states.shape[1]
+    size = len(load(model.states, 0, vehicle))  # known when compiling, so that loops over it are unrolled
     hessian, product, before = interior.squares[0], interior.squares[1], interior.squares[2]
     vectors = interior.vectors
     gradient, mixed, ahead, slope = vectors[0], vectors[1], vectors[2], vectors[3]
@@ -173,9 +173,9 @@ def _sweep_back(
 
 
 @lean
-def _sweep_forward(model: Model, interior: Interior, steps: int, longer_s: float) -> float:
+def _sweep_forward(model: Model, interior: Interior, steps: int, longer_s: float, vehicle: Vehicle) -> float:
     """Fill in the change of states and controls. Returns the largest multiplier of the steps' gaps."""
-    size = model.states.shape[1]
+    size = len(load(model.states, 0, vehicle))
     change = interior.change
     most = 0.0
     for c in range(size):
@@ -254,7 +254,7 @@ def direction(
         damping = max(MORE_DAMPING * damping, LEAST_DAMPING)
     if not found:
         return damping, 0.0, 0.0, cost, 0.0, 0.0, 0.0
-    price = _sweep_forward(model, interior, steps, longer_s)
+    price = _sweep_forward(model, interior, steps, longer_s, vehicle)
     most_0, most_1 = control_limits(vehicle)
     size = model.states.shape[1]
     share = 1.0

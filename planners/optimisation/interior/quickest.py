@@ -112,13 +112,13 @@ def quickest(
         The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
         the iterations used.
     """
-    firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
-    soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
+    drive = _begun(model, interior, goal, scene, barrier, until)
     most = iterations * len(ways)
-    number, best, used, settled = _found(ways, drive, vehicle, most)
+    given = [_guess(way, vehicle) for way in ways]
+    number, best, used, settled = _found(given, drive, vehicle, ATTEMPTS, most)
     while best is not None and not settled and used < most and working_clock() < until:
-        _, better, more, settled = _found([best.states], drive, vehicle, most - used)
+        again = [_guess(best.states, vehicle)]
+        _, better, more, settled = _found(again, drive, vehicle, ATTEMPTS, most - used)
         used += more
         if better is None or len(better.controls) >= len(best.controls):
             break
@@ -126,21 +126,59 @@ def quickest(
     return number, best, used
 
 
+def quickest_near(
+    guesses: Sequence[Plan],
+    model: Model,
+    interior: Interior,
+    goal: Floats,
+    vehicle: Vehicle,
+    scene: Scene,
+    barrier: Barrier,
+    until: float,
+) -> tuple[int, Plan | None, int]:
+    """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
+
+    Args:
+        guesses: all begin at the same state; their steps need not lead from state to state.
+        model: as of ``quickest``, like all that follows, and what is returned.
+        interior: as of ``quickest``.
+        goal: as of ``quickest``.
+        vehicle: as of ``quickest``.
+        scene: as of ``quickest``.
+        barrier: as of ``quickest``.
+        until: as of ``quickest``.
+    """
+    drive = _begun(model, interior, goal, scene, barrier, until)
+    most = MOST_FIRST * 2 * len(guesses)
+    return _found(guesses, drive, vehicle, ATTEMPTS[:1], most)[:3]
+
+
+def _begun(
+    model: Model, interior: Interior, goal: Floats, scene: Scene, barrier: Barrier, until: float
+) -> _Drive:
+    firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
+    soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
+    return _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
+
+
+def _guess(way: Floats, vehicle: Vehicle) -> Plan:
+    return Plan(*retimed(way, vehicle), vehicle.dt)
+
+
 def _found(
-    ways: Sequence[Floats], around: _Drive, vehicle: Vehicle, most: int
+    given: Sequence[Plan], around: _Drive, vehicle: Vehicle, attempts: Sequence[Attempt], most: int
 ) -> tuple[int, Plan | None, int, bool]:
-    """As ``quickest``, with ``most`` iterations in all.
+    """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
     The last of what is returned says whether the drive is settled: found at once, when little was left to
     gain. Else it may become quicker from where it is.
     """
     model = around.model
-    given = [Plan(*retimed(way, vehicle), vehicle.dt) for way in ways]
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used, settled = 0, True
     number, best = -1, None
-    for attempt in ATTEMPTS:
+    for attempt in attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
@@ -149,7 +187,7 @@ def _found(
         for k in guesses:
             guess = given[k] if attempt.afresh else guesses[k]
             steps = len(guess.controls)
-            _fill(drive, guess, ways[k][0])
+            _fill(drive, guess, given[k].states[0])
             first = min(MOST_FIRST, most - used)
             dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
             used += spent

@@ -32,7 +32,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
         stands = np.abs(drive[:, 3]) < STANDS
         if not stands[-1]:
             continue
-        local = _in_frame_of_end(drive)
+        local = in_frame_of_end(drive)
         begins = last_of_stops(drive)
         after = -1
         end = len(drive) - 1
@@ -74,7 +74,8 @@ def no_endings(size: int) -> Endings:
     return Endings(np.empty((0, size)), np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0, np.int32))
 
 
-def _in_frame_of_end(drive: Floats) -> Floats:
+def in_frame_of_end(drive: Floats) -> Floats:
+    """The states ``[T, S]`` of a drive in the frame of its last pose."""
     x, y, heading = drive[-1, :3]
     cos, sin = np.cos(heading), np.sin(heading)
     local = drive.copy()

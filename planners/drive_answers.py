@@ -1,0 +1,93 @@
+"""Answers a question for a pose at rest by a whole stored drive: moved to the question, then optimised.
+
+The stored drive says which way to take: how often to change gear, and on which side to pass. The optimisation
+makes it free, exact and quick. That takes a few milliseconds; a search has to find the way first. If a drive
+takes much longer than it would without obstacles, it may be of the wrong kind, and a search looks for others.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.memory.library.drives import TRIED, moved_drive, rank_drives
+from planners.memory.library.plan_library import PlanLibrary
+from planners.optimisation.polish import polish_guesses
+from planners.search.connection.pose_table import seconds_from, seconds_to_pose
+from planners.search.manoeuvres.variants import without_trailers
+from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
+from planners.world.goal import HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, X, Y, goal_of
+from planners.world.jit import jit
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.vehicle import Vehicle
+from planners.world.view import View
+
+AT_ONCE: Final = 2  # drives of which the quicker one is the answer
+LONG: Final = 1.5  # times what it would take without obstacles: a drive that takes longer may not be the best
+
+
+class DriveAnswer(NamedTuple):
+    """What whole stored drives have for a question. By default nothing."""
+
+    plan: Plan | None = None
+    number: int = -1  # of the library's plan that was moved
+    is_long: bool = False  # whether a search may well find a quicker one
+    checks: int = 0  # collision checks that choosing took
+
+
+def asks_to_stand(problem: Problem) -> bool:
+    """Whether a problem asks for a heading at its goal and lets the vehicle stand there."""
+    goal = goal_of(problem)
+    return bool(goal[HEADING_TOLERANCE] < np.inf and goal[LEAST_SPEED] <= 0.0 <= goal[MOST_SPEED])
+
+
+def _seconds_without_obstacles(start: Floats, goal: Floats, vehicle: Vehicle) -> float:
+    """What a drive from rest to rest takes, in seconds, if nothing is in the way; trailers do not count."""
+    return _seconds(start, goal, seconds_to_pose(without_trailers(vehicle)), vehicle.max_speed)
+
+
+@jit
+def _seconds(start: Floats, goal: Floats, table: Floats, top: float) -> float:
+    return seconds_from(start[0], start[1], start[2], (goal[X], goal[Y], goal[HEADING]), table, top)
+
+
+def drive_answer(
+    library: PlanLibrary,
+    view: View,
+    vehicle: Vehicle,
+    until: float,
+    blindly: np.random.Generator | None = None,
+) -> DriveAnswer:
+    """Move stored drives to a question that ``asks_to_stand``, two at a time, until one becomes a plan.
+
+    Args:
+        library: of the vehicle's plans.
+        view: the question.
+        vehicle: what is to be driven.
+        until: when to end, by ``working_clock``.
+        blindly: picks any drives; None picks those that promise most.
+    """
+    drives, problem = library.drives, view.problem
+    start, goal = start_state(problem, vehicle), goal_of(problem)
+    order = np.zeros(TRIED, np.int32)
+    count, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
+    if blindly is not None and len(drives.plans):
+        count, order = TRIED, blindly.integers(-len(drives.plans), len(drives.plans), TRIED, np.int32)
+    view.lap("recall")
+    found = DriveAnswer(checks=int(checks))
+    for k in range(0, count, AT_ONCE):
+        if working_clock() > until:
+            break
+        entries = [int(entry) for entry in order[k : min(k + AT_ONCE, count)]]
+        guesses = [moved_drive(drives, entry, start, goal, vehicle.dt) for entry in entries]
+        chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, until)
+        if polished.plan is not None:
+            entry = entries[chosen]
+            number = int(drives.plans[entry if entry >= 0 else -1 - entry])
+            is_long = polished.plan.duration_s > LONG * _seconds_without_obstacles(start, goal, vehicle)
+            found = found._replace(plan=polished.plan, number=number, is_long=is_long)
+            break
+    view.lap("repair")
+    return found

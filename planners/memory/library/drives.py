@@ -1,0 +1,190 @@
+"""Whole drives of a library: those that began much as a question does, moved to its start and goal.
+
+A drive is kept in the frame of the pose in which it ends. At another goal it is bent to the question's start:
+it moves with the start where it begins, and not at all where it ends. What comes of it need not be free, nor
+need its steps lead from state to state. It is where an optimisation begins.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.memory.plans.plan_arrays import StoredPlans
+from planners.search.manoeuvres.endings import STANDS, in_frame_of_end
+from planners.world.arrays import Floats, Indices, Integers
+from planners.world.geometry.collision import Scene, state_is_free
+from planners.world.goal import HEADING, X, Y
+from planners.world.jit import inlined, jit
+from planners.world.problem import Plan
+from planners.world.trigonometry import length, sincos, wrapped
+from planners.world.vehicles.dynamics import load
+from planners.world.vehicles.vehicle import Vehicle
+
+NEAR: Final = 40  # drives that begin most alike, of which ...
+TRIED: Final = 8  # ... those are tried that promise most
+FAR: Final = 1.5  # lengths and radians together by which a drive may begin elsewhere
+LOOK: Final = 3  # every so many states a moved drive is looked at
+SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
+
+
+class Drives(NamedTuple):
+    """Drives that end at rest, each in the frame of the pose in which it ends."""
+
+    states: Floats  # [T, S] of all drives, one after another
+    controls: Floats  # [T, 2] from each state to the next; that of a drive's last state counts for nothing
+    bent: Floats  # [T] how much a state moves with the start: 1 at the start, 0 at the end
+    starts: Indices  # [K + 1] drive k owns states[starts[k] : starts[k + 1]]
+    plans: Indices  # [K] which plan of the library it is
+
+
+def drives_of(plans: StoredPlans) -> Drives:
+    """Take the drives of a library's plans that end at rest, and lead anywhere."""
+    states, controls, bent, starts, numbers = [], [], [], [0], []
+    stand = np.abs(plans.states[plans.starts[1:] - 1, 3]) <= STANDS
+    for number in np.flatnonzero(stand).tolist():
+        plan = plans[number]
+        metres = np.hypot(*np.diff(plan.states[:, :2], axis=0).T)
+        if metres.sum() == 0.0:
+            continue
+        driven = np.concatenate([[0.0], np.cumsum(metres)]) / metres.sum()
+        states.append(in_frame_of_end(plan.states))
+        controls.append(np.vstack((plan.controls, np.zeros((1, 2)))))
+        bent.append(1.0 - driven * driven * (3.0 - 2.0 * driven))
+        starts.append(starts[-1] + len(plan.states))
+        numbers.append(number)
+    size = plans.states.shape[1]
+    return Drives(
+        np.concatenate([np.empty((0, size)), *states]),
+        np.concatenate([np.empty((0, 2)), *controls]),
+        np.concatenate([np.empty(0), *bent]),
+        np.array(starts, np.int64),
+        np.array(numbers, np.int64),
+    )
+
+
+@inlined
+def _begin_off(drives: Drives, drive: int, side: float, start: Floats, goal: Floats, off: Floats) -> float:
+    """Fill in by how much ``start [S]`` is ``off [S]`` where a drive begins, and return that in all.
+
+    ``side`` is -1 if the drive is mirrored. Places are in the frame of the goal.
+    """
+    first = drives.states[drives.starts[drive]]
+    sin, cos = sincos(goal[HEADING])
+    dx = start[0] - goal[X]
+    dy = start[1] - goal[Y]
+    off[0] = cos * dx + sin * dy - first[0]
+    off[1] = cos * dy - sin * dx - side * first[1]
+    off[2] = wrapped(start[2] - goal[HEADING] - side * first[2])
+    far = float(abs(off[2]))
+    for k in range(5, first.shape[0]):
+        off[k] = start[k] - side * first[k]
+        far += abs(off[k])
+    return far
+
+
+@inlined
+def _move(drives: Drives, i: int, side: float, goal: Floats, off: Floats, moved: Floats, row: int) -> None:
+    """Write state ``i`` of the drives, moved to a goal and bent by ``off [S]``, into a row of ``moved``."""
+    state, share = drives.states[i], drives.bent[i]
+    sin, cos = sincos(goal[HEADING])
+    x = state[0] + share * off[0]
+    y = side * state[1] + share * off[1]
+    moved[row, 0] = goal[X] + cos * x - sin * y
+    moved[row, 1] = goal[Y] + sin * x + cos * y
+    moved[row, 2] = goal[HEADING] + side * state[2] + share * off[2]
+    moved[row, 3] = state[3]
+    moved[row, 4] = side * state[4]
+    for k in range(5, state.shape[0]):
+        moved[row, k] = side * state[k] + share * off[k]
+
+
+@jit
+def rank_drives(
+    drives: Drives, start: Floats, goal: Floats, order: Integers, vehicle: Vehicle, scene: Scene
+) -> tuple[int, int]:
+    """Find the drives that promise most: quick ones that begin much as asked, and are hardly blocked.
+
+    Args:
+        drives: of the vehicle.
+        start: the state ``[S]`` at which the question begins.
+        goal: that of ``goal_of``, with a heading.
+        order: ``[TRIED]`` is filled in with numbers of drives, the best first; if mirrored -1 - number.
+        vehicle: what is driven.
+        scene: what must not be met.
+
+    Returns:
+        How many there are, and how many states were checked.
+    """
+    size = start.shape[0]
+    near = np.empty(NEAR, np.int64)
+    far = np.full(NEAR, FAR)
+    off = np.zeros(size)
+    moved = np.zeros((1, size))
+    body = vehicle.front + vehicle.rear
+    count = checks = 0
+    for drive in range(drives.plans.shape[0]):
+        for mirrored in range(2):
+            side = -1.0 if mirrored else 1.0
+            away = _begin_off(drives, drive, side, start, goal, off) + length(off[0], off[1]) / body
+            if away >= far[NEAR - 1]:
+                continue
+            at = min(count, NEAR - 1)
+            while at > 0 and far[at - 1] > away:
+                far[at] = far[at - 1]
+                near[at] = near[at - 1]
+                at -= 1
+            far[at] = away
+            near[at] = -1 - drive if mirrored else drive
+            count = min(count + 1, NEAR)
+    promises = np.empty(NEAR)
+    for n in range(count):
+        drive = near[n] if near[n] >= 0 else -1 - near[n]
+        side = 1.0 if near[n] >= 0 else -1.0
+        _begin_off(drives, drive, side, start, goal, off)
+        blocked = 0
+        first = drives.starts[drive]
+        last = drives.starts[drive + 1]
+        for i in range(first, last, LOOK):
+            _move(drives, i, side, goal, off, moved, 0)
+            checks += 1
+            if not state_is_free(load(moved, 0, vehicle), vehicle, scene):
+                blocked += LOOK
+        promises[n] = (last - 1 - first + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
+    best = np.argsort(promises[:count])
+    count = min(count, TRIED)
+    for n in range(count):
+        order[n] = near[best[n]]
+    return count, checks
+
+
+@jit
+def _moved(drives: Drives, drive: int, side: float, start: Floats, goal: Floats, states: Floats) -> None:
+    """Fill in the ``states [T, S]`` of a drive that is moved to a start and a goal."""
+    off = np.zeros(start.shape[0])
+    _begin_off(drives, drive, side, start, goal, off)
+    for i in range(states.shape[0]):
+        _move(drives, drives.starts[drive] + i, side, goal, off, states, i)
+    turns = start[2] - states[0, 2]  # whole ones
+    for i in range(states.shape[0]):
+        states[i, 2] += turns
+    for k in range(start.shape[0]):
+        states[0, k] = start[k]
+
+
+def moved_drive(drives: Drives, entry: int, start: Floats, goal: Floats, dt: float) -> Plan:
+    """Move a drive to a start ``[S]`` and a goal: a guess, whose steps do not quite lead from state to state.
+
+    Args:
+        drives: of the vehicle.
+        entry: as in the ``order`` of ``rank_drives``.
+        start: where it is to begin.
+        goal: where it is to end, that of ``goal_of``.
+        dt: the vehicle's step in seconds.
+    """
+    drive, side = (entry, 1.0) if entry >= 0 else (-1 - entry, -1.0)
+    first, last = drives.starts[drive], drives.starts[drive + 1]
+    states = np.empty((last - first, len(start)))
+    _moved(drives, drive, side, start, goal, states)
+    return Plan(states, drives.controls[first : last - 1] * np.array([1.0, side]), dt)

@@ -1,0 +1,125 @@
+"""Answers by whole stored drives: they are right, mostly need no search, and are never worse beside one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from planners import drive_answers
+from planners.attempt import DRIVES
+from planners.explanation import drive_found
+from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.authority.authority import faults
+from planners.world.classes.families import family
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
+from planners.world.workspace import Workspace
+
+WORKSPACE = Workspace()
+
+
+def drawn(name: str, difficulty: str, seed: int, number: int, vehicle: Vehicle = CAR) -> Problem:
+    return to_canonical(family(name, difficulty, vehicle).draw(seed, number))[0]
+
+
+def library_of(name: str, difficulty: str, plans: int, vehicle: Vehicle = CAR) -> PlanLibrary:
+    problems = [drawn(name, difficulty, 5, number, vehicle) for number in range(plans)]
+    answers = [
+        (each.id, solve(each, "lattice", vehicle=vehicle, workspace=WORKSPACE).plan) for each in problems
+    ]
+    return gathered_library(name, vehicle, [(name, plan) for name, plan in answers if plan is not None])
+
+
+@pytest.fixture(scope="module")
+def slots() -> PlanLibrary:
+    return library_of("parallel", "hard", 40)
+
+
+def test_new_slots_are_answered_by_drives_into_others(slots: PlanLibrary) -> None:
+    moved = 0
+    for number in range(20):
+        problem = drawn("parallel", "hard", 6, number)
+        found = solve(problem, "lattice", "join", 1, slots, workspace=WORKSPACE)
+        assert found.plan is not None
+        assert faults(problem, found.plan) == []
+        if found.recall == DRIVES:
+            moved += 1
+            assert found.source in ("repaired", "searched")
+            assert (found.expansions == 0) == (found.source == "repaired" and found.search_seconds == 0.0)
+    assert moved >= 15
+
+
+def test_if_a_drive_is_long_the_answer_is_never_longer_than_without_a_memory(
+    slots: PlanLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(drive_answers, "LONG", 0.0)
+    shorter = 0
+    for number in range(12):
+        problem = drawn("parallel", "hard", 7, number)
+        alone = solve(problem, "lattice", workspace=WORKSPACE)
+        both = solve(problem, "lattice", "join", 1, slots, workspace=WORKSPACE)
+        assert alone.duration_s is not None
+        assert both.duration_s is not None
+        assert both.recall != DRIVES or both.duration_s <= alone.duration_s
+        shorter += both.duration_s < alone.duration_s
+    assert shorter >= 1
+
+
+@pytest.mark.parametrize("motion", [(0.8, 0.1), (-0.5, -0.2)])
+def test_a_drive_may_begin_in_motion(slots: PlanLibrary, motion: tuple[float, float]) -> None:
+    found = 0
+    for number in range(8):
+        problem = replace(drawn("parallel", "hard", 8, number), start_motion=motion)
+        attempt = solve(problem, "lattice", "join", 1, slots, workspace=WORKSPACE)
+        if attempt.plan is not None:
+            assert faults(problem, attempt.plan) == []
+            found += attempt.recall == DRIVES
+    assert found >= 2
+
+
+def test_drives_picked_blindly_answer_less(slots: PlanLibrary) -> None:
+    counts = {}
+    for assist in ("join", "random-join"):
+        attempts = [
+            solve(drawn("parallel", "hard", 9, number), "lattice", assist, 1, slots, workspace=WORKSPACE)
+            for number in range(10)
+        ]
+        counts[assist] = sum(each.source == "repaired" for each in attempts)
+    assert counts["random-join"] <= counts["join"]
+
+
+def test_trains_turn_round_as_others_did() -> None:
+    library = library_of("yard", "easy", 12, CAR_1_TRAILER)
+    moved = 0
+    for number in range(6):
+        problem = drawn("yard", "easy", 6, number, CAR_1_TRAILER)
+        found = solve(problem, "lattice", "join", 1, library, vehicle=CAR_1_TRAILER, workspace=WORKSPACE)
+        assert found.plan is not None
+        assert faults(problem, found.plan, CAR_1_TRAILER) == []
+        moved += found.recall == DRIVES
+    assert moved >= 2
+
+
+def test_who_needs_no_polish_gets_no_drive(slots: PlanLibrary) -> None:
+    problem = drawn("parallel", "hard", 6, 0)
+    found = solve(problem, "lattice", "join", 1, slots, workspace=WORKSPACE, polished=False)
+    assert found.recall != DRIVES
+
+
+def test_what_is_only_recalled_moves_no_drive(slots: PlanLibrary) -> None:
+    found = solve(drawn("parallel", "hard", 6, 0), "lattice", "closed", 1, slots, workspace=WORKSPACE)
+    assert found.recall != DRIVES
+
+
+def test_the_drive_that_was_moved_is_found_again(slots: PlanLibrary) -> None:
+    problem = drawn("parallel", "hard", 6, 1)
+    attempt = solve(problem, "lattice", "repair", 1, slots, workspace=WORKSPACE)
+    drive = drive_found(problem, attempt, slots, CAR)
+    assert attempt.plan is not None
+    assert drive is not None
+    assert drive.plan is not None
+    assert slots.questions[drive.number].startswith("parallel")
+    assert attempt.source != "repaired" or (drive.plan.controls == attempt.plan.controls).all()
