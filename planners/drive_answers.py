@@ -18,9 +18,9 @@ from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.manoeuvres.variants import without_trailers
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
-from planners.world.goal import HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, X, Y, goal_of
+from planners.world.goal import HEADING, X, Y, goal_of
 from planners.world.jit import jit
-from planners.world.problem import Plan, Problem, start_state
+from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
@@ -35,12 +35,6 @@ class DriveAnswer(NamedTuple):
     number: int = -1  # of the library's plan that was moved
     is_long: bool = False  # whether a search may well find a quicker one
     checks: int = 0  # collision checks that choosing took
-
-
-def asks_to_stand(problem: Problem) -> bool:
-    """Whether a problem asks for a heading at its goal and lets the vehicle stand there."""
-    goal = goal_of(problem)
-    return bool(goal[HEADING_TOLERANCE] < np.inf and goal[LEAST_SPEED] <= 0.0 <= goal[MOST_SPEED])
 
 
 def _seconds_without_obstacles(start: Floats, goal: Floats, vehicle: Vehicle) -> float:
@@ -60,7 +54,7 @@ def drive_answer(
     until: float,
     blindly: np.random.Generator | None = None,
 ) -> DriveAnswer:
-    """Move stored drives to a question that ``asks_to_stand``, two at a time, until one becomes a plan.
+    """Move stored drives to a question for a pose at rest, two at a time, until one becomes a plan.
 
     Args:
         library: of the vehicle's plans.
@@ -72,9 +66,11 @@ def drive_answer(
     drives, problem = library.drives, view.problem
     start, goal = start_state(problem, vehicle), goal_of(problem)
     order = np.zeros(TRIED, np.int32)
-    count, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
-    if blindly is not None and len(drives.plans):
-        count, order = TRIED, blindly.integers(-len(drives.plans), len(drives.plans), TRIED, np.int32)
+    if blindly is None:
+        count, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
+    else:
+        count, checks = min(TRIED, len(drives.plans)), 0
+        order[:count] = blindly.integers(-len(drives.plans), len(drives.plans), count)
     view.lap("recall")
     found = DriveAnswer(checks=int(checks))
     for k in range(0, count, AT_ONCE):
@@ -84,8 +80,7 @@ def drive_answer(
         guesses = [moved_drive(drives, entry, start, goal, vehicle.dt) for entry in entries]
         chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, until)
         if polished.plan is not None:
-            entry = entries[chosen]
-            number = int(drives.plans[entry if entry >= 0 else -1 - entry])
+            number = int(drives.plans[max(entries[chosen], -1 - entries[chosen])])
             is_long = polished.plan.duration_s > LONG * _seconds_without_obstacles(start, goal, vehicle)
             found = found._replace(plan=polished.plan, number=number, is_long=is_long)
             break

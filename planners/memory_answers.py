@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.attempt import DRIVES, SUB_PLANS
-from planners.drive_answers import asks_to_stand, drive_answer
+from planners.drive_answers import DriveAnswer, drive_answer
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import least_blocked as find_least_blocked
@@ -17,8 +17,10 @@ from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import default_recall, recall
 from planners.search.guides.detour import is_detour, is_detour_from_motion
 from planners.search.help import PATIENCE, Help
+from planners.search.manoeuvres.manoeuvring import suits
 from planners.search.query import Endings, Query
 from planners.sub_plan_answers import sub_plan_answer
+from planners.world.goal import goal_of
 from planners.world.problem import Plan, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
@@ -82,7 +84,8 @@ def answer_from(
         is_long = strategy != "centroid" and is_detour(plan, planner, view, vehicle)
         return answer._replace(plan=plan, source="recalled", is_long=is_long)
     library = memory if isinstance(memory, PlanLibrary) else memory.library
-    if improves and use in JOINS and asks_to_stand(problem):
+    drive = DriveAnswer()
+    if improves and use in JOINS and suits(goal_of(problem), vehicle):
         drive = drive_answer(library, view, vehicle, until, blindly)
         if drive.plan is not None:
             return MemoryAnswer(
@@ -94,7 +97,7 @@ def answer_from(
     answer = MemoryAnswer(
         strategy,
         parts.plan,
-        checks=parts.checks,
+        checks=drive.checks + parts.checks,
         endings=library.endings if use in JOINS and blindly is None else None,
         knows_way=parts.knows_way,
     )

@@ -13,7 +13,7 @@ from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior
-from planners.optimisation.interior.quickest import NEVER, quickest, quickest_near
+from planners.optimisation.interior.quickest import MOST_FIRST, NEVER, quickest
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
@@ -132,7 +132,8 @@ def _polished_once(
     if arriving:
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         around = goal, vehicle, scene, barrier
-        number, moved, used = quickest(drives, model, interior, *around, iterations, until)
+        begun = [Plan(states, controls, vehicle.dt) for _, states, controls, _ in given]
+        number, moved, used = quickest(begun, model, interior, *around, iterations, until)
         shortest = min(given, key=lambda each: each[3])
         if moved is not None and len(moved.controls) < shortest[3]:
             if isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
@@ -179,7 +180,8 @@ def polish_guesses(
     model, goal = _ready(problem, max(len(guess.controls) for guess in guesses) + ROOM, vehicle, workspace)
     interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
-    number, plan, used = quickest_near(guesses, model, interior, goal, vehicle, scene, barrier, until)
+    around = goal, vehicle, scene, barrier
+    number, plan, used = quickest(guesses, model, interior, *around, 2 * MOST_FIRST, until, is_near=True)
     return number, Polished(plan, used)
 
 

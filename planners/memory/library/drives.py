@@ -140,7 +140,7 @@ def rank_drives(
             count = min(count + 1, NEAR)
     promises = np.empty(NEAR)
     for n in range(count):
-        drive = near[n] if near[n] >= 0 else -1 - near[n]
+        drive = max(near[n], -1 - near[n])
         side = 1.0 if near[n] >= 0 else -1.0
         _begin_off(drives, drive, side, start, goal, off)
         blocked = 0
@@ -183,7 +183,7 @@ def moved_drive(drives: Drives, entry: int, start: Floats, goal: Floats, dt: flo
         goal: where it is to end, that of ``goal_of``.
         dt: the vehicle's step in seconds.
     """
-    drive, side = (entry, 1.0) if entry >= 0 else (-1 - entry, -1.0)
+    drive, side = max(entry, -1 - entry), 1.0 if entry >= 0 else -1.0
     first, last = drives.starts[drive], drives.starts[drive + 1]
     states = np.empty((last - first, len(start)))
     _moved(drives, drive, side, start, goal, states)

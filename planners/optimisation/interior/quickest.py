@@ -85,7 +85,7 @@ class _Drive(NamedTuple):
 
 
 def quickest(
-    ways: Sequence[Floats],
+    given: Sequence[Plan],
     model: Model,
     interior: Interior,
     goal: Floats,
@@ -94,11 +94,13 @@ def quickest(
     barrier: Barrier,
     iterations: int,
     until: float,
+    is_near: bool = False,
 ) -> tuple[int, Plan | None, int]:
     """Find the quickest drive near the way of another one, or of several.
 
     Args:
-        ways: the states ``[T, S]`` of drives, which may be blocked; all begin at the same one.
+        given: drives, or guesses whose steps need not lead from state to state. They may be blocked, and all
+            begin at the same state.
         model: buffers with room for as many steps and some more.
         interior: buffers of the same size.
         goal: that of ``goal_of``.
@@ -107,15 +109,20 @@ def quickest(
         barrier: its margin and hitch count.
         iterations: at most, for each way.
         until: when to end, by ``working_clock``.
+        is_near: whether they are nearly optimal: then their speeds are kept, and there is one attempt.
 
     Returns:
-        The number of the way to which it belongs, a free drive that arrives as asked, if one was found, and
+        The number of the one to which it belongs, a free drive that arrives as asked, if one was found, and
         the iterations used.
     """
-    drive = _begun(model, interior, goal, scene, barrier, until)
-    most = iterations * len(ways)
-    given = [_guess(way, vehicle) for way in ways]
-    number, best, used, settled = _found(given, drive, vehicle, ATTEMPTS, most)
+    firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
+    soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
+    most = iterations * len(given)
+    if is_near:
+        return _found(given, drive, vehicle, ATTEMPTS[:1], most)[:3]
+    guesses = [_guess(plan.states, vehicle) for plan in given]
+    number, best, used, settled = _found(guesses, drive, vehicle, ATTEMPTS, most)
     while best is not None and not settled and used < most and working_clock() < until:
         again = [_guess(best.states, vehicle)]
         _, better, more, settled = _found(again, drive, vehicle, ATTEMPTS, most - used)
@@ -124,41 +131,6 @@ def quickest(
             break
         best = better
     return number, best, used
-
-
-def quickest_near(
-    guesses: Sequence[Plan],
-    model: Model,
-    interior: Interior,
-    goal: Floats,
-    vehicle: Vehicle,
-    scene: Scene,
-    barrier: Barrier,
-    until: float,
-) -> tuple[int, Plan | None, int]:
-    """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
-
-    Args:
-        guesses: all begin at the same state; their steps need not lead from state to state.
-        model: as of ``quickest``, like all that follows, and what is returned.
-        interior: as of ``quickest``.
-        goal: as of ``quickest``.
-        vehicle: as of ``quickest``.
-        scene: as of ``quickest``.
-        barrier: as of ``quickest``.
-        until: as of ``quickest``.
-    """
-    drive = _begun(model, interior, goal, scene, barrier, until)
-    most = MOST_FIRST * 2 * len(guesses)
-    return _found(guesses, drive, vehicle, ATTEMPTS[:1], most)[:3]
-
-
-def _begun(
-    model: Model, interior: Interior, goal: Floats, scene: Scene, barrier: Barrier, until: float
-) -> _Drive:
-    firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
-    soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    return _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
 
 
 def _guess(way: Floats, vehicle: Vehicle) -> Plan:
