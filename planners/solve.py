@@ -91,6 +91,7 @@ def solve(
     fault = _fault(problem, planner, assist, memory, vehicle)
     if fault is not None:
         raise ValueError(fault)
+    limits = limits or Limits()
     view = View(problem, workspace)
     improves = polished and problem.arrival is not None
     if assist in WITHOUT_MEMORY or memory is None:
@@ -99,11 +100,12 @@ def solve(
         found = answer_from(
             *(memory, view, planner, top_k, seed, strategy, vehicle, assist),
             improves=improves,
-            until=view.began + (limits or Limits()).seconds,
+            until=view.began + limits.seconds,
         )
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
     if found.plan is None or found.is_long or (improves and not found.is_polished):
-        answer = _searched(view, planner, assist, memory, found, seed, limits or Limits(), vehicle, improves)
+        limits = replace(limits, seconds=max(view.began + limits.seconds - working_clock(), 0.0))
+        answer = _searched(view, planner, assist, memory, found, seed, limits, vehicle, improves)
     planning_seconds = working_clock() - view.began
     plan = answer.plan
 

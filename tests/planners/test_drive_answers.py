@@ -7,13 +7,18 @@ from dataclasses import replace
 import pytest
 
 from planners import drive_answers
+from planners import solve as solving
 from planners.attempt import DRIVES
 from planners.explanation import drive_found
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
+from planners.memory_answers import MemoryAnswer
+from planners.search.outcome import Outcome, Status
+from planners.search.query import Limits, Query
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family
+from planners.world.compiling import working_clock
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from planners.world.workspace import Workspace
@@ -123,3 +128,26 @@ def test_the_drive_that_was_moved_is_found_again(slots: PlanLibrary) -> None:
     assert drive.plan is not None
     assert slots.questions[drive.number].startswith("parallel")
     assert attempt.source != "repaired" or (drive.plan.controls == attempt.plan.controls).all()
+
+
+def test_what_the_memory_takes_is_taken_off_the_search(
+    slots: PlanLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left: list[float] = []
+
+    def slow(*given: object, **named: object) -> MemoryAnswer:
+        began = working_clock()
+        while working_clock() < began + 0.2:
+            pass
+        return MemoryAnswer()
+
+    def searched(planner: str, query: Query, *_: object) -> tuple[Outcome, bool]:
+        left.append(query.limits.seconds)
+        return Outcome(Status.BUDGET_SPENT, None, 0, 0, 0, 0.0, 0.0), False
+
+    monkeypatch.setattr(solving, "answer_from", slow)
+    monkeypatch.setattr(solving, "search_and_polish", searched)
+    for seconds, most in ((0.5, 0.3), (0.1, 0.0)):
+        problem, limits = drawn("parallel", "hard", 6, 0), Limits(seconds=seconds)
+        solve(problem, "lattice", "join", 1, slots, limits=limits, workspace=WORKSPACE)
+        assert 0.0 <= left[-1] <= most
