@@ -37,6 +37,7 @@ class Model(NamedTuple):
     vectors: Floats  # [6, S] scratch
     squares: Floats  # [2, S, S] scratch
     nudged: Floats  # [1, S] scratch
+    boxes: Floats  # [S, S - 4, 6] scratch: the bodies of a state of which one number is nudged
 
 
 def allocate_model(steps: int, size: int) -> Model:
@@ -53,6 +54,7 @@ def allocate_model(steps: int, size: int) -> Model:
         (6, size),
         (2, size, size),
         (1, size),
+        (size, size - 4, 6),
     )
     return Model(*(np.zeros(shape) for shape in shapes))
 
@@ -136,23 +138,33 @@ def differentiate_nearness(
             curvature[r, c] = 0.0
     bounds = scene.bounds
     far = barrier.range_m + barrier.margin_m
+    is_near = False  # whether the boxes are nudged
     for body, box in enumerate(swept_bodies(load(states, i, vehicle), vehicle)):
         x = box[0]
         y = box[1]
         reach = length(box[4], box[5]) + far
         if min(min(x - bounds[0], bounds[2] - x), min(y - bounds[1], bounds[3] - y)) < reach:
+            if not is_near:
+                _nudge_boxes(model, i, vehicle)
+                is_near = True
             for k in range(4):
                 axis = wall(k, bounds)
-                _add_gap(model, i, body, axis, gap_along(axis, box), vehicle, barrier)
+                _add_gap(model, i, body, axis, gap_along(axis, box), barrier)
         for p in range(circles.shape[0]):
             dx = x - circles[p, 0]
             dy = y - circles[p, 1]
             near = reach + circles[p, 2]
             if dx * dx + dy * dy < near * near:
-                gap, axis = widest_gap(
-                    box, scene.piece_starts[p], scene.piece_starts[p + 1], scene.edges, far
-                )
-                _add_gap(model, i, body, axis, gap, vehicle, barrier)
+                first = scene.piece_starts[p]
+                last = scene.piece_starts[p + 1]
+                gap, _ = widest_gap(box, first, last, scene.edges, far)
+                if gap >= far:  # most pieces; without the axis that is known in a third of the time
+                    continue
+                gap, axis = widest_gap(box, first, last, scene.edges, far)
+                if not is_near:
+                    _nudge_boxes(model, i, vehicle)
+                    is_near = True
+                _add_gap(model, i, body, axis, gap, barrier)
     for h in range(5, size):
         hitch = states[i, h]
         _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
@@ -160,34 +172,39 @@ def differentiate_nearness(
         curvature[h, h] += bend
 
 
+@inlined
+def _nudge(c: int) -> float:
+    return -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
+
+
 @lean
-def _add_gap(
-    model: Model, i: int, body: int, axis: Axis, gap: float, vehicle: Vehicle, barrier: Barrier
-) -> None:
+def _nudge_boxes(model: Model, i: int, vehicle: Vehicle) -> None:
+    """Fill in the bodies of state ``i`` with one of its numbers nudged, for each number."""
+    nudged = model.nudged
+    size = len(load(model.states, 0, vehicle))
+    for c in range(size):
+        nudged[0, c] = model.states[i, c]
+    for c in range(size):
+        nudged[0, c] += _nudge(c)
+        for body, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
+            for n in range(6):
+                model.boxes[c, body, n] = box[n]
+        nudged[0, c] = model.states[i, c]
+
+
+@lean
+def _add_gap(model: Model, i: int, body: int, axis: Axis, gap: float, barrier: Barrier) -> None:
     """Add what the gap (metres) of a body along an axis contributes."""
     _, slope, bend = nearness(gap - barrier.margin_m, barrier)
     if bend == 0.0:
         return
-    size = len(load(model.states, 0, vehicle))
-    nudged = model.nudged
+    size = model.states.shape[1]
     by_state = model.vectors[0]
     for c in range(size):
-        nudged[0, c] = model.states[i, c]
-    for c in range(size):
-        nudge = -NUDGE if c == 3 else NUDGE  # at full speed the footprint's margin grows no more
-        nudged[0, c] += nudge
-        by_state[c] = (_moved_gap(nudged, body, axis, vehicle) - gap) / nudge
-        nudged[0, c] = model.states[i, c]
+        box = model.boxes[c, body]
+        moved = gap_along(axis, (box[0], box[1], box[2], box[3], box[4], box[5]))
+        by_state[c] = (moved - gap) / _nudge(c)
     for r in range(size):
         model.gradient[i, r] += slope * by_state[r]
         for c in range(size):
             model.curvature[i, r, c] += bend * by_state[r] * by_state[c]
-
-
-@inlined
-def _moved_gap(nudged: Floats, body: int, axis: Axis, vehicle: Vehicle) -> float:
-    gap = 0.0
-    for number, box in enumerate(swept_bodies(load(nudged, 0, vehicle), vehicle)):
-        if number == body:
-            gap = gap_along(axis, box)
-    return gap

@@ -100,6 +100,28 @@ def cost_of(
 
 
 @jit
+def present_cost(
+    model: Model,
+    interior: Interior,
+    steps: int,
+    goal: Floats,
+    strength: float,
+    time_counts: float,
+    vehicle: Vehicle,
+    scene: Scene,
+    circles: Floats,
+    hold: Hold,
+) -> float:
+    """What the drive in ``model.states`` costs; arguments as of ``cost_of``."""
+    return float(
+        cost_of(
+            *(model.states, model.controls, steps, goal, interior.aim, strength, time_counts),
+            *(vehicle, scene, circles, hold),
+        )
+    )
+
+
+@jit
 def try_change(
     model: Model,
     interior: Interior,

@@ -11,7 +11,7 @@ from typing import Final
 from planners.optimisation.arrival_error import aim_near
 from planners.optimisation.gains import EFFORT, GENTLE
 from planners.optimisation.interior.buffers import LIMITED, Interior, limits_of, value_of
-from planners.optimisation.interior.costs import Hold, cost_of, differentiate, weight_of_error
+from planners.optimisation.interior.costs import Hold, differentiate, weight_of_error
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
@@ -216,7 +216,7 @@ def direction(
     scene: Scene,
     circles: Floats,
     hold: Hold,
-) -> tuple[float, float, float, float, float, float, float]:
+) -> tuple[float, float, float, float, float, float]:
     """Fill in ``interior.change`` and ``interior.change_controls``.
 
     Args:
@@ -235,14 +235,11 @@ def direction(
 
     Returns:
         The damping that was needed; by how many seconds a step gets longer; the share of the change that
-        keeps within all limits, 0 if there is no direction; the cost; its slope along the change; the sum of
-        the gaps; and what a gap of 1 costs at most.
+        keeps within all limits, 0 if there is no direction; the slope of the cost along the change; the sum
+        of the gaps; and what a gap of 1 costs at most.
     """
     differentiate(model, interior, steps, vehicle, longer, scene, circles, hold.barrier)
-    cost = cost_of(
-        *(model.states, model.controls, steps, goal, interior.aim, strength, time_counts),
-        *(vehicle, scene, circles, hold),
-    )
+    aim_near(model.states[steps], goal, interior.aim, hold.inside)
     found = False
     longer_s = 0.0
     for _ in range(DAMPINGS):
@@ -253,7 +250,7 @@ def direction(
             break
         damping = max(MORE_DAMPING * damping, LEAST_DAMPING)
     if not found:
-        return damping, 0.0, 0.0, cost, 0.0, 0.0, 0.0
+        return damping, 0.0, 0.0, 0.0, 0.0, 0.0
     price = _sweep_forward(model, interior, steps, longer_s, vehicle)
     most_0, most_1 = control_limits(vehicle)
     size = model.states.shape[1]
@@ -273,7 +270,6 @@ def direction(
         for c in range(size):
             slope += interior.change[k + 1, c] * model.gradient[k + 1, c]
             gaps += abs(model.gaps[k, c])
-    aim_near(model.states[steps], goal, interior.aim, hold.inside)
     for c in range(size):
         off = model.states[steps, c] - interior.aim[c]
         if off != 0.0:
@@ -282,4 +278,4 @@ def direction(
         share = min(share, SHORTER * vehicle.dt / -longer_s)
     elif longer_s > 0.0:
         share = min(share, LONGER * vehicle.dt / longer_s)
-    return damping, longer_s, share, cost, slope, gaps, price
+    return damping, longer_s, share, slope, gaps, price

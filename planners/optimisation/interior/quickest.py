@@ -18,7 +18,7 @@ from planners.optimisation.interior.buffers import (
     accept_change,
     begin_inside,
 )
-from planners.optimisation.interior.costs import Hold, try_change
+from planners.optimisation.interior.costs import Hold, present_cost, try_change
 from planners.optimisation.interior.drivable import driven
 from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
@@ -120,17 +120,17 @@ def quickest(
     drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
     most = iterations * len(given)
     if is_near:
-        return _found(given, drive, vehicle, ATTEMPTS[:1], most)[:3]
-    guesses = [_guess(plan.states, vehicle) for plan in given]
-    number, best, used, settled = _found(guesses, drive, vehicle, ATTEMPTS, most)
-    while best is not None and not settled and used < most and working_clock() < until:
-        again = [_guess(best.states, vehicle)]
-        _, better, more, settled = _found(again, drive, vehicle, ATTEMPTS, most - used)
+        number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], most, NEVER)
+    else:
+        guesses = [_guess(plan.states, vehicle) for plan in given]
+        number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, most, NEVER)
+    quicker = best
+    while quicker is not None and used < most and working_clock() < until:
+        best = quicker
+        again, below = [_guess(best.states, vehicle)], len(best.controls)
+        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS[:1], most - used, below)
         used += more
-        if better is None or len(better.controls) >= len(best.controls):
-            break
-        best = better
-    return number, best, used
+    return number, quicker or best, used
 
 
 def _guess(way: Floats, vehicle: Vehicle) -> Plan:
@@ -138,24 +138,27 @@ def _guess(way: Floats, vehicle: Vehicle) -> Plan:
 
 
 def _found(
-    given: Sequence[Plan], around: _Drive, vehicle: Vehicle, attempts: Sequence[Attempt], most: int
-) -> tuple[int, Plan | None, int, bool]:
+    given: Sequence[Plan],
+    around: _Drive,
+    vehicle: Vehicle,
+    attempts: Sequence[Attempt],
+    most: int,
+    shorter_than: int,
+) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    The last of what is returned says whether the drive is settled: found at once, when little was left to
-    gain. Else it may become quicker from where it is.
+    Only a drive of less than ``shorter_than`` steps will do.
     """
     model = around.model
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
-    used, settled = 0, True
+    used = 0
     number, best = -1, None
     for attempt in attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
-        hurried = set()  # whose iterations ended first
         for k in guesses:
             guess = given[k] if attempt.afresh else guesses[k]
             steps = len(guess.controls)
@@ -163,24 +166,21 @@ def _found(
             first = min(MOST_FIRST, most - used)
             dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
             used += spent
-            if spent == first:
-                hurried.add(k)
             guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
         left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
-            below = NEVER if best is None else len(best.controls)
+            below = shorter_than if best is None else len(best.controls)
             found, spent = _in_whole_steps(drive, guesses[k], vehicle, below, most - used)
             used += spent
             if found is not None:
                 number, best = k, found
-                settled = attempt is ATTEMPTS[0] and k not in hurried
             else:
                 left[k] = guesses[k]
         longest = math.inf if best is None else best.duration_s - vehicle.dt
         guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
         if not guesses or used >= most or working_clock() > drive.until:
             break
-    return number, best, used, settled
+    return number, best, used
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:
@@ -233,13 +233,17 @@ def _descend(
     counts = 1.0 if time_counts else 0.0
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
     damping, price, in_vain = FIRST_DAMPING, 1.0, 0
-    tried, cost_tried, gaps_tried = vehicle, math.inf, math.inf
+    tried, cost, cost_tried, gaps_tried = vehicle, math.nan, math.inf, math.inf
     begin_inside(model, interior, steps, strength, vehicle)
     for iteration in range(iterations):
         if working_clock() > drive.until:
             return vehicle.dt, iteration, None
+        if math.isnan(cost):  # not known yet
+            cost = present_cost(
+                *(model, interior, steps, drive.goal, strength, counts, vehicle, *around, hold)
+            )
         longer = vehicle._replace(dt=vehicle.dt * (1.0 + LITTLE_LONGER))
-        damping, longer_s, share, cost, slope, gaps, dearest = direction(
+        damping, longer_s, share, slope, gaps, dearest = direction(
             *(model, interior, steps, drive.goal, strength, counts, damping, vehicle, longer, *around, hold)
         )
         price = max(min(price, 10.0 * dearest), dearest)
@@ -263,7 +267,7 @@ def _descend(
                 return vehicle.dt, iteration + 1, None
             continue
         in_vain = 0
-        vehicle = tried
+        vehicle, cost = tried, cost_tried
         accept_change(model, interior, steps, strength, vehicle)
         if not time_counts and gaps_tried < SMALL_GAPS:
             found = _driven(drive, steps, vehicle)
@@ -277,8 +281,7 @@ def _descend(
         if share > 0.3 and abs(slope) < little and gaps_tried < 1e-3 * steps * vehicle.dt:
             if time_counts and strength <= LAST_STRENGTH and gaps_tried < SMALL_GAPS:
                 return vehicle.dt, iteration + 1, None
-            strength = max(WEAKER * strength, LAST_STRENGTH)
-            hold = drive.firm
+            strength, hold, cost = max(WEAKER * strength, LAST_STRENGTH), drive.firm, math.nan
     return vehicle.dt, iterations, None if time_counts else _driven(drive, steps, vehicle)
 
 

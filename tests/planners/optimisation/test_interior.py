@@ -72,7 +72,7 @@ def test_the_direction_solves_newtons_equations(seed: int, time_counts: float) -
     model.controls[:] = plan.controls
     begin_inside(model, interior, steps, STRENGTH, CAR)
     longer = CAR._replace(dt=CAR.dt * (1.0 + 1e-6))
-    damping, longer_s, _, _, slope, gaps, _ = direction(
+    damping, longer_s, _, slope, gaps, _ = direction(
         *(model, interior, steps, goal, STRENGTH, time_counts, 0.1, CAR, longer, scene),
         *(circles_around(scene), HOLD),
     )
