@@ -51,6 +51,7 @@ class Limits:
     nodes: int = 400_000  # tree vertices at once
     seconds: float = 30.0
     bound_s: float = math.inf  # only plans that take less time than this count as solutions
+    further: int = 1000  # expansions after a first drive to a pose, for drives of other kinds
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from planners.memory.plans.experience import Experience
 from planners.optimisation.polish import polish
 from planners.search.manoeuvres.endings import worth_storing
+from planners.search.query import Limits
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import scene_of
@@ -29,6 +31,7 @@ from tasks.requests.question_sources import QuestionSource, is_drawn, question_s
 
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
+FURTHER: Final = 15_000  # expansions for drives of other kinds to a pose: found once, they are recalled often
 PIECE: Final = 50  # numbers of questions: a killed worker loses some two seconds of work
 GIVE_UP: Final = 5  # questions asked for each wanted plan
 
@@ -144,14 +147,16 @@ def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:
 
 
 def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
-    """What is kept for a question: a polished plan, perhaps that of the search too, or nothing."""
-    attempt = solve(*(question, COLLECTOR), seed=seed, vehicle=vehicle, workspace=workspace, polished=False)
-    if attempt.plan is None:
+    """What is kept for a question: the quickest plan, perhaps one with stops too, or nothing."""
+    ask = partial(solve, question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
+    found = ask(polished=False).plan
+    if found is None:
         return []
-    scene = scene_of(question)
-    margin = MARGIN_M if question.arrival is None else 0.0  # a pose may be in a tight slot
-    polished = polish(question, attempt.plan, vehicle, scene, workspace, margin_m=margin).plan
-    variants = worth_storing(attempt.plan, polished, vehicle)
+    if question.arrival is None:
+        best = polish(question, found, vehicle, scene_of(question), workspace, margin_m=MARGIN_M).plan
+    else:  # a pose may be in a tight slot: no margin
+        best = ask(limits=Limits(expansions=Limits.expansions + FURTHER, further=FURTHER)).plan
+    variants = worth_storing(found, best, vehicle)
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)
     return variants
