@@ -42,7 +42,8 @@ LITTLE_S: Final = 0.05  # seconds to gain, with which a stage ends
 SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radians and more
 NO_GAPS: Final = 1e-6  # their sum when the last part cannot close them better ...
 NO_GAIN: Final = 1e-2  # ... if so little is left to gain, in metres
-MOST_FIRST: Final = 60  # iterations while time counts
+MOST_FIRST: Final = 60  # iterations while time counts ...
+MOST_NEAR: Final = 30  # ... of what is nearly optimal: if it takes longer it is mostly in vain
 MOST_LAST: Final = 15  # and of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
 NEVER: Final = 1 << 30  # steps
@@ -120,17 +121,18 @@ def quickest(
     drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
     most = iterations * len(given)
     if is_near:
-        number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], most, NEVER)
+        number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], MOST_NEAR, most, NEVER)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
-        number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, most, NEVER)
-    quicker = best
-    while quicker is not None and used < most and working_clock() < until:
-        best = quicker
+        number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, MOST_FIRST, most, NEVER)
+    while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
-        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS[:1], most - used, below)
+        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS[:1], MOST_FIRST, most - used, below)
         used += more
-    return number, quicker or best, used
+        if quicker is None:
+            break
+        best = quicker
+    return number, best, used
 
 
 def _guess(way: Floats, vehicle: Vehicle) -> Plan:
@@ -142,12 +144,13 @@ def _found(
     around: _Drive,
     vehicle: Vehicle,
     attempts: Sequence[Attempt],
+    first: int,
     most: int,
     shorter_than: int,
 ) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    Only a drive of less than ``shorter_than`` steps will do.
+    Time counts for ``first`` iterations of each. Only a drive of less than ``shorter_than`` steps will do.
     """
     model = around.model
     room = len(model.controls) - MORE_STEPS[-1]
@@ -163,8 +166,8 @@ def _found(
             guess = given[k] if attempt.afresh else guesses[k]
             steps = len(guess.controls)
             _fill(drive, guess, given[k].states[0])
-            first = min(MOST_FIRST, most - used)
-            dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, first)
+            left_for_it = min(first, most - used)
+            dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, left_for_it)
             used += spent
             guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
         left = {}
