@@ -13,7 +13,7 @@ from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior
-from planners.optimisation.interior.quickest import MOST_FIRST, NEVER, quickest
+from planners.optimisation.interior.quickest import NEVER, quickest
 from planners.optimisation.local_model import Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
@@ -27,6 +27,7 @@ from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 700  # where a drive must arrive as asked; some 60 suffice mostly
+GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 MUCH: Final = 0.97  # of its steps: who is pressed to so few may get quicker from there
@@ -181,7 +182,7 @@ def polish_guesses(
     interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
     around = goal, vehicle, scene, barrier
-    number, plan, used = quickest(guesses, model, interior, *around, 2 * MOST_FIRST, until, is_near=True)
+    number, plan, used = quickest(guesses, model, interior, *around, GUESS_ITERATIONS, until, is_near=True)
     return number, Polished(plan, used)
 
 

@@ -52,7 +52,8 @@ class LatticeSettings(NamedTuple):
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
-    longest: int = 4000  # expansions for drives of other kinds while all that are found take long
+    further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
+    longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
 
@@ -150,12 +151,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
         ends = latest - UNPOLISHED * (latest - working_clock())
-        further = query.limits.further
-        longest = max(further, settings.longest)
-        left = manoeuvring.further(further, longest, settings.for_one, left, ends)
+        longest = settings.longest, query.limits.further
+        left = manoeuvring.further(settings.further, longest, settings.for_one, left, ends)
         kept = manoeuvring.kept
         if joining is not None:
-            joining.further(further, 0, further, left, ends)
+            joining.further(settings.further, (0, 0), settings.further, left, ends)
             kept += joining.kept
         outcome = replace(
             outcome,

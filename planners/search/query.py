@@ -51,7 +51,9 @@ class Limits:
     nodes: int = 400_000  # tree vertices at once
     seconds: float = 30.0
     bound_s: float = math.inf  # only plans that take less time than this count as solutions
-    further: int = 1000  # expansions after a first drive to a pose, for drives of other kinds
+    further: int = (
+        0  # expansions at least for drives of other kinds after a first to a pose; not with trailers
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,7 +40,7 @@ from tasks.settings.errors import RunError, UsageError
 GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
 _LOG = logging.getLogger(__name__)
-FEW_PLANS: Final = 200  # gathering so many here takes less time than starting a server and workers
+FEW_PLANS: Final = 50  # gathering so many here takes hardly more time than starting a server and workers
 HEADINGS: Final = ("source", "questions", "plans", "driving s")
 FIELDS: Final = ("source", "questions", "plans", "driving_s")
 
@@ -57,7 +57,7 @@ class Answered(NamedTuple):
     """A question that was answered."""
 
     source: int  # the number of its source
-    variants: list[Experience]  # its plan, polished, and perhaps that of the search
+    variants: list[Experience]  # its plan, polished, and perhaps the first that was found
 
 
 def gather(
@@ -73,8 +73,9 @@ def gather(
     """Draw questions from each source in turn until enough are answered, and write the plans as a library.
 
     A class, a family of manoeuvres and a map give any number of questions, a file of problems those that it
-    holds. Each plan is polished and judged. Where the search stands still on its way to a pose, its own plan
-    is kept as well: other drives can join it there (``PlanLibrary.endings``), and polish melts such stops.
+    holds. Each plan is polished and judged; in a narrow place it is the quickest that a long search finds.
+    Where the first drive to a pose stands still on its way, it is kept as well: other drives can join it
+    there (``PlanLibrary.endings``), and polish melts such stops.
     The same sources and settings give the same bytes, whatever the number of workers. If the command is
     killed, the same command asks only what is left. Where fewer questions can be answered than wanted, the
     library holds the plans that there are, and a warning says so.

@@ -31,8 +31,9 @@ from tasks.requests.question_sources import QuestionSource, is_drawn, question_s
 
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
-FURTHER: Final = 15_000  # expansions for drives of other kinds to a pose: found once, they are recalled often
-PIECE: Final = 50  # numbers of questions: a killed worker loses some two seconds of work
+# what is found once is recalled often: in narrow places the search goes on for drives of other kinds
+EFFORT: Final = Limits(expansions=35_000, seconds=600.0, further=15_000)
+PIECE: Final = 10  # numbers of questions: a killed worker loses some three seconds of work
 GIVE_UP: Final = 5  # questions asked for each wanted plan
 
 
@@ -84,7 +85,7 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
             continue
         question = to_canonical(drawn)[0]
         asked.append(number)
-        plans = _variants(question, vehicle, request.settings.seed, workspace)
+        plans = stored_variants(question, vehicle, request.settings.seed, workspace)
         rows += [number] * len(plans)
         kept += [Experience(question, plan, vehicle) for plan in plans]
     write_experiences(
@@ -146,16 +147,19 @@ def _question(sources: Sequence[QuestionSource], number: int) -> Problem | None:
     return source.draw(own) if own < source.most else None
 
 
-def _variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
-    """What is kept for a question: the quickest plan, perhaps one with stops too, or nothing."""
+def stored_variants(question: Problem, vehicle: Vehicle, seed: int, workspace: Workspace) -> list[Plan]:
+    """What a library keeps for a question in its own frame: nothing if it is not solved, else a judged plan.
+
+    With it goes the first drive to a pose if it has stops, at which others can join it.
+    """
     ask = partial(solve, question, COLLECTOR, seed=seed, vehicle=vehicle, workspace=workspace)
     found = ask(polished=False).plan
     if found is None:
         return []
     if question.arrival is None:
         best = polish(question, found, vehicle, scene_of(question), workspace, margin_m=MARGIN_M).plan
-    else:  # a pose may be in a tight slot: no margin
-        best = ask(limits=Limits(expansions=Limits.expansions + FURTHER, further=FURTHER)).plan
+    else:  # it may be in a tight slot: no margin
+        best = ask(limits=EFFORT).plan
     variants = worth_storing(found, best, vehicle)
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)

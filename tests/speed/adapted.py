@@ -24,8 +24,6 @@ from planners.memory.adaptation import Adaptation, Outcome
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.free import free_plans
 from planners.memory.plans.sweeps import sweep_plans
-from planners.optimisation.polish import polish
-from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import FAMILIES, family
@@ -35,13 +33,13 @@ from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.vehicles.vehicle_files import said_vehicle
+from tasks.requests.gather_pieces import stored_variants
 from tests.speed.manoeuvre_attempts import SEED, Peer
 from tests.speed.manoeuvres import measured
 from tests.speed.statistics import with_interval
 
 COLLECTED: Final = 5  # seed of the old vehicle's plans
 ANEW: Final = 6  # seed of the new vehicle's
-MARGIN_M: Final = 0.4  # as ``gather`` keeps to a place
 Answered = list[tuple[str, Plan]]
 
 
@@ -52,16 +50,9 @@ def _draw(source: str, difficulty: str, vehicle: Vehicle) -> Callable[[int, int]
 
 
 def _solved(problem: Problem, vehicle: Vehicle, workspace: Workspace) -> Answered:
-    """What ``gather`` keeps for a question, by and large: the polished plan and that of the search."""
+    """What ``gather`` keeps for a question."""
     question = to_canonical(problem)[0]
-    found = solve(question, "lattice", vehicle=vehicle, workspace=workspace).plan
-    if found is None:
-        return []
-    margin = MARGIN_M if question.arrival is None else 0.0
-    scene = scene_of(question)
-    polished = polish(question, found, vehicle, scene, workspace, margin_m=margin).plan or found
-    both = [polished, found] if question.arrival is not None else [polished]
-    return [(question.id, plan) for plan in both]
+    return [(question.id, plan) for plan in stored_variants(question, vehicle, 1, workspace)]
 
 
 def measure(console: Console, source: str, asked: argparse.Namespace) -> None:

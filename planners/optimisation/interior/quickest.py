@@ -110,7 +110,7 @@ def quickest(
         barrier: its margin and hitch count.
         iterations: at most, for each way.
         until: when to end, by ``working_clock``.
-        is_near: whether they are nearly optimal: then their speeds are kept, and there is one attempt.
+        is_near: whether they are nearly optimal: then it begins with their speeds, and there is one attempt.
 
     Returns:
         The number of the one to which it belongs, a free drive that arrives as asked, if one was found, and

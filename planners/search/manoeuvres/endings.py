@@ -59,7 +59,7 @@ def last_of_stops(drive: Floats) -> Indices:
 
 
 def worth_storing(found: Plan, polished: Plan | None, vehicle: Vehicle) -> list[Plan]:
-    """The polished plan, and beside it the one that was found if it has stops, which polish melts away.
+    """The polished plan, and beside it the one that was found first if it has stops, which polish melts away.
 
     At these stops others can join it.
     """

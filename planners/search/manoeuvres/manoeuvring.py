@@ -173,14 +173,15 @@ class Manoeuvring:
                 return True
         return False
 
-    def further(self, most: int, longest: int, for_one: int, within: int, until: float) -> int:
+    def further(self, most: int, longer: tuple[int, int], for_one: int, within: int, until: float) -> int:
         """Search on for drives of other kinds, or quicker ones; they are kept.
 
         The longer the quickest of them takes, the more may be gained: then the search goes on for longer.
 
         Args:
             most: expansions.
-            longest: expansions while all that was found takes long; without trailers.
+            longer: without trailers, at most so many while all that was found takes long, and at least so
+                many in any case.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
             until: when to end, by ``working_clock``.
@@ -195,14 +196,14 @@ class Manoeuvring:
         while self._finds_drive(min(began + most, last), until):
             self._keep()
         self._soon = [other for other in self._kept if other is not None]
-        while not self.meets and self._finds_drive(min(began + self._worth(longest), last), until):
+        while not self.meets and self._finds_drive(min(began + self._worth(*longer), last), until):
             self._keep()
         return last - self.expansions
 
-    def _worth(self, longest: int) -> int:
-        """How many expansions, ``longest`` at most, the quickest drive is worth that was found."""
+    def _worth(self, longest: int, least: int) -> int:
+        """How many expansions the quickest drive is worth that was found, if there is one."""
         seconds = float(self._drive.ways.seconds.min())
-        return int(min(PER_SQUARE_SECOND * seconds * seconds, longest)) if self.kept else 0
+        return int(max(min(PER_SQUARE_SECOND * seconds * seconds, longest), least)) if self.kept else 0
 
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.

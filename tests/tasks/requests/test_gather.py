@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 
 from flows.cli.main import call
+from planners.solve import solve
+from planners.world.alignment import to_canonical
+from planners.world.classes.families import family
 from storage.archives.libraries import load_library
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
@@ -59,6 +62,27 @@ def test_the_questions_of_a_file_are_asked_as_they_stand(
     assert "2 of 3" in told
     assert "3 plans" in told
     assert load_library(tmp_path / "library").questions == ("strewn-1-10", "strewn-2-10")
+
+
+def test_what_is_stored_for_a_pose_is_quicker_than_what_is_answered_at_once(tmp_path: Path) -> None:
+    drawn = family("lot")
+    asked = [drawn.draw(11, number) for number in (3, 4, 5, 6)]
+    answers = [solve(to_canonical(problem)[0], "lattice", seed=1).plan for problem in asked]
+    write_problems(tmp_path / "lots.jsonl", asked)
+    gather.gather([str(tmp_path / "lots.jsonl")], tmp_path / "library", 4, 1.0, "standard", ImportSettings())
+    library = load_library(tmp_path / "library")
+    stored = [
+        min(
+            plan.duration_s
+            for plan, of in zip(library.plans, library.questions, strict=True)
+            if of == each.id
+        )
+        for each in asked
+    ]
+    at_once = [plan.duration_s for plan in answers if plan is not None]
+    assert len(at_once) == len(asked)
+    assert sum(stored) < sum(at_once)
+    assert all(kept < soon + 0.15 for kept, soon in zip(stored, at_once, strict=True))
 
 
 def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
