@@ -22,12 +22,11 @@ from planners.world.workspace import Workspace
 from storage.tables.experiences import write_experiences
 from storage.vehicles.definitions import definition_of
 from storage.worlds.importing import ImportSettings
-from storage.worlds.sources import source_at
 from tasks.attempts.judged_attempts import check_plan
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.part_folder import NumberedPiece, is_readable
-from tasks.requests.question_sources import QuestionSource, is_drawn, question_source
+from tasks.requests.question_sources import QuestionSource, is_drawn, named_source, question_source
 
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
@@ -53,7 +52,7 @@ class GatherRequest:
         """A digest of all that decides which question has which number, and what is kept of its answer."""
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
-        contents = ["" if is_drawn(name) else source_at(Path(name)).digest() for name in self.sources]
+        contents = ["" if is_drawn(name) else named_source(name).digest() for name in self.sources]
         return key_of("gather", how, self.plans, self.poses, self.difficulty, self.sources, contents)
 
 

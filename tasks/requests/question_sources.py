@@ -17,7 +17,7 @@ from storage.errors import StorageError
 from storage.exchange.problems import read_problems
 from storage.fields import nearest
 from storage.worlds.importing import ImportSettings, import_part
-from storage.worlds.sources import source_at
+from storage.worlds.sources import Source, source_at
 
 OWN_SEEDS: Final = 1 << 32  # larger than any seed with which users draw problems
 
@@ -33,6 +33,17 @@ class QuestionSource:
 def is_drawn(name: str) -> bool:
     """Whether the name is that of a class or a family, and not of a file or folder."""
     return name in (*CLASSES, *FAMILIES) and not Path(name).exists()
+
+
+def named_source(name: str) -> Source:
+    """The map, worlds or problems at a path; raises StorageError if there is nothing that can be read."""
+    if not Path(name).exists():
+        known = [*CLASSES, *FAMILIES]
+        raise StorageError(
+            f"{name} is no file or folder, and no class or family{nearest(name, known)}: {', '.join(known)}; "
+            "check the name."
+        )
+    return source_at(Path(name))
 
 
 def question_source(
@@ -56,13 +67,7 @@ def question_source(
         drawn = class_or_family(name, difficulty, vehicle)
         draw = partial(drawn.draw, seed)
         return QuestionSource(draw) if name in FAMILIES else _asked_in(draw, poses, settings)
-    if not Path(name).exists():
-        known = [*CLASSES, *FAMILIES]
-        raise StorageError(
-            f"{name} is no file or folder, and no class or family{nearest(name, known)}: {', '.join(known)}; "
-            "check the name."
-        )
-    source = source_at(Path(name))
+    source = named_source(name)
     if source.format == "problems" and source.path.is_file():
         problems = read_problems(source.path, vehicle)
         return QuestionSource(lambda number: problems[number], len(problems))

@@ -185,3 +185,10 @@ def test_wrong_use_is_told_in_a_line(
 ) -> None:
     assert call(["gather", "random", "--out", str(tmp_path / "library"), *options]) == 2
     assert line in capsys.readouterr().err
+
+
+def test_a_misspelt_family_is_told_with_the_nearest_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(["gather", "perpendiculr", "--out", str(tmp_path / "library")]) == 1
+    assert "nearest is 'perpendicular'" in capsys.readouterr().err
