@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
-from planners.optimisation.interior.costs import Hold, try_change
+from planners.optimisation.interior.costs import SPEED_OFF, Hold, try_change
 from planners.optimisation.interior.drivable import at_asked_speed
 from planners.optimisation.interior.drivable import driven as driven_after
 from planners.optimisation.interior.newton import direction
@@ -124,7 +124,7 @@ def cost_model(model, interior, goal, damping, time_counts) -> tuple[Floats, Flo
     number = steps * (size + 2) + 1
     hessian, gradient = np.zeros((number, number)), np.zeros(number)
     limits = np.array([CAR.max_acceleration, CAR.max_steering_rate])
-    bends = np.array([100.0, 100.0, 400.0, 1000.0 / CAR.max_speed**2, 0.0])
+    bends = np.array([100.0, 100.0, 400.0, 2.0 * SPEED_OFF / CAR.max_speed**2, 0.0])
     for k in range(steps):
         at = slice(k * size, (k + 1) * size)
         gradient[at] += model.gradient[k + 1]
@@ -173,21 +173,27 @@ def closing(model, interior, time_counts) -> Floats:
 
 
 @settings(max_examples=8, deadline=None)
-@given(metres=st.floats(1.0, 12.0), waits=st.integers(0, 30), slowly=st.floats(0.3, 1.0))
+@given(
+    metres=st.floats(1.0, 12.0),
+    waits=st.integers(0, 30),
+    slowly=st.floats(0.3, 1.0),
+    most=st.floats(0.1, 2.0),
+)
 def test_straight_ahead_it_takes_the_least_time_that_there_is(
-    metres: float, waits: int, slowly: float
+    metres: float, waits: int, slowly: float, most: float
 ) -> None:
-    count = max(math.ceil(math.sqrt(metres / slowly) / CAR.dt), 2)
+    vehicle = CAR._replace(max_acceleration=most)  # a bus brakes for ten seconds
+    count = max(math.ceil(math.sqrt(metres / (slowly * most)) / CAR.dt), 2)
     first = metres / (count * CAR.dt) ** 2
     controls = np.array([*[(first, 0.0)] * count, *[(0.0, 0.0)] * waits, *[(-first, 0.0)] * count])
     controls = np.concatenate([controls[:count], controls[count + waits :], np.zeros((waits, 2))])
-    problem, plan = driven(controls)
-    top, most = CAR.max_speed, CAR.max_acceleration
+    problem, plan = driven(controls, vehicle=vehicle)
+    top = CAR.max_speed
     way = math.dist(problem.start[:2], problem.goal) - problem.goal_radius
     least = 2.0 * math.sqrt(way / most) if way * most < top**2 else way / top + top / most
-    better = polish(problem, plan, CAR, scene_of(problem), WORKSPACE).plan
+    better = polish(problem, plan, vehicle, scene_of(problem), WORKSPACE).plan
     assert better is not None
-    assert faults(problem, better) == []
+    assert faults(problem, better, vehicle) == []
     assert better.duration_s <= least + 2.5 * CAR.dt
 
 
@@ -222,6 +228,21 @@ def test_whoever_drives_it_a_manoeuvre_becomes_quicker_and_stays_right(name: str
     assert better is not None
     assert faults(problem, better, vehicle) == []
     assert better.duration_s < 0.9 * plan.duration_s
+
+
+@pytest.mark.parametrize("most", [0.1, 0.15, 0.3, 1.0])
+def test_who_brakes_slowly_stands_at_the_goal_as_soon_as_it_can(most: float) -> None:
+    vehicle = CAR._replace(max_acceleration=most)
+    steer, steps = [(0.0, 1.4)] * 4, round(10.0 / math.sqrt(most))
+    there, back = [(most, 0.0)] * steps, [(-most, 0.0)] * steps
+    problem, plan = driven(
+        np.array([*steer, *there, *back, *[(0.0, -1.4)] * 8, *back, *there]), vehicle=vehicle
+    )
+    better = polish(problem, plan, vehicle, scene_of(problem), WORKSPACE)
+    assert better.plan is not None
+    assert faults(problem, better.plan, vehicle) == []
+    assert better.plan.duration_s < 0.9 * plan.duration_s
+    assert better.iterations < 100  # hundreds if it does not stand, and is pressed instead
 
 
 @pytest.mark.parametrize("turns", [2, 4, 5])
