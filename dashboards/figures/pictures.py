@@ -65,18 +65,21 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
         _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
-    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}
-    axes.annotate("", heading_tip(problem, vehicle), problem.start[:2], arrowprops=arrow, zorder=6)
-    tip = goal_tip(problem, vehicle)
-    if tip is not None:
-        axes.annotate("", tip, problem.goal, arrowprops=arrow | {"color": ORANGE}, zorder=6)
-    tip = speed_tip(problem)
-    if tip is not None:
-        speed = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.4}
-        axes.annotate("", tip, problem.start[:2], arrowprops=speed, zorder=7)
+    start = problem.start[:2]
+    shown = [(x_min, y_min), (x_max, y_max)]
+    for root, tip, colour, width in (
+        (start, heading_tip(problem, vehicle), INK, 1.4),
+        (problem.goal, goal_tip(problem, vehicle), ORANGE, 1.4),
+        (start, speed_tip(problem), VERMILLION, 2.4),
+    ):
+        if tip is not None:
+            arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width}
+            axes.annotate("", tip, root, arrowprops=arrow, zorder=6)
+            shown.append(tip)  # beyond the bounds if it faces them: no arrow is drawn whose tip is not shown
     margin = 0.015 * (x_max - x_min)
-    axes.set_xlim(x_min - margin, x_max + margin)
-    axes.set_ylim(y_min - margin, y_max + margin)
+    (left, lower), (right, upper) = np.min(shown, axis=0) - margin, np.max(shown, axis=0) + margin
+    axes.set_xlim(left, right)
+    axes.set_ylim(lower, upper)
     axes.set_aspect("equal")
     axes.set_axis_off()
 

@@ -158,6 +158,28 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
     assert speed_tip(asked) == pytest.approx((math.sqrt(2.0), math.sqrt(2.0)))
 
 
+@pytest.mark.parametrize("heading", [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi])
+def test_arrows_of_poses_that_face_the_bounds_are_drawn(heading: float) -> None:
+    middle, room = np.array([15.0, 6.0]), CAR.front + 0.1
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    x, y = (middle + (middle - room) * ahead).tolist()
+    facing = replace(
+        problem(),
+        start=(x, y, heading),
+        goal=(x, y),
+        bounds=(0.0, 0.0, 30.0, 12.0),
+        start_motion=(1.0,),
+        arrival=Arrival(heading, 0.05),
+    )
+    for figure in (picture(facing, None, ""), gallery([Example(facing, [], None, "")] * 6)):
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            arrows = [each for each in axes.findobj(Annotation) if isinstance(each, Annotation)]
+            assert len(arrows) == 3  # at the start, at the goal, of the speed
+            for arrow in arrows:  # outside its axes none is drawn
+                assert axes.bbox.contains(*axes.transData.transform(arrow.xy))
+
+
 def test_a_plan_of_one_state_can_be_drawn() -> None:
     plan = Plan(start_state(problem())[None, :], np.empty((0, 2)))
     draw_plan(Figure().add_subplot(), plan)
