@@ -19,7 +19,9 @@ from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
 from tasks.requests import gather
 from tasks.requests import gather_pieces as pieces
+from tasks.requests import part_folder
 from tasks.requests.question_sources import question_source
+from tasks.settings.errors import RunError
 from tests.storage.worlds.samples import town_cells, write_map
 from tests.worlds import strewn, walled_goal
 
@@ -135,6 +137,23 @@ def test_nothing_that_is_there_is_replaced(
     assert call(["gather", "problems.jsonl", "--plans", "1", "--workers", "1", "--out", name]) in (1, 2)
     assert capsys.readouterr().err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_who_waits_for_workers_is_told_before_they_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+
+    def server(_: Path) -> None:
+        told.append(capsys.readouterr().out)
+        raise RunError("no server today")
+
+    monkeypatch.setattr(part_folder, "local_server", server)
+    asked = ["gather", "random", "--plans", "60", "--workers", "2", "--out", str(tmp_path / "library")]
+    assert call(asked) == call([*asked, "--quiet"]) == 1
+    assert "worker" in told[0]
+    assert told[0].count("\n") == 1
+    assert told[1] == ""
 
 
 def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: Path) -> None:
