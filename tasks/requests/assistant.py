@@ -179,10 +179,12 @@ class Assistant:
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
 
     def recalled(self, problem: Problem, attempt: Attempt) -> list[Plan]:
-        """The plans that an attempt recalled, in the frame of its problem."""
+        """The whole plans that an attempt recalled to answer as they are, in the frame of its problem."""
         canonical, alignment = to_canonical(problem)
         memory = self.memory_of(problem.class_name)
-        stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
+        if not isinstance(memory, Memory) or not is_canonical(canonical):
+            return []
+        stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled]
         return [from_canonical(plan, alignment) for plan in stored]
 
 
@@ -246,7 +248,7 @@ def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled:
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
-    ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
+    ranked = memory if isinstance(memory, Memory) and recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
     drive = None if memory is None else drive_found(canonical, attempt, memory, assistant.vehicle)

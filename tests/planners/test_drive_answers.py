@@ -126,6 +126,7 @@ def test_the_drive_that_was_moved_is_found_again(slots: PlanLibrary) -> None:
     assert attempt.plan is not None
     assert drive is not None
     assert drive.plan is not None
+    assert attempt.recalled == (drive.number,)
     assert slots.questions[drive.number].startswith("parallel")
     assert attempt.source != "repaired" or (drive.plan.controls == attempt.plan.controls).all()
 

@@ -17,9 +17,8 @@ from planners.world.classes.families import family
 from storage.archives.libraries import load_library
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
-from tasks.requests import gather
+from tasks.requests import gather, part_folder
 from tasks.requests import gather_pieces as pieces
-from tasks.requests import part_folder
 from tasks.requests.question_sources import question_source
 from tasks.settings.errors import RunError
 from tests.storage.worlds.samples import town_cells, write_map
