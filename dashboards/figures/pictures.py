@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,6 +32,8 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
+_MOVED: Final[dict[str, Any]] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (5, 2))}
+
 
 class Example(NamedTuple):
     """One picture of the gallery."""
@@ -43,6 +45,7 @@ class Example(NamedTuple):
     vehicle: Vehicle = CAR
     collisions: bool = False  # mark every state in collision, not only the first
     asked_only: bool = False  # nothing was attempted
+    moved: Plan | None = None  # a stored drive as it was before it was moved and became the answer
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -145,6 +148,7 @@ def picture(
     vehicle: Vehicle = CAR,
     called: str = "recalled",
     collisions: bool = False,
+    moved: Plan | None = None,
 ) -> Figure:
     """A figure of one ``problem``; the other arguments are those of ``Example``.
 
@@ -156,8 +160,9 @@ def picture(
         vehicle: the vehicle that drives them.
         called: what the legend calls the ``recalled`` plans.
         collisions: whether every state in collision is marked.
+        moved: a stored drive as it was before it was moved and became the answer.
     """
-    example = Example(problem, recalled, answer, caption, vehicle, collisions)
+    example = Example(problem, recalled, answer, caption, vehicle, collisions, moved=moved)
     figure = new_figure(6.4, 1.2 + 6.0 * _height_share(problem), problem.id or "Problem")
     _draw_example(figure.add_subplot(), example)
     legend_below(figure, _legend([example], called), 3)
@@ -182,6 +187,8 @@ def _draw_example(axes: Axes, example: Example) -> None:
         draw_plan(axes, example.answer, example.vehicle)
     for plan in example.recalled:
         draw_recalled(axes, checked(plan, scene, example.vehicle), example.collisions)
+    if example.moved is not None:
+        axes.plot(*example.moved.states[:, :2].T, **_MOVED, zorder=6)
     failed = example.answer is None and not example.asked_only
     title = f"{example.caption}, no plan found" if failed else example.caption
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
@@ -223,6 +230,8 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
         )  # fmt: skip
     if any(example.answer is not None for example in to_poses):
         handles += manoeuvre_legend()
+    if any(example.moved is not None for example in examples):
+        handles.append(Line2D([], [], **_MOVED, label="stored drive, before it was moved"))
     if not any(example.recalled for example in examples):
         return handles
     handles += [

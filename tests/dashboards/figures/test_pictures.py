@@ -62,8 +62,8 @@ def test_the_whole_legend_is_in_the_picture(
     straight: Plan, speed: float, arrival: Arrival | None, called: str
 ) -> None:
     moving = replace(problem(WALL), start_motion=(speed,), arrival=arrival)
-    for recalled in ((), (straight,)):
-        figure = picture(moving, straight, "", recalled, called=called, collisions=True)
+    for recalled, moved in (((), None), ((straight,), None), ((straight,), straight)):
+        figure = picture(moving, straight, "", recalled, called=called, collisions=True, moved=moved)
         figure.draw_without_rendering()
         (legend,) = figure.legends
         shown = legend.get_window_extent()
@@ -178,6 +178,15 @@ def test_arrows_of_poses_that_face_the_bounds_are_drawn(heading: float) -> None:
             assert len(arrows) == 3  # at the start, at the goal, of the speed
             for arrow in arrows:  # outside its axes none is drawn
                 assert axes.bbox.contains(*axes.transData.transform(arrow.xy))
+
+
+def test_a_stored_drive_that_was_moved_is_drawn_and_named(straight: Plan) -> None:
+    asked = replace(problem(), arrival=Arrival(1.0, 0.1))
+    plain, both = (picture(asked, straight, "", moved=moved) for moved in (None, straight))
+    assert len(both.legends[0].get_texts()) == len(plain.legends[0].get_texts()) + 1
+    (way,) = (line for line in both.axes[0].lines if line.is_dashed())
+    assert np.array_equal(way.get_xydata(), straight.states[:, :2])
+    assert not any(line.is_dashed() for line in plain.axes[0].lines)
 
 
 def test_a_plan_of_one_state_can_be_drawn() -> None:
