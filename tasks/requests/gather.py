@@ -41,8 +41,8 @@ GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
 _LOG = logging.getLogger(__name__)
 FEW_PLANS: Final = 50  # gathering so many here takes hardly more time than starting a server and workers
-HEADINGS: Final = ("source", "questions", "plans", "driving s")
-FIELDS: Final = ("source", "questions", "plans", "driving_s")
+HEADINGS: Final = ("source", "questions asked", "questions answered", "plans stored", "mean driving s")
+FIELDS: Final = ("source", "questions", "answered", "plans", "driving_s")
 
 
 class SourceCounts(NamedTuple):
@@ -50,6 +50,7 @@ class SourceCounts(NamedTuple):
 
     name: str
     questions: int  # that were asked
+    plans: int  # that are stored: of some answers to a pose two
     seconds: list[float]  # driving time of each answer
 
 
@@ -127,23 +128,23 @@ def gather(
             )
         _save(request, kept)
         remove_folder(parts_folder(out))
+    answered = [[each.variants for each in kept if each.source == number] for number in range(len(sources))]
     return [
         SourceCounts(
-            Path(name).name,
-            tried[number],
-            [each.variants[0].plan.duration_s for each in kept if each.source == number],
+            Path(name).name, tried[number], sum(map(len, own)), [best.plan.duration_s for best, *_ in own]
         )
-        for number, name in enumerate(sources)
+        for number, (name, own) in enumerate(zip(sources, answered, strict=True))
     ]
 
 
 def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
-    """A table that counts questions and plans of each source, with mean driving times."""
+    """A table that counts questions, answers and plans of each source, with mean driving times."""
     rows = [
         [
             each.name,
             f"{each.questions:,}",
             f"{len(each.seconds):,}",
+            f"{each.plans:,}",
             decimal(fmean(each.seconds), 1) if each.seconds else NOTHING,
         ]
         for each in counts
@@ -155,8 +156,9 @@ def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
     """The numbers by which libraries are compared."""
     seconds = [each for source in counts for each in source.seconds]
     questions = sum(each.questions for each in counts)
-    own = {f"plans_{each.name}": float(len(each.seconds)) for each in counts}
-    totals = {"questions": questions, "plans": len(seconds), "answered": len(seconds) / questions}
+    own = {f"plans_{each.name}": float(each.plans) for each in counts}
+    plans = sum(each.plans for each in counts)
+    totals = {"questions": questions, "plans": plans, "answered": len(seconds) / questions}
     return {**totals, "driving_seconds": fmean(seconds), **own}
 
 

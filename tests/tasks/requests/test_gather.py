@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -84,6 +85,22 @@ def test_what_is_stored_for_a_pose_is_quicker_than_what_is_answered_at_once(tmp_
     assert len(at_once) == len(asked)
     assert sum(stored) < sum(at_once)
     assert all(kept < soon + 0.15 for kept, soon in zip(stored, at_once, strict=True))
+
+
+def test_the_table_counts_the_questions_and_the_plans_of_each_source(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "library"
+    asked = ["gather", "lot", "random", "--plans", "6", "--workers", "1", "--out", str(out), "--json"]
+    assert call(asked) == 0
+    (table,) = json.loads(capsys.readouterr().out)["tables"]
+    library = load_library(out)
+    of = [["lot" if each.startswith("lot") else "random", each] for each in library.questions]
+    for row in table["rows"]:
+        own = [question for source, question in of if source == row["source"]]
+        assert row["plans"] == len(own)
+        assert row["answered"] == len(set(own)) <= row["questions"]
+    assert len(library) == sum(row["plans"] for row in table["rows"]) > 6
 
 
 def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
