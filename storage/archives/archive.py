@@ -80,7 +80,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
         StorageError: it is missing or damaged, has extra or missing files, has another version, or is for
             another vehicle or grid.
     """
-    header = _header(folder, kind)
+    header = read_header(folder, kind)
     refuse_another(folder, header.get("vehicle"), vehicle)
     if header.get("grid") != GRID:
         raise StorageError(
@@ -110,7 +110,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
 
 def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     """The vehicle that an archive is made for; raises StorageError as ``read_archive`` does."""
-    vehicle = vehicle_recorded(_header(folder, kind).get("vehicle"))
+    vehicle = vehicle_recorded(read_header(folder, kind).get("vehicle"))
     if vehicle is None:
         raise StorageError(
             f"{folder} was made for a vehicle that this program does not know; build it again."
@@ -118,8 +118,11 @@ def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     return vehicle
 
 
-def _header(folder: Path, kind: str) -> dict[str, Any]:
-    """The header of an archive of this version, exactly as it was written."""
+def read_header(folder: Path, kind: str) -> dict[str, Any]:
+    """The header of an archive of this version, exactly as it was written.
+
+    Raises StorageError if the archive is missing, its header is damaged, or it has another version.
+    """
     path = fetch_folder(folder) / f"{kind}.json"
     if not path.is_file():
         raise StorageError(f"{folder} holds no {kind} (it has no {kind}.json); check the path or build one.")

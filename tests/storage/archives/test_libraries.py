@@ -14,7 +14,7 @@ from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, state_size
 from storage.archives.arrays import write_array
-from storage.archives.libraries import load_library, save_library
+from storage.archives.libraries import how_gathered, load_library, save_library
 from storage.errors import StorageError
 from tests.storage.archives.signing import sign
 from tests.storage.samples import a_memory, same_plan
@@ -41,6 +41,14 @@ def test_a_library_comes_back_exactly_and_gives_the_same_bytes(tmp_path: Path) -
     save_library(tmp_path / "two", loaded)
     for file in (tmp_path / "one").iterdir():
         assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes()
+
+
+def test_a_library_tells_how_it_was_gathered(tmp_path: Path) -> None:
+    for name, gathered in (("own", {"seconds": 0.1 + 0.2}), ("other", None)):
+        save_library(tmp_path / name, a_library(2), gathered)
+        assert how_gathered(tmp_path / name) == gathered
+        assert len(load_library(tmp_path / name)) == 2
+    assert how_gathered(tmp_path / "nowhere") is None
 
 
 def test_the_plans_of_a_memory_are_a_library_too() -> None:

@@ -103,6 +103,30 @@ def test_the_table_counts_the_questions_and_the_plans_of_each_source(
     assert len(library) == sum(row["plans"] for row in table["rows"]) > 6
 
 
+def test_a_repeated_command_does_nothing_and_tells_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_problems(Path("asked.jsonl"), [strewn(1, 10), walled_goal(), strewn(2, 10)])
+    for plans, code in (("2", 0), ("3", 3)):  # of which one cannot be answered
+        asked = ["gather", "asked.jsonl", "--plans", plans, "--out", f"library-{plans}", "--json"]
+        told = []
+        for workers in ("1", "2"):
+            with monkeypatch.context() as patch:
+                if workers == "2":
+                    patch.setattr(gather, "gather_pieces", None)  # nothing is done
+                assert call([*asked, "--workers", workers]) == code
+            told.append(json.loads(capsys.readouterr().out))
+        assert told[0]["tables"] == told[1]["tables"]
+        assert told[0]["files"] == told[1]["files"]
+        assert told[0]["warnings"] == told[1]["warnings"]
+        assert told[1]["lines"] != []
+    for change in (["--seed", "2"], ["--plans", "1"], ["--poses", "0.5"], ["--vehicle", "car-1-trailer"]):
+        assert call([*asked, *change]) == 2
+    write_problems(Path("asked.jsonl"), [strewn(1, 10)])
+    assert call(asked) == 2
+
+
 def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pieces, "PIECE", 4)
     monkeypatch.setattr(gather, "FEW_PLANS", 0)
