@@ -108,6 +108,9 @@ def gather(
     if difficulty != "standard" and not any(map(is_drawn, sources)):
         raise UsageError("--difficulty is of classes and families, and none is among the sources.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
+    for name in sources:
+        if is_drawn(name) and Path(name).exists():
+            _LOG.warning("%s is taken for the class or family; write ./%s for the folder here.", name, name)
     request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
     asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
     if gathered is not None and gathered["asked"] == asked:

@@ -246,6 +246,31 @@ def test_wrong_use_is_told_in_a_line(
     assert line in capsys.readouterr().err
 
 
+def test_a_name_is_a_family_and_a_path_is_a_folder_whatever_folders_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["gather", "lot", "--plans", "1", "--poses", "1", "--workers", "1", "--out"]
+    assert call([*asked, "before"]) == 0
+    assert capsys.readouterr().err.count("./lot") == 0
+    Path("lot").mkdir()
+    write_problems(Path("lot") / "own.jsonl", [strewn(1, 10)])
+    assert call([*asked, "after"]) == 0
+    assert capsys.readouterr().err.count("./lot") == 1
+    assert call(["gather", "./lot", *asked[2:], "folder"]) == 0
+    assert "./lot" not in capsys.readouterr().err
+    before, after, folder = (load_library(Path(name)).questions for name in ("before", "after", "folder"))
+    assert before == after != folder
+
+
+def test_a_library_may_be_called_like_the_family_it_was_gathered_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        assert call(["gather", "lot", "--plans", "1", "--workers", "1", "--out", "lot"]) == 0
+
+
 def test_a_misspelt_family_is_told_with_the_nearest_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
