@@ -118,14 +118,25 @@ def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     return vehicle
 
 
+def kind_of(folder: Path, *kinds: str) -> str:
+    """Which of some ``kinds`` of archive a ``folder`` holds. Raises StorageError if none."""
+    fetch_folder(folder)
+    for kind in kinds:
+        if (folder / f"{kind}.json").is_file():
+            return kind
+    if not folder.exists():
+        raise StorageError(f"{folder} does not exist; check the path.")
+    named = " and no ".join(kinds)
+    headers = " and no ".join(f"{kind}.json" for kind in kinds)
+    raise StorageError(f"{folder} holds no {named} (it has no {headers}); check the path or build one.")
+
+
 def read_header(folder: Path, kind: str) -> dict[str, Any]:
     """The header of an archive of this version, exactly as it was written.
 
     Raises StorageError if the archive is missing, its header is damaged, or it has another version.
     """
-    path = fetch_folder(folder) / f"{kind}.json"
-    if not path.is_file():
-        raise StorageError(f"{folder} holds no {kind} (it has no {kind}.json); check the path or build one.")
+    path = folder / f"{kind_of(folder, kind)}.json"
     if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
         raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
     text = local_text(path)
