@@ -33,7 +33,7 @@ class Attempt:
     repair_seconds: float  # repairing a recalled plan, successfully or not
     roadmap_seconds: float
     search_seconds: float
-    recalled: tuple[int, ...]  # plans of the memory, best first
+    recalled: tuple[int, ...]  # whole plans of the memory, best first; or the drive of it that was moved
     collision_checks: int
     expansions: int
     nodes: int

@@ -33,6 +33,7 @@ class DriveAnswer(NamedTuple):
 
     plan: Plan | None = None
     number: int = -1  # of the library's plan that was moved
+    entry: int = 0  # of its drive, as in the order of ``rank_drives``
     is_long: bool = False  # whether a search may well find a quicker one
     checks: int = 0  # collision checks that choosing took
 
@@ -80,9 +81,10 @@ def drive_answer(
         guesses = [moved_drive(drives, entry, start, goal, vehicle.dt) for entry in entries]
         chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, until)
         if polished.plan is not None:
-            number = int(drives.plans[max(entries[chosen], -1 - entries[chosen])])
+            entry = entries[chosen]
+            number = int(drives.plans[max(entry, -1 - entry)])
             is_long = polished.plan.duration_s > LONG * _seconds_without_obstacles(start, goal, vehicle)
-            found = found._replace(plan=polished.plan, number=number, is_long=is_long)
+            found = found._replace(plan=polished.plan, number=number, entry=entry, is_long=is_long)
             break
     view.lap("repair")
     return found

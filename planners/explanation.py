@@ -9,6 +9,7 @@ import numpy as np
 
 from planners.attempt import DRIVES, Attempt
 from planners.drive_answers import DriveAnswer, drive_answer
+from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
@@ -19,7 +20,8 @@ from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
-from planners.world.problem import Problem, is_canonical
+from planners.world.goal import goal_of
+from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.view import View
@@ -83,14 +85,22 @@ def recollections(
     return looked_at
 
 
+class MovedDrive(NamedTuple):
+    """A whole stored drive that was moved to a problem."""
+
+    answer: DriveAnswer
+    stored: Plan  # as it was driven, or as in a mirror, with its end at the goal
+
+
 def drive_found(
     problem: Problem, attempt: Attempt, memory: Memory | PlanLibrary, vehicle: Vehicle
-) -> DriveAnswer | None:
+) -> MovedDrive | None:
     """Look again at the whole stored drive that was moved to a canonical problem; None if none was."""
     if attempt.recall != DRIVES:
         return None
     library = memory.library if isinstance(memory, Memory) else memory
-    return drive_answer(library, View(problem), vehicle, math.inf)
+    answer = drive_answer(library, View(problem), vehicle, math.inf)
+    return MovedDrive(answer, placed_drive(library.drives, answer.entry, goal_of(problem), vehicle.dt))
 
 
 def parts_found(

@@ -34,9 +34,10 @@ class MemoryAnswer(NamedTuple):
 
     strategy: str | None = None  # of recall
     plan: Plan | None = None  # that fits
-    source: str = ""  # of the plan: "recalled", "repaired", or "searched" if most steps are not stored
+    # of the plan: "recalled", "repaired" if it was moved, or "searched" if most steps are not stored
+    source: str = ""
     is_long: bool = False  # whether the plan seems a detour, so that a short search is worth it
-    recalled: tuple[int, ...] = ()  # plans of the memory, best first
+    recalled: tuple[int, ...] = ()  # whole plans of the memory, best first; or the drive that was moved
     checks: int = 0  # collision checks that this took
     endings: Endings | None = None  # of known plans, at which a search may aim
     knows_way: bool = False  # whether the workspace holds the distances to the goal now
@@ -90,6 +91,7 @@ def answer_from(
         if drive.plan is not None:
             return MemoryAnswer(
                 *(DRIVES if strategy == usual else strategy, drive.plan, "repaired", drive.is_long),
+                recalled=(drive.number,),
                 checks=drive.checks,
                 is_polished=True,
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -32,6 +32,8 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
+_MOVED: Final[dict[str, Any]] = {"color": INK, "linewidth": 0.9, "linestyle": (0, (5, 2))}
+
 
 class Example(NamedTuple):
     """One picture of the gallery."""
@@ -43,6 +45,7 @@ class Example(NamedTuple):
     vehicle: Vehicle = CAR
     collisions: bool = False  # mark every state in collision, not only the first
     asked_only: bool = False  # nothing was attempted
+    moved: Plan | None = None  # a stored drive as it was before it was moved and became the answer
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
@@ -65,18 +68,21 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
         _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
-    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.4}
-    axes.annotate("", heading_tip(problem, vehicle), problem.start[:2], arrowprops=arrow, zorder=6)
-    tip = goal_tip(problem, vehicle)
-    if tip is not None:
-        axes.annotate("", tip, problem.goal, arrowprops=arrow | {"color": ORANGE}, zorder=6)
-    tip = speed_tip(problem)
-    if tip is not None:
-        speed = {"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 2.4}
-        axes.annotate("", tip, problem.start[:2], arrowprops=speed, zorder=7)
+    start = problem.start[:2]
+    shown = [(x_min, y_min), (x_max, y_max)]
+    for root, tip, colour, width in (
+        (start, heading_tip(problem, vehicle), INK, 1.4),
+        (problem.goal, goal_tip(problem, vehicle), ORANGE, 1.4),
+        (start, speed_tip(problem), VERMILLION, 2.4),
+    ):
+        if tip is not None:
+            arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": width}
+            axes.annotate("", tip, root, arrowprops=arrow, zorder=6)
+            shown.append(tip)  # beyond the bounds if it faces them: no arrow is drawn whose tip is not shown
     margin = 0.015 * (x_max - x_min)
-    axes.set_xlim(x_min - margin, x_max + margin)
-    axes.set_ylim(y_min - margin, y_max + margin)
+    (left, lower), (right, upper) = np.min(shown, axis=0) - margin, np.max(shown, axis=0) + margin
+    axes.set_xlim(left, right)
+    axes.set_ylim(lower, upper)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
@@ -142,6 +148,7 @@ def picture(
     vehicle: Vehicle = CAR,
     called: str = "recalled",
     collisions: bool = False,
+    moved: Plan | None = None,
 ) -> Figure:
     """A figure of one ``problem``; the other arguments are those of ``Example``.
 
@@ -153,8 +160,9 @@ def picture(
         vehicle: the vehicle that drives them.
         called: what the legend calls the ``recalled`` plans.
         collisions: whether every state in collision is marked.
+        moved: a stored drive as it was before it was moved and became the answer.
     """
-    example = Example(problem, recalled, answer, caption, vehicle, collisions)
+    example = Example(problem, recalled, answer, caption, vehicle, collisions, moved=moved)
     figure = new_figure(6.4, 1.2 + 6.0 * _height_share(problem), problem.id or "Problem")
     _draw_example(figure.add_subplot(), example)
     legend_below(figure, _legend([example], called), 3)
@@ -179,6 +187,8 @@ def _draw_example(axes: Axes, example: Example) -> None:
         draw_plan(axes, example.answer, example.vehicle)
     for plan in example.recalled:
         draw_recalled(axes, checked(plan, scene, example.vehicle), example.collisions)
+    if example.moved is not None:
+        axes.plot(*example.moved.states[:, :2].T, **_MOVED, zorder=6)
     failed = example.answer is None and not example.asked_only
     title = f"{example.caption}, no plan found" if failed else example.caption
     axes.set_title(title, fontsize=9, color=VERMILLION if failed else INK, pad=4)
@@ -220,6 +230,8 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
         )  # fmt: skip
     if any(example.answer is not None for example in to_poses):
         handles += manoeuvre_legend()
+    if any(example.moved is not None for example in examples):
+        handles.append(Line2D([], [], **_MOVED, label="stored drive, before it was moved"))
     if not any(example.recalled for example in examples):
         return handles
     handles += [

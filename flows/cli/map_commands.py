@@ -119,7 +119,7 @@ def gather(
         write_files(
             model=register_library(model, out, settings.vehicle, asked, task.gathered_metrics(counts))
         )
-    return SHORT if sum(len(each.seconds) for each in counts) < plans else 0
+    return SHORT if sum(each.answered for each in counts) < plans else 0
 
 
 def _gather_pieces(request: GatherRequest) -> list[Gathered]:

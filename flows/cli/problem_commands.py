@@ -63,7 +63,8 @@ def plan(
 
     Args:
         problem: A .json, .jsonl or .parquet file.
-        pick: Which problem of the file, by its id or its number; not needed if there is only one.
+        pick: Which problem of the file, by its id or its number, the line counted from 1; not needed if there
+            is only one.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
         improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
@@ -110,7 +111,8 @@ def optimise(
 
     Args:
         problem: A .json, .jsonl or .parquet file.
-        pick: Which problem of the file, by its id or its number; not needed if there is only one.
+        pick: Which problem of the file, by its id or its number, the line counted from 1; not needed if there
+            is only one.
         plan: Begin with the plan of this .json file, made for this problem or another.
         planner: Begin with the plan of this planner; default follow.
         straight: Begin with a straight line from start to goal.

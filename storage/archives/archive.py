@@ -80,7 +80,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
         StorageError: it is missing or damaged, has extra or missing files, has another version, or is for
             another vehicle or grid.
     """
-    header = _header(folder, kind)
+    header = read_header(folder, kind)
     refuse_another(folder, header.get("vehicle"), vehicle)
     if header.get("grid") != GRID:
         raise StorageError(
@@ -110,7 +110,7 @@ def read_archive(folder: Path, kind: str, vehicle: Vehicle) -> tuple[dict[str, A
 
 def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     """The vehicle that an archive is made for; raises StorageError as ``read_archive`` does."""
-    vehicle = vehicle_recorded(_header(folder, kind).get("vehicle"))
+    vehicle = vehicle_recorded(read_header(folder, kind).get("vehicle"))
     if vehicle is None:
         raise StorageError(
             f"{folder} was made for a vehicle that this program does not know; build it again."
@@ -118,11 +118,25 @@ def archived_vehicle(folder: Path, kind: str) -> Vehicle:
     return vehicle
 
 
-def _header(folder: Path, kind: str) -> dict[str, Any]:
-    """The header of an archive of this version, exactly as it was written."""
-    path = fetch_folder(folder) / f"{kind}.json"
-    if not path.is_file():
-        raise StorageError(f"{folder} holds no {kind} (it has no {kind}.json); check the path or build one.")
+def kind_of(folder: Path, *kinds: str) -> str:
+    """Which of some ``kinds`` of archive a ``folder`` holds. Raises StorageError if none."""
+    fetch_folder(folder)
+    for kind in kinds:
+        if (folder / f"{kind}.json").is_file():
+            return kind
+    if not folder.exists():
+        raise StorageError(f"{folder} does not exist; check the path.")
+    named = " and no ".join(kinds)
+    headers = " and no ".join(f"{kind}.json" for kind in kinds)
+    raise StorageError(f"{folder} holds no {named} (it has no {headers}); check the path or build one.")
+
+
+def read_header(folder: Path, kind: str) -> dict[str, Any]:
+    """The header of an archive of this version, exactly as it was written.
+
+    Raises StorageError if the archive is missing, its header is damaged, or it has another version.
+    """
+    path = folder / f"{kind_of(folder, kind)}.json"
     if _size_of_plain_file(path) > LARGEST_HEADER_BYTES:
         raise StorageError(f"{path} is too long to describe a {kind}; build it again.")
     text = local_text(path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from planners.memory.memory import Memory
 from planners.memory.plans.plan_arrays import StoredPlans
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, Vehicle
-from storage.archives.archive import archived_vehicle, read_archive, write_archive
+from storage.archives.archive import archived_vehicle, kind_of, read_archive, read_header, write_archive
 from storage.archives.memories import load_memory
 from storage.archives.plan_files import PLAN_FILES, files_of_plans, plans_in
 from storage.errors import StorageError
@@ -21,18 +21,34 @@ from storage.places.run_folder import checked_name
 
 _KIND: Final = "library"
 _HEADER: Final = f"{_KIND}.json"
-HEADERS: Final = ("memory.json", _HEADER)  # one of these files is in the folder of a memory, of a library
+_KINDS: Final = ("memory", _KIND)
+HEADERS: Final = tuple(f"{kind}.json" for kind in _KINDS)  # one is in the folder of a memory, of a library
 _DRIFT: Final = 1e-6  # metres and radians by which states may differ from the simulated controls
 
 
-def save_library(folder: Path, library: PlanLibrary) -> None:
-    """Write a ``library`` as a ``folder``, whole or not at all; the same plans give the same bytes."""
+def save_library(folder: Path, library: PlanLibrary, gathered: Any = None) -> None:
+    """Write a ``library`` as a ``folder``, whole or not at all; the same plans give the same bytes.
+
+    Args:
+        folder: where it is written.
+        library: the library.
+        gathered: JSON that says how it was gathered, for ``how_gathered``.
+    """
     header = {
+        "gathered": gathered,
         "class": library.class_name,
         "questions": list(library.questions),
         "scales": list(library.scales),
     }
     write_archive(folder, _KIND, library.vehicle, header, files_of_plans(library.plans))
+
+
+def how_gathered(folder: Path) -> Any:
+    """What ``save_library`` was told of how the library in a ``folder`` was gathered; None if nothing was.
+
+    Raises StorageError if the library is damaged.
+    """
+    return read_header(folder, _KIND).get("gathered") if (folder / _HEADER).is_file() else None
 
 
 def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
@@ -64,12 +80,13 @@ def load_library(folder: Path, vehicle: Vehicle = CAR) -> PlanLibrary:
 
 def vehicle_of(folder: Path) -> Vehicle:
     """The vehicle for which the memory or the library in a ``folder`` was made. Raises as loading does."""
-    return archived_vehicle(folder, _KIND if (folder / _HEADER).is_file() else "memory")
+    return archived_vehicle(folder, kind_of(folder, *_KINDS))
 
 
 def load_memory_or_library(folder: Path, vehicle: Vehicle = CAR) -> Memory | PlanLibrary:
     """The memory or the library of a ``vehicle`` in a ``folder``. Raises StorageError if there is neither."""
-    return load_library(folder, vehicle) if (folder / _HEADER).is_file() else load_memory(folder, vehicle)
+    load = load_library if kind_of(folder, *_KINDS) == _KIND else load_memory
+    return load(folder, vehicle)
 
 
 def _check_driven(plans: StoredPlans, vehicle: Vehicle) -> None:

@@ -62,28 +62,33 @@ def read_problem(path: Path, vehicle: Vehicle = CAR, pick: str | None = None) ->
     Args:
         path: the file.
         vehicle: the vehicle that drives.
-        pick: the id of the problem, or else its number as messages tell it: its line, or counted from 1. None
-            takes the only one.
+        pick: the id of the problem, or else its number as messages tell it: its line, or counted from 1. Its
+            id and place are logged. None takes the only one.
 
     Raises:
         StorageError: the file has no such problem, or several where none is picked; or it is malformed.
     """
     found: list[tuple[int, Any]] = []
     count = last = 0
+    first_id = ""
     for count, (last, fields) in enumerate(raw_problems(path), start=1):
-        identity = fields.get("id") if isinstance(fields, Mapping) else None
-        if pick is not None and pick == (identity or _default_id(path, last)):
+        identity = (fields.get("id") if isinstance(fields, Mapping) else None) or _default_id(path, last)
+        first_id = first_id or identity
+        if pick is not None and pick == identity:
             found = [(last, fields)]
             break
         if pick == str(last) or (pick is None and count == 1):
             found = [(last, fields)]
     if not found or (pick is None and count > 1):
         asked = "" if pick is None else f", none with the id or number {short(pick)}"
-        choose = f"; choose one with --pick, by its id or its number up to {last}" if count else ""
+        ways = f"by its id (the first is {short(first_id)}) or its number (1 to {last})"
+        choose = f"; choose one with --pick, {ways}" if count else ""
         raise StorageError(f"{path} holds {count:,} problem{'s' * (count != 1)}{asked}{choose}.")
     ((where, problem),) = _checked(path, found, vehicle)
     if isinstance(problem, str):
         raise StorageError(f"{where}: {problem}.")
+    if pick is not None:
+        _LOG.info("problem  %s (%s)", problem.id, where)
     return problem
 
 

@@ -46,11 +46,28 @@ def stated_vehicle(fields: Any) -> Vehicle | None:
 
 def refuse_another_driver(stated: Vehicle | None, driver: Vehicle) -> None:
     """Raise ValueError if a problem's ``stated`` vehicle, if there is one, is not the one that drives."""
-    difference = first_difference(definition_of(stated), definition_of(driver)) if stated else ""
-    if stated and difference:
-        alike = name_of(stated) == name_of(driver)
+    if stated is not None and _difference(stated, driver):
         raise ValueError(
             f"is for vehicle {name_of(stated)}, but {name_of(driver)} is to drive"
-            f"{f': {difference}' if alike else ''}; leave out --vehicle, or use a memory of the problem's "
+            f"{_unless_named(stated, driver)}; leave out --vehicle, or use a memory of the problem's "
             "vehicle; or, if any vehicle is meant, leave out the field vehicle"
         )
+
+
+def refuse_memory_of_another(stated: Vehicle, memory: str, stored: Vehicle) -> None:
+    """Raise ValueError if the vehicle that problems state is not the one whose plans a memory has stored."""
+    if _difference(stated, stored):
+        raise ValueError(
+            f"is for vehicle {name_of(stated)}, but {memory} holds plans of {name_of(stored)}"
+            f"{_unless_named(stated, stored)}: name a memory of {name_of(stated)}, which `gather` collects, "
+            "or `adapt` makes of this one"
+        )
+
+
+def _difference(stated: Vehicle, other: Vehicle) -> str:
+    return first_difference(definition_of(stated), definition_of(other))
+
+
+def _unless_named(stated: Vehicle, other: Vehicle) -> str:
+    """How two vehicles differ, if their names do not say that they do."""
+    return f": {_difference(stated, other)}" if name_of(stated) == name_of(other) else ""

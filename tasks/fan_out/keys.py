@@ -14,8 +14,12 @@ PACKAGES: Final = ("planners", "storage", "tasks")  # an edit in one of them mak
 
 def key_of(*inputs: Any) -> str:
     """A digest of JSON values, and of all source files that turn them into rows."""
-    text = json.dumps([sources_digest(), *inputs], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:24]
+    return digest_of(sources_digest(), *inputs)
+
+
+def digest_of(*inputs: Any) -> str:
+    """A digest of JSON values."""
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:24]
 
 
 @functools.cache

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.libraries import HEADERS, vehicle_of
 from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import vehicle_of_problems
-from storage.vehicles.stated_vehicle import refuse_another_driver
+from storage.vehicles.stated_vehicle import refuse_another_driver, refuse_memory_of_another
 from storage.vehicles.vehicle_files import said_vehicle, text_of
 from tasks.registry.model_uris import memory_folder
 from tasks.settings.checks import checked_vehicle
@@ -25,23 +26,28 @@ def settled_vehicle(given: str | None, problems: Path | None = None, memory: str
 
     Raises:
         UsageError: there is no vehicle with the given name, its file is wrong, or the problems are for
-            another.
+            another than the given one or that of the memory.
         StorageError: the problems are damaged, or the memory is missing or damaged.
         RunError: MLflow does not have the memory.
     """
     is_file = problems is not None and problems.suffix in FORMATS and problems.is_file()
     stated = vehicle_of_problems(problems) if problems is not None and is_file else None
-    if given is not None:
-        driver = checked_vehicle(given)
-        try:
-            refuse_another_driver(stated, said_vehicle(driver))
-        except ValueError as error:
-            raise UsageError(f"{problems} {error}.") from None
-        return driver
-    if stated is not None:
-        return text_of(stated)
+    if stated is None:
+        stored = _vehicle_of_memory(memory) if given is None else None
+        return checked_vehicle(given or (DEFAULT_VEHICLE if stored is None else text_of(stored)))
+    driver = text_of(stated) if given is None else checked_vehicle(given)
+    try:
+        refuse_memory_of_another(stated, str(memory), _vehicle_of_memory(memory) or stated)
+        refuse_another_driver(stated, said_vehicle(driver))
+    except ValueError as error:
+        raise UsageError(f"{problems} {error}.") from None
+    return driver
+
+
+def _vehicle_of_memory(memory: str | None) -> Vehicle | None:
+    """The vehicle of the memories at an address; None if there are none."""
     with memory_folder(memory) as folder:
         for place in () if folder is None else (folder, *sorted(folder.glob("memories/[!.]*"))):
             if any((place / header).is_file() for header in HEADERS):
-                return text_of(vehicle_of(place))
-    return DEFAULT_VEHICLE
+                return vehicle_of(place)
+    return None

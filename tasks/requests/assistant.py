@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any, Final, NamedTuple
 
 from planners.attempt import TIMED_PARTS, Attempt
-from planners.explanation import drive_found, parts_found, recollections
+from planners.explanation import MovedDrive, drive_found, parts_found, recollections
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
@@ -179,11 +179,18 @@ class Assistant:
         return attempt, attempt.plan and from_canonical(attempt.plan, alignment)
 
     def recalled(self, problem: Problem, attempt: Attempt) -> list[Plan]:
-        """The plans that an attempt recalled, in the frame of its problem."""
+        """The whole plans that an attempt recalled to answer as they are, in the frame of its problem."""
         canonical, alignment = to_canonical(problem)
         memory = self.memory_of(problem.class_name)
-        stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled] if memory else []
+        if not isinstance(memory, Memory) or not is_canonical(canonical):
+            return []
+        stored = [turned(memory.plans[i], canonical.start[2]) for i in attempt.recalled]
         return [from_canonical(plan, alignment) for plan in stored]
+
+    def moved_drive(self, problem: Problem, attempt: Attempt) -> MovedDrive | None:
+        """The whole stored drive that was moved to a problem, in the canonical frame, or None."""
+        memory, canonical = self.memory_of(problem.class_name), to_canonical(problem)[0]
+        return None if memory is None else drive_found(canonical, attempt, memory, self.vehicle)
 
 
 def plan_one(
@@ -223,6 +230,7 @@ def plan_one(
     if learn is not None:
         remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
     recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
+    drive = assistant.moved_drive(problem, attempt) if explained else None
     summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
     if drawing is not None:
         from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
@@ -230,28 +238,36 @@ def plan_one(
 
         driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
         caption = f"{driven}{attempt.source or attempt.status}"
-        figure = picture(problem, plan, caption, recalled, assistant.vehicle, collisions=explained)
+        moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
+        figure = picture(
+            *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
+        )
         save_picture(figure, drawing)
     if explained:
-        _explain(assistant, problem, attempt, recalled)
+        _explain(assistant, problem, attempt, recalled, drive)
     failure = None if plan else no_plan(problem.id or str(file), summary, out, written)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
     return PlannedOne(attempt, plan, answer, failure, written)
 
 
-def _explain(assistant: Assistant, problem: Problem, attempt: Attempt, recalled: Sequence[Plan]) -> None:
+def _explain(
+    assistant: Assistant,
+    problem: Problem,
+    attempt: Attempt,
+    recalled: Sequence[Plan],
+    drive: MovedDrive | None,
+) -> None:
     # late: tables cost a tenth of a second
     from tasks.requests.explain import log_explanation, log_without_memory
 
     canonical, _ = to_canonical(problem)
     memory = assistant.memory_of(problem.class_name)
-    ranked = memory if isinstance(memory, Memory) and attempt.recalled else None
+    ranked = memory if isinstance(memory, Memory) and recalled else None
     recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
     parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
-    drive = None if memory is None else drive_found(canonical, attempt, memory, assistant.vehicle)
     listed = list(zip(recollected, recalled, strict=True))
-    log_explanation(attempt, memory, listed, problem.scale, parts, drive)
+    log_explanation(attempt, memory, listed, problem.scale, parts, drive and drive.answer)
     if memory is not None:
         with no_garbage_collection():
             log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))

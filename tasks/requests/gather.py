@@ -15,7 +15,7 @@ from dashboards.cells import NOTHING, CellTable, decimal
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from planners.world.classes.problem_classes import DIFFICULTIES
-from storage.archives.libraries import save_library
+from storage.archives.libraries import how_gathered, save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
@@ -41,8 +41,8 @@ GatherFlow = Callable[[GatherRequest], list[Gathered]]
 
 _LOG = logging.getLogger(__name__)
 FEW_PLANS: Final = 50  # gathering so many here takes hardly more time than starting a server and workers
-HEADINGS: Final = ("source", "questions", "plans", "driving s")
-FIELDS: Final = ("source", "questions", "plans", "driving_s")
+HEADINGS: Final = ("source", "questions asked", "questions answered", "plans stored", "mean driving s")
+FIELDS: Final = ("source", "questions", "answered", "plans", "driving_s")
 
 
 class SourceCounts(NamedTuple):
@@ -50,7 +50,9 @@ class SourceCounts(NamedTuple):
 
     name: str
     questions: int  # that were asked
-    seconds: list[float]  # driving time of each answer
+    answered: int
+    plans: int  # that are stored: of some answers to a pose two
+    driving_s: float | None  # mean driving time of the answers, None without any
 
 
 class Answered(NamedTuple):
@@ -92,10 +94,10 @@ def gather(
             Prefect. None does everything in this process.
 
     Returns:
-        what came of each source.
+        what came of each source; of an earlier command that asked for the same, if ``out`` holds its library.
 
     Raises:
-        UsageError: a number is out of range, or ``out`` exists.
+        UsageError: a number is out of range, or ``out`` exists and holds something else.
         StorageError: a source cannot be read.
         RunError: no question could be answered.
     """
@@ -106,45 +108,36 @@ def gather(
     if difficulty != "standard" and not any(map(is_drawn, sources)):
         raise UsageError("--difficulty is of classes and families, and none is among the sources.")
     check_outputs([Path(each) for each in sources if not is_drawn(each)], [out])
-    refuse_existing(out)
+    for name in sources:
+        if is_drawn(name) and Path(name).exists():
+            _LOG.warning("%s is taken for the class or family; write ./%s for the folder here.", name, name)
     request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
-    with unfinished(out):
-        if flow is None or workers == 1 or plans <= FEW_PLANS:
-            results = gather_pieces(request, partial(do_here, GATHER))
-        else:
-            with part_workers(out, workers):
-                results = flow(request)
-        kept, tried = _kept(request, results)
-        if not kept:
-            raise RunError(
-                f"None of the {tried.total()} questions was answered; give easier or other sources."
-            )
-        if len(kept) < plans:
-            _LOG.warning(
-                "Questions answered: %d of %d, fewer than the %d plans wanted. The library holds these "
-                "plans; give more sources to get more.",
-                *(len(kept), tried.total(), plans),
-            )
-        _save(request, kept)
-        remove_folder(parts_folder(out))
-    return [
-        SourceCounts(
-            Path(name).name,
-            tried[number],
-            [each.variants[0].plan.duration_s for each in kept if each.source == number],
+    asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
+    if gathered is not None and gathered["asked"] == asked:
+        _LOG.info("%s holds these plans already; remove it to gather them again.", out)
+        counts = [SourceCounts(**each) for each in gathered["sources"]]
+    else:
+        refuse_existing(out)
+        counts = _gathered(request, workers, flow)
+    answered = sum(each.answered for each in counts)
+    if answered < plans:
+        _LOG.warning(
+            "Questions answered: %d of %d, fewer than the %d plans wanted. The library holds these "
+            "plans; give more sources to get more.",
+            *(answered, sum(each.questions for each in counts), plans),
         )
-        for number, name in enumerate(sources)
-    ]
+    return counts
 
 
 def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
-    """A table that counts questions and plans of each source, with mean driving times."""
+    """A table that counts questions, answers and plans of each source, with mean driving times."""
     rows = [
         [
             each.name,
             f"{each.questions:,}",
-            f"{len(each.seconds):,}",
-            decimal(fmean(each.seconds), 1) if each.seconds else NOTHING,
+            f"{each.answered:,}",
+            f"{each.plans:,}",
+            NOTHING if each.driving_s is None else decimal(each.driving_s, 1),
         ]
         for each in counts
     ]
@@ -153,11 +146,32 @@ def gathered_table(counts: Sequence[SourceCounts]) -> CellTable:
 
 def gathered_metrics(counts: Sequence[SourceCounts]) -> dict[str, float]:
     """The numbers by which libraries are compared."""
-    seconds = [each for source in counts for each in source.seconds]
-    questions = sum(each.questions for each in counts)
-    own = {f"plans_{each.name}": float(len(each.seconds)) for each in counts}
-    totals = {"questions": questions, "plans": len(seconds), "answered": len(seconds) / questions}
-    return {**totals, "driving_seconds": fmean(seconds), **own}
+    questions, answered, plans = (
+        sum(each)
+        for each in zip(*((each.questions, each.answered, each.plans) for each in counts), strict=True)
+    )
+    driving = sum(each.answered * (each.driving_s or 0.0) for each in counts) / answered
+    own = {f"plans_{each.name}": float(each.plans) for each in counts}
+    totals = {"questions": questions, "plans": plans, "answered": answered / questions}
+    return {**totals, "driving_seconds": driving, **own}
+
+
+def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> list[SourceCounts]:
+    with unfinished(request.out):
+        if flow is None or workers == 1 or request.plans <= FEW_PLANS:
+            results = gather_pieces(request, partial(do_here, GATHER))
+        else:
+            with part_workers(request.out, workers):
+                results = flow(request)
+        kept, tried = _kept(request, results)
+        if not kept:
+            raise RunError(
+                f"None of the {tried.total()} questions was answered; give easier or other sources."
+            )
+        counts = _counted(request, kept, tried)
+        _save(request, kept, counts)
+        remove_folder(parts_folder(request.out))
+    return counts
 
 
 def _kept(request: GatherRequest, results: Sequence[Gathered]) -> tuple[list[Answered], Counter[int]]:
@@ -180,7 +194,17 @@ def _kept(request: GatherRequest, results: Sequence[Gathered]) -> tuple[list[Ans
     return kept, tried
 
 
-def _save(request: GatherRequest, kept: Sequence[Answered]) -> None:
+def _counted(request: GatherRequest, kept: Sequence[Answered], tried: Counter[int]) -> list[SourceCounts]:
+    counts = []
+    for number, name in enumerate(request.sources):
+        own = [each.variants for each in kept if each.source == number]
+        driving_s = fmean(best.plan.duration_s for best, *_ in own) if own else None
+        plans = sum(map(len, own))
+        counts.append(SourceCounts(Path(name).name, tried[number], len(own), plans, driving_s))
+    return counts
+
+
+def _save(request: GatherRequest, kept: Sequence[Answered], counts: Sequence[SourceCounts]) -> None:
     questions = [each.variants[0].problem for each in kept]
     classes = {question.class_name for question in questions}
     library = gathered_library(
@@ -189,4 +213,5 @@ def _save(request: GatherRequest, kept: Sequence[Answered]) -> None:
         [(plan.problem.id, plan.plan) for each in kept for plan in each.variants],
         tuple(sorted({question.scale for question in questions})),
     )
-    save_library(request.out, library)
+    sources = [each._asdict() for each in counts]
+    save_library(request.out, library, {"asked": request.asked, "sources": sources})

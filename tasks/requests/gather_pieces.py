@@ -23,7 +23,7 @@ from storage.tables.experiences import write_experiences
 from storage.vehicles.definitions import definition_of
 from storage.worlds.importing import ImportSettings
 from tasks.attempts.judged_attempts import check_plan
-from tasks.fan_out.keys import key_of
+from tasks.fan_out.keys import digest_of, key_of
 from tasks.fan_out.stage import Job
 from tasks.requests.part_folder import NumberedPiece, is_readable
 from tasks.requests.question_sources import QuestionSource, is_drawn, named_source, question_source
@@ -48,12 +48,17 @@ class GatherRequest:
     settings: ImportSettings
 
     @functools.cached_property
-    def digest(self) -> str:
-        """A digest of all that decides which question has which number, and what is kept of its answer."""
+    def asked(self) -> str:
+        """A digest of all that a command asks for."""
         settings = self.settings
         how = asdict(settings) | {"vehicle": definition_of(settings.vehicle)}
         contents = ["" if is_drawn(name) else named_source(name).digest() for name in self.sources]
-        return key_of("gather", how, self.plans, self.poses, self.difficulty, self.sources, contents)
+        return digest_of(how, self.plans, self.poses, self.difficulty, self.sources, contents)
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """A digest of all that decides which question has which number, and what is kept of its answer."""
+        return key_of("gather", self.asked)
 
 
 @dataclass(frozen=True)

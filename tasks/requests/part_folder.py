@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from tasks.fan_out.progress import progress
 from tasks.fan_out.stage import AnyPiece, Job, Result
 from tasks.servers.prefect_server import local_server
 from tasks.settings.errors import UsageError
+
+_LOG = logging.getLogger(__name__)
 
 
 class Request(Protocol):
@@ -125,6 +128,7 @@ def refuse_existing(out: Path) -> None:
 @contextmanager
 def part_workers(out: Path, workers: int) -> Iterator[None]:
     """Provide a Prefect server and worker processes for a flow that makes the parts of ``out``."""
+    _LOG.info("Waiting for worker processes: on a new machine they compile the planners for up to a minute.")
     with local_server(parts_folder(out).absolute()) as server:
         from tasks.fan_out.fan_out import cluster  # Prefect and Dask, after the environment is set
 

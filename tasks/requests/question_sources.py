@@ -31,8 +31,8 @@ class QuestionSource:
 
 
 def is_drawn(name: str) -> bool:
-    """Whether the name is that of a class or a family, and not of a file or folder."""
-    return name in (*CLASSES, *FAMILIES) and not Path(name).exists()
+    """Whether the name is that of a class or a family, whatever files and folders there are."""
+    return name in (*CLASSES, *FAMILIES)
 
 
 def named_source(name: str) -> Source:

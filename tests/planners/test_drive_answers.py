@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from planners import drive_answers
 from planners import solve as solving
 from planners.attempt import DRIVES
 from planners.explanation import drive_found
+from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory_answers import MemoryAnswer
 from planners.search.outcome import Outcome, Status
@@ -19,7 +21,9 @@ from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family
 from planners.world.compiling import working_clock
+from planners.world.goal import HEADING, X, Y, goal_of
 from planners.world.problem import Problem
+from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from planners.world.workspace import Workspace
 
@@ -125,9 +129,21 @@ def test_the_drive_that_was_moved_is_found_again(slots: PlanLibrary) -> None:
     drive = drive_found(problem, attempt, slots, CAR)
     assert attempt.plan is not None
     assert drive is not None
-    assert drive.plan is not None
-    assert slots.questions[drive.number].startswith("parallel")
-    assert attempt.source != "repaired" or (drive.plan.controls == attempt.plan.controls).all()
+    assert drive.answer.plan is not None
+    assert attempt.recalled == (drive.answer.number,)
+    assert slots.questions[drive.answer.number].startswith("parallel")
+    assert attempt.source != "repaired" or (drive.answer.plan.controls == attempt.plan.controls).all()
+
+
+def test_a_drive_is_put_to_a_goal_as_it_was_driven_or_as_in_a_mirror(slots: PlanLibrary) -> None:
+    goal = goal_of(drawn("parallel", "hard", 6, 1))
+    for drive, number in enumerate(slots.drives.plans):
+        stored = slots.plans[number]
+        for entry, side in ((drive, 1.0), (-1 - drive, -1.0)):
+            put = placed_drive(slots.drives, entry, goal, CAR.dt)
+            np.testing.assert_allclose(put.states[-1, :3], goal[[X, Y, HEADING]], atol=1e-9)
+            again = simulate(put.states[0], stored.controls * (1.0, side), CAR)
+            np.testing.assert_allclose(put.states, again, atol=1e-6)
 
 
 def test_what_the_memory_takes_is_taken_off_the_search(

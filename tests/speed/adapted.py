@@ -3,9 +3,9 @@
 ``python -m tests.speed adapted [--sources parallel curves …] [--old car] [--new bus.yaml] [--plans 100]
 [--questions 60]`` collects plans of the old vehicle, adapts them, and collects plans of the new vehicle, as
 ``gather`` does, until that took as many CPU seconds as adapting. Then it asks new problems of another seed.
-A family of manoeuvres is planned by the lattice alone and with each library; "recalled" is the share that is
-answered by a plan of which a part was stored, and driving is of what all solve. For a class it is the share
-of problems in which a stored plan is free, and driving that of the quickest one, in problems that all
+A family of manoeuvres is planned by the lattice alone and with each library; "from memory" is the share that
+is answered by a plan of which a part was stored, and driving is of what all solve. For a class it is the
+share of problems in which a stored plan is free, and driving that of the quickest one, in problems that all
 answer. Intervals are 95 %, by bootstrap. The authority judges every plan.
 """
 
@@ -132,12 +132,12 @@ def _joined(
     for name, peer in peers.items():
         rows = found[peer]
         assert not any(row.fault for row in rows)
-        recalled = np.array([row.attempt.source in ("recalled", "repaired") for row in rows])
+        stored = np.array([row.attempt.source in ("recalled", "repaired") for row in rows])
         ms = np.array([1e3 * row.attempt.planning_seconds for row in rows])
         driving = np.array([row.attempt.duration_s or np.nan for row in rows])[common]
         console.print(
-            f"  {name:8} solved {np.mean([row.attempt.solved for row in rows]):.0%}, recalled "
-            f"{with_interval(100.0 * recalled, '.0f', np.mean)} %, planning mean "
+            f"  {name:8} solved {np.mean([row.attempt.solved for row in rows]):.0%}, from memory "
+            f"{with_interval(100.0 * stored, '.0f', np.mean)} %, planning mean "
             f"{with_interval(ms, '.0f', np.mean)} ms, driving {with_interval(driving, '.1f', np.mean)} s"
         )
 

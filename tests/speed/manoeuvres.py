@@ -6,11 +6,11 @@ family and planner the solved share, planning times (failures included), driving
 what all solve, and the total: planning and driving. ``--given`` asks the problems of TPCAP, dynobench and
 Bench-MR instead, where they lie beside the repository, and prints each beside the best driving time that is
 published. ``--memory LIBRARY`` also has the planners join plans of a library, of the one vehicle that
-``--vehicles`` names; "recalled" is the share of questions answered by a plan of which a part was stored, and
-a line says how much sooner the robot is there so, with the 95 % interval, problems resampled. ``--optimise``
-has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over Reeds-Shepp
-curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame of its
-problem.
+``--vehicles`` names; "from memory" is the share of questions answered by a plan of which a part was stored,
+and a line says how much sooner the robot is there so, with the 95 % interval, problems resampled.
+``--optimise`` has every plan optimised, too, and counts that time. ``--ompl`` adds OMPL's RRT-Connect over
+Reeds-Shepp curves for cars without trailers: paths, no plans. The authority judges every plan, in the frame
+of its problem.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def _table(title: str, names: tuple[str, ...]) -> Table:
         table.add_column(column, no_wrap=True)
     for column in (
         "solved",
-        "recalled",
+        "from memory",
         "median ms",
         "mean",
         "99 %",

@@ -7,6 +7,7 @@ need its steps lead from state to state. It is where an optimisation begins.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -187,4 +188,19 @@ def moved_drive(drives: Drives, entry: int, start: Floats, goal: Floats, dt: flo
     first, last = drives.starts[drive], drives.starts[drive + 1]
     states = np.empty((last - first, len(start)))
     _moved(drives, drive, side, start, goal, states)
+    return Plan(states, drives.controls[first : last - 1] * np.array([1.0, side]), dt)
+
+
+def placed_drive(drives: Drives, entry: int, goal: Floats, dt: float) -> Plan:
+    """Put a drive to a goal as it was driven, or as in a mirror: it ends there, and begins anywhere.
+
+    The arguments are those of ``moved_drive``.
+    """
+    drive, side = max(entry, -1 - entry), 1.0 if entry >= 0 else -1.0
+    first, last = drives.starts[drive], drives.starts[drive + 1]
+    states = drives.states[first:last] * side
+    states[:, [0, 3]] *= side  # how far ahead it is, and its speed
+    sin, cos = math.sin(goal[HEADING]), math.cos(goal[HEADING])
+    states[:, :2] = goal[[X, Y]] + states[:, :2] @ np.array([[cos, sin], [-sin, cos]])
+    states[:, 2] += goal[HEADING]
     return Plan(states, drives.controls[first : last - 1] * np.array([1.0, side]), dt)

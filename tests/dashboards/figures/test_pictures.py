@@ -62,8 +62,8 @@ def test_the_whole_legend_is_in_the_picture(
     straight: Plan, speed: float, arrival: Arrival | None, called: str
 ) -> None:
     moving = replace(problem(WALL), start_motion=(speed,), arrival=arrival)
-    for recalled in ((), (straight,)):
-        figure = picture(moving, straight, "", recalled, called=called, collisions=True)
+    for recalled, moved in (((), None), ((straight,), None), ((straight,), straight)):
+        figure = picture(moving, straight, "", recalled, called=called, collisions=True, moved=moved)
         figure.draw_without_rendering()
         (legend,) = figure.legends
         shown = legend.get_window_extent()
@@ -156,6 +156,37 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
     assert state is not None
     assert state[0, :3] == pytest.approx((*CANONICAL_GOAL, 1.0))
     assert speed_tip(asked) == pytest.approx((math.sqrt(2.0), math.sqrt(2.0)))
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.5 * math.pi, math.pi, -0.5 * math.pi])
+def test_arrows_of_poses_that_face_the_bounds_are_drawn(heading: float) -> None:
+    middle, room = np.array([15.0, 6.0]), CAR.front + 0.1
+    ahead = np.array([math.cos(heading), math.sin(heading)])
+    x, y = (middle + (middle - room) * ahead).tolist()
+    facing = replace(
+        problem(),
+        start=(x, y, heading),
+        goal=(x, y),
+        bounds=(0.0, 0.0, 30.0, 12.0),
+        start_motion=(1.0,),
+        arrival=Arrival(heading, 0.05),
+    )
+    for figure in (picture(facing, None, ""), gallery([Example(facing, [], None, "")] * 6)):
+        figure.draw_without_rendering()
+        for axes in figure.axes:
+            arrows = [each for each in axes.findobj(Annotation) if isinstance(each, Annotation)]
+            assert len(arrows) == 3  # at the start, at the goal, of the speed
+            for arrow in arrows:  # outside its axes none is drawn
+                assert axes.bbox.contains(*axes.transData.transform(arrow.xy))
+
+
+def test_a_stored_drive_that_was_moved_is_drawn_and_named(straight: Plan) -> None:
+    asked = replace(problem(), arrival=Arrival(1.0, 0.1))
+    plain, both = (picture(asked, straight, "", moved=moved) for moved in (None, straight))
+    assert len(both.legends[0].get_texts()) == len(plain.legends[0].get_texts()) + 1
+    (way,) = (line for line in both.axes[0].lines if line.is_dashed())
+    assert np.array_equal(way.get_xydata(), straight.states[:, :2])
+    assert not any(line.is_dashed() for line in plain.axes[0].lines)
 
 
 def test_a_plan_of_one_state_can_be_drawn() -> None:

@@ -14,7 +14,13 @@ from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, DIFFERENTIAL_DRIVE, state_size
 from storage.archives.arrays import write_array
-from storage.archives.libraries import load_library, save_library
+from storage.archives.libraries import (
+    how_gathered,
+    load_library,
+    load_memory_or_library,
+    save_library,
+    vehicle_of,
+)
 from storage.errors import StorageError
 from tests.storage.archives.signing import sign
 from tests.storage.samples import a_memory, same_plan
@@ -41,6 +47,24 @@ def test_a_library_comes_back_exactly_and_gives_the_same_bytes(tmp_path: Path) -
     save_library(tmp_path / "two", loaded)
     for file in (tmp_path / "one").iterdir():
         assert file.read_bytes() == (tmp_path / "two" / file.name).read_bytes()
+
+
+def test_a_library_tells_how_it_was_gathered(tmp_path: Path) -> None:
+    for name, gathered in (("own", {"seconds": 0.1 + 0.2}), ("other", None)):
+        save_library(tmp_path / name, a_library(2), gathered)
+        assert how_gathered(tmp_path / name) == gathered
+        assert len(load_library(tmp_path / name)) == 2
+    assert how_gathered(tmp_path / "nowhere") is None
+
+
+@pytest.mark.parametrize("read", [load_memory_or_library, vehicle_of])
+def test_a_folder_with_neither_memory_nor_library_is_told_from_one_that_is_missing(
+    tmp_path: Path, read: Callable[[Path], object]
+) -> None:
+    with pytest.raises(StorageError, match=r"no memory\.json and no library\.json"):
+        read(tmp_path)
+    with pytest.raises(StorageError, match="gone does not exist"):
+        read(tmp_path / "gone")
 
 
 def test_the_plans_of_a_memory_are_a_library_too() -> None:

@@ -131,9 +131,10 @@ def test_a_vehicle_of_the_same_name_is_refused_with_what_is_different(tmp_path: 
 
 
 def test_a_folder_without_a_memory_is_said_so(tmp_path: Path) -> None:
-    for folder in (tmp_path, tmp_path / "gone"):
-        with pytest.raises(StorageError, match="holds no memory"):
-            load_memory(folder)
+    with pytest.raises(StorageError, match=r"holds no memory \(it has no memory\.json\)"):
+        load_memory(tmp_path)
+    with pytest.raises(StorageError, match="gone does not exist"):
+        load_memory(tmp_path / "gone")
 
 
 def test_a_memory_replaces_the_one_before_whole(tmp_path: Path) -> None:

@@ -43,6 +43,27 @@ def test_each_problem_of_a_file_can_be_picked_by_its_id_or_its_number(
             read_problem(path, pick=wrong)
 
 
+@pytest.mark.parametrize("pick", ["2", "lot-1"])
+def test_who_picks_is_told_which_problem_it_is_by_id_and_line(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, pick: str
+) -> None:
+    path = tmp_path / "lots.jsonl"
+    path.write_text("".join(json.dumps(GOOD | {"id": f"lot-{number}"}) + "\n" for number in range(3)))
+    with caplog.at_level("INFO"):
+        assert read_problem(path, pick=pick).id == "lot-1"
+    (told,) = caplog.messages
+    assert "lot-1" in told
+    assert "line 2" in told
+
+
+def test_who_picks_nothing_that_is_there_is_told_how_both_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "lots.jsonl"
+    path.write_text("".join(json.dumps(GOOD | {"id": f"lot-{number}"}) + "\n" for number in range(3)))
+    for wrong in (None, "0", "4", "lot-3"):
+        with pytest.raises(StorageError, match=r"'lot-0'.*1 to 3"):
+            read_problem(path, pick=wrong)
+
+
 def test_an_id_is_picked_before_a_number_and_lines_count_as_messages_count_them(tmp_path: Path) -> None:
     first, second, third = (json.dumps(GOOD | {"id": name}) for name in ("a", "1", ""))
     path = tmp_path / "mine.jsonl"

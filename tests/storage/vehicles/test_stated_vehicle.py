@@ -70,16 +70,32 @@ def test_who_names_no_vehicle_gets_that_of_the_problem_or_of_the_memory(
     assert driver("own.json") == "differential-drive"
     assert driver("any.json") == "car"
     assert driver("any.json", "--memory", "memory") == "car"
-    assert call(["plan", "own.json", "--memory", "memory"]) == 1
-    told = capsys.readouterr().err
-    assert "made for vehicle car, expected differential-drive" in told
-    assert told.count("\n") == 1
     controls = np.full((9, 2), 0.1)
     plan = Plan(simulate(np.zeros(6), controls, CAR_1_TRAILER), controls, CAR_1_TRAILER.dt)
     save_library(Path("theirs"), gathered_library("general", CAR_1_TRAILER, [("asked", plan)]))
     assert settled_vehicle(None, Path("any.json"), "theirs") == "car-1-trailer"
-    assert settled_vehicle(None, Path("own.json"), "theirs") == "differential-drive"
     assert settled_vehicle("car", Path("any.json"), "theirs") == "car"
+
+
+@pytest.mark.parametrize("given", [[], ["--vehicle", "car"], ["--vehicle", "differential-drive"]])
+@pytest.mark.parametrize("command", [["plan"], ["solve", "--out", "rows.parquet"]])
+def test_no_vehicle_is_advised_where_memory_and_problems_are_for_different_ones(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    given: list[str],
+    command: list[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_problems(Path("own.json"), [problem_of([])], DIFFERENTIAL_DRIVE)
+    write_memory(Path("memory"), plans=3)
+    assert call([*command, "own.json", "--memory", "memory", *given]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert {"own.json", "differential-drive", "memory", "car", "`gather`", "`adapt`"} <= set(
+        told.replace(",", "").replace(":", "").split()
+    )
+    assert "--vehicle" not in told
 
 
 @pytest.mark.parametrize("command", ["plan", "optimise", "solve", "gather"])

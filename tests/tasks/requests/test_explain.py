@@ -20,6 +20,7 @@ from planners.search.outcome import work_of
 from planners.solve import solve
 from planners.sub_plan_answers import sub_plan_answer
 from planners.world.alignment import to_canonical
+from planners.world.classes.families import family
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.geometry.occupancy import drawing_of
 from planners.world.problem import CANONICAL_START, Arrival, Problem
@@ -135,6 +136,24 @@ def test_it_says_what_parts_of_plans_had_for_a_question(
         assert ("no parts" in line) == (searched and parts.plan is None)
         told[source.partition(",")[0], quicker] = line
     assert len(set(told.values())) == len(told) > 1
+
+
+def test_the_stored_drive_that_was_moved_is_told_and_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stored, asked = (family("parallel").draw(1, number) for number in (0, 1))
+    plan = solve(to_canonical(stored)[0], "lattice").plan
+    assert plan is not None
+    save_library(tmp_path / "library", gathered_library("parallel", CAR, [("stored", plan)]))
+    write_problems(tmp_path / "asked.json", [asked], for_it_alone=True)
+    told = {}
+    for options in ((), ("--explain",)):
+        drawing = tmp_path / f"{len(options)}.png"
+        plan_it = ["plan", str(tmp_path / "asked.json"), "--memory", str(tmp_path / "library"), *options]
+        assert call([*plan_it, "--picture", str(drawing)]) == 0
+        told[options] = capsys.readouterr().out, drawing.read_bytes()
+    assert "plan 0 of 1 plans" in told[("--explain",)][0]
+    assert told[()][1] != told[("--explain",)][1]
 
 
 @pytest.mark.parametrize("command", ["plan", "solve"])

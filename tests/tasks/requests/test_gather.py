@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -17,9 +18,10 @@ from planners.world.classes.families import family
 from storage.archives.libraries import load_library
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
-from tasks.requests import gather
+from tasks.requests import gather, part_folder
 from tasks.requests import gather_pieces as pieces
 from tasks.requests.question_sources import question_source
+from tasks.settings.errors import RunError
 from tests.storage.worlds.samples import town_cells, write_map
 from tests.worlds import strewn, walled_goal
 
@@ -85,6 +87,46 @@ def test_what_is_stored_for_a_pose_is_quicker_than_what_is_answered_at_once(tmp_
     assert all(kept < soon + 0.15 for kept, soon in zip(stored, at_once, strict=True))
 
 
+def test_the_table_counts_the_questions_and_the_plans_of_each_source(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "library"
+    asked = ["gather", "lot", "random", "--plans", "6", "--workers", "1", "--out", str(out), "--json"]
+    assert call(asked) == 0
+    (table,) = json.loads(capsys.readouterr().out)["tables"]
+    library = load_library(out)
+    of = [["lot" if each.startswith("lot") else "random", each] for each in library.questions]
+    for row in table["rows"]:
+        own = [question for source, question in of if source == row["source"]]
+        assert row["plans"] == len(own)
+        assert row["answered"] == len(set(own)) <= row["questions"]
+    assert len(library) == sum(row["plans"] for row in table["rows"]) > 6
+
+
+def test_a_repeated_command_does_nothing_and_tells_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_problems(Path("asked.jsonl"), [strewn(1, 10), walled_goal(), strewn(2, 10)])
+    for plans, code in (("2", 0), ("3", 3)):  # of which one cannot be answered
+        asked = ["gather", "asked.jsonl", "--plans", plans, "--out", f"library-{plans}", "--json"]
+        told = []
+        for workers in ("1", "2"):
+            with monkeypatch.context() as patch:
+                if workers == "2":
+                    patch.setattr(gather, "gather_pieces", None)  # nothing is done
+                assert call([*asked, "--workers", workers]) == code
+            told.append(json.loads(capsys.readouterr().out))
+        assert told[0]["tables"] == told[1]["tables"]
+        assert told[0]["files"] == told[1]["files"]
+        assert told[0]["warnings"] == told[1]["warnings"]
+        assert told[1]["lines"] != []
+    for change in (["--seed", "2"], ["--plans", "1"], ["--poses", "0.5"], ["--vehicle", "car-1-trailer"]):
+        assert call([*asked, *change]) == 2
+    write_problems(Path("asked.jsonl"), [strewn(1, 10)])
+    assert call(asked) == 2
+
+
 def test_gathering_that_was_interrupted_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pieces, "PIECE", 4)
     monkeypatch.setattr(gather, "FEW_PLANS", 0)
@@ -137,6 +179,23 @@ def test_nothing_that_is_there_is_replaced(
     assert sorted(tmp_path.rglob("*")) == before
 
 
+def test_who_waits_for_workers_is_told_before_they_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+
+    def server(_: Path) -> None:
+        told.append(capsys.readouterr().out)
+        raise RunError("no server today")
+
+    monkeypatch.setattr(part_folder, "local_server", server)
+    asked = ["gather", "random", "--plans", "60", "--workers", "2", "--out", str(tmp_path / "library")]
+    assert call(asked) == call([*asked, "--quiet"]) == 1
+    assert "worker" in told[0]
+    assert told[0].count("\n") == 1
+    assert told[1] == ""
+
+
 def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: Path) -> None:
     problems = tmp_path / "asked.jsonl"
     for seed in (1, 2):
@@ -185,6 +244,31 @@ def test_wrong_use_is_told_in_a_line(
 ) -> None:
     assert call(["gather", "random", "--out", str(tmp_path / "library"), *options]) == 2
     assert line in capsys.readouterr().err
+
+
+def test_a_name_is_a_family_and_a_path_is_a_folder_whatever_folders_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["gather", "lot", "--plans", "1", "--poses", "1", "--workers", "1", "--out"]
+    assert call([*asked, "before"]) == 0
+    assert capsys.readouterr().err.count("./lot") == 0
+    Path("lot").mkdir()
+    write_problems(Path("lot") / "own.jsonl", [strewn(1, 10)])
+    assert call([*asked, "after"]) == 0
+    assert capsys.readouterr().err.count("./lot") == 1
+    assert call(["gather", "./lot", *asked[2:], "folder"]) == 0
+    assert "./lot" not in capsys.readouterr().err
+    before, after, folder = (load_library(Path(name)).questions for name in ("before", "after", "folder"))
+    assert before == after != folder
+
+
+def test_a_library_may_be_called_like_the_family_it_was_gathered_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        assert call(["gather", "lot", "--plans", "1", "--workers", "1", "--out", "lot"]) == 0
 
 
 def test_a_misspelt_family_is_told_with_the_nearest_name(
