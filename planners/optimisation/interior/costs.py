@@ -22,8 +22,8 @@ from planners.world.jit import inlined, jit, lean
 from planners.world.vehicles.dynamics import load, step
 from planners.world.vehicles.vehicle import Vehicle
 
-# metres; what it costs to be full speed off the speed that is asked at the end. A little speed is always left,
-# worth the braking that it saves; taking it away in the end must not move the vehicle out of its goal
+# metres; what it costs to be full speed off the speed that is asked at the end. A little speed is always left
+# that is worth the braking that it saves; taking it away must not move the vehicle out of its goal
 SPEED_OFF: Final = 50_000.0
 
 
