@@ -32,8 +32,8 @@ from planners.world.vehicles.vehicle import Vehicle
 
 STEPS: Final = 1 << 13  # of a drive at most
 TOPS: Final = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.04)  # shares of full speed, and at last ...
-CREEP: Final = 0.5  # ... this share of the pace at which a tree looks where it is narrow
-PACES: Final = len(TOPS) + 1
+CREEPS: Final = (0.5, 0.1)  # ... these shares of the pace at which a tree looks where it is narrow
+PACES: Final = len(TOPS) + len(CREEPS)
 NEAR_M: Final = 2e-3  # how exactly a word leads to a node, in metres and radians
 STRIDES: Final = 1 << 10  # of an arc at most
 ROUNDING: Final = 1e-9
@@ -132,7 +132,7 @@ def _pace(level: int, gear: float, top: float, vehicle: Vehicle) -> float:
     """The speed (m/s) of a level, of which level 0 is the quickest, where ``top`` is full speed."""
     if level < len(TOPS):
         return TOPS[level] * top
-    return min(TOPS[-1] * top, CREEP * stride_of(gear, vehicle) / (FINE * vehicle.dt))
+    return min(TOPS[-1] * top, CREEPS[level - len(TOPS)] * stride_of(gear, vehicle) / (FINE * vehicle.dt))
 
 
 @lean

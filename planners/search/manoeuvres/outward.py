@@ -45,9 +45,10 @@ class Outward(NamedTuple):
     """How a tree grows. Lengths are in those of the first body."""
 
     bends: tuple[float, ...] = (1.0, 0.0, -1.0)  # shares of the tightest
-    marks: tuple[int, ...] = (3, 8, 15, 30, 50, 80)  # strides after which an arc may end
+    stride: float = 1.0  # share of ``stride_of`` from one look to the next
+    marks: tuple[float, ...] = (3.0, 8.0, 15.0, 30.0, 50.0, 80.0)  # strides after which an arc may end
     cell: float = 0.05  # side of a cell
-    headings: int = 96  # cells of headings, 128 at most
+    headings: int = 96  # cells of headings, ``MOST_HEADINGS`` at most
     greed: float = 1.5  # weight of the time from the start
     crowding: float = 0.0  # seconds by which a node counts as farther for each opened in its region
     worst: bool = False  # with trailers that of the first or last body, whichever is longer, not the mean
@@ -168,7 +169,7 @@ def open_node(
     bend_limit = tightest_bend(vehicle.max_speed, vehicle)
     size = vehicle.front + vehicle.rear
     for gear in GEARS:
-        stride = stride_of(gear, outgoing)
+        stride = settings.stride * stride_of(gear, outgoing)
         if stride <= 0.0:
             continue
         for share in settings.bends:

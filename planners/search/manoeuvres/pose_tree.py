@@ -26,6 +26,7 @@ REGION: Final = 1.0  # side of a region, in the first body's length ...
 REGION_HEADINGS: Final = 8  # ... and how many headings are told apart there; of each hitch three parts
 _FIBONACCI: Final = 0x9E3779B1
 HITCH_CELLS: Final = 5.0  # of hitches, a radian
+MOST_HEADINGS: Final = 1024  # cells of headings: so many a key has room for
 ROLLING: Final = 0.5  # of the time for turning the wheels at rest, if that is done while driving on
 # indices into PoseTree.counts
 SIZE, CHECKS, LAST = range(3)
@@ -154,11 +155,11 @@ def cell_of(state: State, gear: float, tree: PoseTree, cell: float, headings: in
     """The cell of a pose that is left in a gear, seen from the goal; with its hitches."""
     row = math.floor((state[1] - tree.states[0, 1]) / cell) & 0xFFFF
     column = math.floor((state[0] - tree.states[0, 0]) / cell) & 0xFFFF
-    heading = int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi))) & 127
+    heading = int((wrapped(state[2]) + math.pi) * (headings / (2.0 * math.pi))) % MOST_HEADINGS
     key = 0
     for k in range(5, len(state)):
         key = key << 5 | (math.floor(state[k] * HITCH_CELLS) & 31)
-    return int(((key << 16 | row) << 16 | column) << 8 | heading << 1 | (1 if gear > 0.0 else 0))
+    return int(((key << 16 | row) << 16 | column) << 11 | heading << 1 | (1 if gear > 0.0 else 0))
 
 
 @inlined

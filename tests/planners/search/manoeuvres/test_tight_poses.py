@@ -16,6 +16,7 @@ from planners.world.classes.families import Family, family
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
+from storage.vehicles.vehicle_files import said_vehicle
 
 LIMITS = Limits(expansions=6000)
 
@@ -44,6 +45,15 @@ HARD = [("angled", 53), ("angled", 71), ("angled", 97), ("perpendicular", 26), (
 def test_the_narrowest_slots_are_reached_too(name: str, number: int) -> None:
     problem = to_canonical(family(name, "hard").draw(900, number))[0]
     assert faults(problem, solved(problem)) == []
+
+
+@pytest.mark.parametrize(("name", "number"), [("forklift", 0), ("forklift", 2), ("bus", 4), ("bus", 12)])
+def test_who_swings_out_behind_the_wheels_leaves_a_kerb_degree_by_degree(name: str, number: int) -> None:
+    vehicle = said_vehicle(f"docs/vehicles/{name}.yaml")
+    problem = to_canonical(family("parallel", "standard", vehicle).draw(91, number))[0]
+    found = plan("lattice", problem, generator(0), limits=Limits(expansions=12_000), vehicle=vehicle).plan
+    assert found is not None
+    assert faults(problem, found, vehicle) == []
 
 
 def test_the_same_question_has_the_same_answer() -> None:

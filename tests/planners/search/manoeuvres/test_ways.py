@@ -177,7 +177,7 @@ def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
 
 @pytest.mark.parametrize(
     ("name", "difficulty", "number"),
-    [("parallel", "hard", 0), ("perpendicular", "hard", 27), ("lot", "standard", 44)],
+    [("perpendicular", "hard", 5), ("perpendicular", "hard", 27)],
 )
 def test_a_drive_that_takes_several_attempts_is_not_lost_beside_another(
     name: str, difficulty: str, number: int
