@@ -31,8 +31,7 @@ from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 
 FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
-WEAKER: Final = 0.1  # ... times this when little is left to gain ...
-LAST_STRENGTH: Final = 3e-4  # ... down to this
+WEAKER: Final = 0.1  # ... times this with each hold that follows when little is left to gain
 LAST_STEPS_STRENGTH: Final = 1e-3  # while only gaps are closed
 RANGE_M: Final = 0.3  # of obstacles, as of ``Barrier``
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-6, 1e3  # metres
@@ -65,8 +64,9 @@ ATTEMPTS: Final = (  # one after another, until a drive is found
     Attempt(0.25, 0.01, 0.001, afresh=True),
     Attempt(0.25, 0.03, 0.001, afresh=True),
 )
+PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
-FIRM_CONTACT_M: Final = 0.0005  # ... close to them, but hard
+FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
 FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the goal is used ...
 FIRM_PULL: Final = 30.0  # ... and no more
 
@@ -81,7 +81,7 @@ class _Drive(NamedTuple):
     scene: Scene
     circles: Floats
     soft: Hold  # at first
-    firm: Hold  # when little is left to gain
+    firm: tuple[Hold, ...]  # one after another when little is left to gain; the first while gaps are closed
     until: float  # of the clock
 
 
@@ -117,17 +117,19 @@ def quickest(
         the iterations used.
     """
     firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
+    close = firm._replace(strength=WEAKER * FIRM_STRENGTH, contact=WEAKER * FIRM_CONTACT_M)
     soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, hold, until)
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if is_near:
         number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], MOST_NEAR, most, NEVER)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
         number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, MOST_FIRST, most, NEVER)
+    drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
-        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS[:1], MOST_FIRST, most - used, below)
+        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS, MOST_FIRST, most - used, below)
         used += more
         if quicker is None:
             break
@@ -150,7 +152,8 @@ def _found(
 ) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    Time counts for ``first`` iterations of each. Only a drive of less than ``shorter_than`` steps will do.
+    Time counts for ``first`` iterations of each. Only a drive of less than ``shorter_than`` steps will do,
+    and after one attempt it has to promise much less.
     """
     model = around.model
     room = len(model.controls) - MORE_STEPS[-1]
@@ -179,7 +182,8 @@ def _found(
                 number, best = k, found
             else:
                 left[k] = guesses[k]
-        longest = math.inf if best is None else best.duration_s - vehicle.dt
+        promising = PROMISING * shorter_than * vehicle.dt
+        longest = promising if best is None else best.duration_s - vehicle.dt
         guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
         if not guesses or used >= most or working_clock() > drive.until:
             break
@@ -231,7 +235,7 @@ def _descend(
     Returns the length of a step, the iterations used, and a drive where time does not count and one is found.
     """
     model, interior = drive.model, drive.interior
-    hold = drive.soft if time_counts else drive.firm
+    hold, *later = (drive.soft, *drive.firm) if time_counts else (drive.firm[0],) * 2
     around = drive.scene, drive.circles
     counts = 1.0 if time_counts else 0.0
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
@@ -282,9 +286,10 @@ def _descend(
             damping = min(3.0 * damping, MOST_DAMPING)
         little = LITTLE_S * vehicle.max_speed + 10.0 * strength
         if share > 0.3 and abs(slope) < little and gaps_tried < 1e-3 * steps * vehicle.dt:
-            if time_counts and strength <= LAST_STRENGTH and gaps_tried < SMALL_GAPS:
+            if later:
+                strength, hold, cost = WEAKER * strength, later.pop(0), math.nan
+            elif time_counts and gaps_tried < SMALL_GAPS:
                 return vehicle.dt, iteration + 1, None
-            strength, hold, cost = max(WEAKER * strength, LAST_STRENGTH), drive.firm, math.nan
     return vehicle.dt, iterations, None if time_counts else _driven(drive, steps, vehicle)
 
 
