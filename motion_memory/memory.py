@@ -19,6 +19,7 @@ from planners.attempt import SUB_PLANS
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.recall import RECALLS, default_recall
+from planners.optimisation.polish import driven_near
 from planners.ranked_plans import RankedPlan, ranked_plans
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, solve
@@ -27,6 +28,7 @@ from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import checked_problem
 from planners.world.classes.families import families_of, family
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import (
     BOUNDS,
     CANONICAL_DISTANCE,
@@ -35,6 +37,7 @@ from planners.world.problem import (
     Plan,
     Problem,
     obstacles_of,
+    start_state,
 )
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -318,4 +321,7 @@ def _warmed(ready: Memory) -> Memory:
         )
     ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
     ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
+    slot = to_canonical(narrow.draw(0, 0))[0]
+    stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
+    driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # pressing, which few plans need
     return ready
