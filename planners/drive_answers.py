@@ -2,7 +2,8 @@
 
 The stored drive says which way to take: how often to change gear, and on which side to pass. The optimisation
 makes it free, exact and quick. That takes a few milliseconds; a search has to find the way first. If a drive
-takes much longer than it would without obstacles, it may be of the wrong kind, and a search looks for others.
+takes much longer than it would without obstacles, and than drives from nearby take, it may be of the wrong
+kind, and a search looks for others.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
-LONG: Final = 1.5  # times what it would take without obstacles: a drive that takes longer may not be the best
+# a drive may not be the best if it takes more than so many times ...
+LONG: Final = 1.5  # ... what it would take without obstacles, and ...
+UNUSUAL: Final = 1.15  # ... what the quickest stored drive takes of those that begin nearest
 
 
 class DriveAnswer(NamedTuple):
@@ -68,9 +71,9 @@ def drive_answer(
     start, goal = start_state(problem, vehicle), goal_of(problem)
     order = np.zeros(TRIED, np.int32)
     if blindly is None:
-        count, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
+        count, quickest, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
     else:
-        count, checks = min(TRIED, len(drives.plans)), 0
+        count, quickest, checks = min(TRIED, len(drives.plans)), 0, 0
         order[:count] = blindly.integers(-len(drives.plans), len(drives.plans), count)
     view.lap("recall")
     found = DriveAnswer(checks=int(checks))
@@ -83,7 +86,8 @@ def drive_answer(
         if polished.plan is not None:
             entry = entries[chosen]
             number = int(drives.plans[max(entry, -1 - entry)])
-            is_long = polished.plan.duration_s > LONG * _seconds_without_obstacles(start, goal, vehicle)
+            without = _seconds_without_obstacles(start, goal, vehicle)
+            is_long = polished.plan.duration_s > max(LONG * without, UNUSUAL * quickest * vehicle.dt)
             found = found._replace(plan=polished.plan, number=number, entry=entry, is_long=is_long)
             break
     view.lap("repair")

@@ -65,6 +65,7 @@ def test_if_a_drive_is_long_the_answer_is_never_longer_than_without_a_memory(
     slots: PlanLibrary, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drive_answers, "LONG", 0.0)
+    monkeypatch.setattr(drive_answers, "UNUSUAL", 0.0)
     moved = 0
     for number in range(12):
         problem = drawn("parallel", "hard", 7, number)

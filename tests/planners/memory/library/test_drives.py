@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.library.drives import FAR, TRIED, drives_of, moved_drive, rank_drives
+from planners.memory.library.drives import FAR, NEAREST, TRIED, drives_of, moved_drive, rank_drives
 from planners.memory.plans.plan_arrays import store_plans
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import scene_of
@@ -89,16 +89,22 @@ def test_only_drives_that_begin_near_are_ranked(seed: int, vehicle: Vehicle) -> 
     start = np.zeros(state_size(vehicle))
     start[:3] = 25.0, 25.0, rng.uniform(-3.0, 3.0)
     goal = goal_of_pose(*(start[:2] + rng.uniform(-3.0, 3.0, 2)), rng.uniform(-3.0, 3.0))
-    count, checks = rank_drives(drives, start, goal, order, vehicle, scene)
+    count, quickest, checks = rank_drives(drives, start, goal, order, vehicle, scene)
     body = vehicle.front + vehicle.rear
     assert (count == 0) == (checks == 0)
-    for entry in order[:count].tolist():
+    near = []
+    for entry in range(-len(plans), len(plans)):
         number, side = (entry, 1.0) if entry >= 0 else (-1 - entry, -1.0)
         first = drives.states[drives.starts[number]]
         begins = placed(first[np.newaxis], (goal[0], goal[1], goal[3]), side)[0]
         off = math.dist(begins[:2], start[:2]) / body + abs(math.remainder(begins[2] - start[2], math.tau))
-        assert off + np.abs(begins[5:] - start[5:]).sum() <= FAR
-    assert len(set(order[:count].tolist())) == count
+        off += np.abs(begins[5:] - start[5:]).sum()
+        if off < FAR:
+            near.append((off, len(plans[number].controls), entry))
+    near.sort()
+    assert {*order[:count].tolist()} <= {entry for *_, entry in near}
+    assert len(set(order[:count].tolist())) == count == min(len(near), TRIED)
+    assert quickest == min((steps for _, steps, _ in near[:NEAREST]), default=0)
 
 
 def test_drives_that_do_not_end_at_rest_are_left_out() -> None:
