@@ -124,9 +124,9 @@ def kind_of(folder: Path, *kinds: str) -> str:
     for kind in kinds:
         if (folder / f"{kind}.json").is_file():
             return kind
-    if not folder.exists():
-        raise StorageError(f"{folder} does not exist; check the path.")
     named = " and no ".join(kinds)
+    if not folder.exists():
+        raise StorageError(f"{folder} does not exist, so it holds no {named}; check the path or build one.")
     headers = " and no ".join(f"{kind}.json" for kind in kinds)
     raise StorageError(f"{folder} holds no {named} (it has no {headers}); check the path or build one.")
 
