@@ -26,9 +26,9 @@ from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
-# a drive may not be the best if it takes more than so many times ...
-LONG: Final = 1.5  # ... what it would take without obstacles, and ...
-UNUSUAL: Final = 1.15  # ... what the quickest stored drive takes of those that begin nearest
+# A drive may not be the best if it takes longer than both of these allow.
+LONG: Final = 1.5  # times what it would take without obstacles
+UNUSUAL: Final = 1.15  # times what the quickest of the stored drives takes that begin nearest
 
 
 class DriveAnswer(NamedTuple):

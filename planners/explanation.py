@@ -100,6 +100,8 @@ def drive_found(
         return None
     library = memory.library if isinstance(memory, Memory) else memory
     answer = drive_answer(library, View(problem), vehicle, math.inf)
+    if answer.plan is None or attempt.recalled != (answer.number,):
+        return None
     return MovedDrive(answer, placed_drive(library.drives, answer.entry, goal_of(problem), vehicle.dt))
 
 

@@ -15,7 +15,7 @@ from dashboards.cells import NOTHING, CellTable, decimal
 from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from planners.world.classes.problem_classes import DIFFICULTIES
-from storage.archives.libraries import how_gathered, save_library
+from storage.archives.libraries import how_gathered, load_library, save_library
 from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
@@ -114,6 +114,7 @@ def gather(
     request = GatherRequest(tuple(sources), out, plans, poses, difficulty, settings)
     asked, gathered = request.asked, how_gathered(out)  # StorageError if a source is missing
     if gathered is not None and gathered["asked"] == asked:
+        load_library(out, settings.vehicle)  # StorageError if it is damaged
         _LOG.info("%s holds these plans already; remove it to gather them again.", out)
         counts = [SourceCounts(**each) for each in gathered["sources"]]
     else:

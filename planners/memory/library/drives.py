@@ -25,7 +25,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
-NEAREST: Final = 10  # of them: what the quickest of these takes, a drive as asked may take
+NEAREST: Final = 10  # of them: the quickest of these sets what is usual
 FAR: Final = 1.5  # lengths and radians together by which a drive may begin elsewhere
 LOOK: Final = 3  # every so many states a moved drive is looked at
 SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
@@ -117,7 +117,8 @@ def rank_drives(
         scene: what must not be met.
 
     Returns:
-        How many there are, the steps of the quickest of the ``NEAREST``, and how many states were checked.
+        How many there are, the steps of the quickest of the ``NEAREST`` (0 if there are fewer), and how many
+        states were checked.
     """
     size = start.shape[0]
     near = np.empty(NEAR, np.int64)
@@ -157,6 +158,8 @@ def rank_drives(
         if n == 0 or (n < NEAREST and steps < quickest):
             quickest = steps
         promises[n] = (steps + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
+    if count < NEAREST:
+        quickest = 0  # a few drives say nothing about what is usual
     best = np.argsort(promises[:count])
     count = min(count, TRIED)
     for n in range(count):

@@ -19,7 +19,7 @@ LEVELS: Final = (
     (2000, Outward(cell=0.2, headings=64, greed=6.0), 12.0),
     (5000, Outward(cell=0.1, headings=64, greed=12.0, worst=True), 12.0),
     (10000, Outward(cell=0.05, headings=96, greed=12.0), 12.0),
-    (5000, Outward(cell=0.02, headings=128, greed=12.0, worst=True), 12.0),
+    (1 << 30, Outward(cell=0.02, headings=128, greed=12.0, worst=True), 12.0),
     (1 << 30, Outward(cell=0.05, headings=1024, greed=12.0, worst=True, stride=0.2, marks=INCHES), 12.0),
 )
 CROWDING: Final = 0.5  # with trailers: there are many more states that hardly differ

@@ -123,6 +123,8 @@ def test_a_repeated_command_does_nothing_and_tells_the_same(
         assert told[1]["lines"] != []
     for change in (["--seed", "2"], ["--plans", "1"], ["--poses", "0.5"], ["--vehicle", "car-1-trailer"]):
         assert call([*asked, *change]) == 2
+    (Path("library-3") / "controls.npy").unlink()
+    assert call(asked) == 1  # a damaged library is not said to be there
     write_problems(Path("asked.jsonl"), [strewn(1, 10)])
     assert call(asked) == 2
 
