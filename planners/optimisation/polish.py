@@ -30,7 +30,7 @@ ARRIVING_ITERATIONS: Final = 700  # where a drive must arrive as asked; some 60 
 GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
-MUCH: Final = 0.97  # of its steps: who is pressed to so few may get quicker from there
+MUCH: Final = 0.97  # of its steps: a drive that is pressed to so few may get quicker from there
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
 # strength, range and least gain in metres: obstacles push from far and softly first, then only close to them

@@ -199,7 +199,7 @@ def moved_drive(drives: Drives, entry: int, start: Floats, goal: Floats, dt: flo
 
 
 def placed_drive(drives: Drives, entry: int, goal: Floats, dt: float) -> Plan:
-    """Put a drive to a goal as it was driven, or as in a mirror: it ends there, and begins anywhere.
+    """Put a drive to a goal as it was driven, or as in a mirror: it ends there, wherever it then begins.
 
     The arguments are those of ``moved_drive``.
     """

@@ -25,7 +25,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 Placing = tuple[float, float, float, float]  # where a sub-plan begins: x, y, heading; -1 if it is mirrored
 NEAR_M: Final = 1.5  # on about this way a gap beside the sub-plan is closed
-SLACK_M: Final = 0.2  # who is farther behind or ahead of the sub-plan waits for it or skips a state
+SLACK_M: Final = 0.2  # a vehicle farther behind or ahead of the sub-plan waits for it or skips a state
 BLOCKED, ENDED, ARRIVED = range(3)  # how a drive along a sub-plan ended
 SMALL: Final = 0.05  # a bend at which curvature is proportional to it
 

@@ -235,7 +235,8 @@ def _descend(
     Returns the length of a step, the iterations used, and a drive where time does not count and one is found.
     """
     model, interior = drive.model, drive.interior
-    hold, *later = (drive.soft, *drive.firm) if time_counts else (drive.firm[0],) * 2
+    # each begins with less strength than the one before, so that of closing gaps comes twice
+    hold, *later = (drive.soft, *drive.firm) if time_counts else (drive.firm[0], drive.firm[0])
     around = drive.scene, drive.circles
     counts = 1.0 if time_counts else 0.0
     strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH

@@ -12,7 +12,7 @@ from planners.world.arrays import Floats
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
-STANDING_M: Final = 1e-6  # who drives less in a step stands
+STANDING_M: Final = 1e-6  # a step that is shorter stands still
 SPEED_SHARE: Final = 0.98  # of full speed
 ACCELERATION_SHARE: Final = 0.95  # of the largest acceleration
 FINE: Final = 200  # pieces of a run for which its time is summed up

@@ -17,7 +17,7 @@ FINE: Final = 5  # so many looks where the way is narrow, each with a smaller ma
 def top_speed(gear: float, bend: float, vehicle: Vehicle) -> float:
     """The largest speed (m/s) in a gear and a bend; 0 or less if the vehicle does not drive in that gear."""
     top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
-    if bend != 0.0 and turn_in(bend, 0.0, vehicle) != bend:  # who turns by driving
+    if bend != 0.0 and turn_in(bend, 0.0, vehicle) != bend:  # it turns by driving
         top = min(top, turn_limit(vehicle) / abs(curvature_of(bend, vehicle)))
     return float(top)
 
@@ -26,7 +26,8 @@ def top_speed(gear: float, bend: float, vehicle: Vehicle) -> float:
 def stride_of(gear: float, vehicle: Vehicle) -> float:
     """The metres from one look to the next: no more than are driven in a step at full speed.
 
-    Who cannot stand drives whole steps at its least speed. Vehicles may be those that drive out of a goal.
+    A vehicle that cannot stand drives whole steps at its least speed. Vehicles may be those that drive out of
+    a goal.
     """
     least = max(vehicle.min_speed, -vehicle.max_speed)
     if least > 0.0:

@@ -113,7 +113,7 @@ def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
     state = load(drive.states, drive.counts[0], vehicle)
     store(c.states, 0, state)
     if turn_in(bend, 0.0, vehicle) != bend:
-        return 0  # who turns by driving
+        return 0  # it turns by driving
     limit = control_limits(vehicle)[1] * vehicle.dt
     steps = max(math.ceil(abs(bend - state[4]) / limit - ROUNDING), 0)
     if steps > c.controls.shape[0]:

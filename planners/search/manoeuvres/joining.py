@@ -31,7 +31,7 @@ NUDGE: Final = 1e-5  # of a bend (rad) and of a length (m), to see what they do
 DAMPING: Final = 1e-7
 COARSE: Final = 4.0  # strides of a step here: nothing is looked at
 EXACT: Final = 1e-5  # metres and radians
-WIDEST: Final = 0.5  # radians or metres: who is farther off is not corrected
+WIDEST: Final = 0.5  # radians or metres: what is farther off is not corrected
 # indices into Join.counts
 ARCS, BEFORE = range(2)
 

@@ -9,8 +9,8 @@ from planners.search.manoeuvres.outward import Outward
 from planners.search.manoeuvres.variants import word_radius
 from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Vehicle
 
-# strides after which an arc may end where there is only room to turn by a degree: who swings out far behind
-# the wheels leaves a wall by many such arcs
+# ``marks`` where there is only room to turn by a degree: a body that swings out far behind its wheels leaves
+# a wall by many such arcs
 INCHES: Final = (0.5, 1.5, 4.0, 10.0, 30.0, 80.0)
 # for how many expansions, unless nothing is left before, and the greed with trailers
 LEVELS: Final = (
@@ -29,12 +29,12 @@ SPOT: Final = 0.25  # of a body's length: the radius in which it turns nearly on
 def suited(number: int, vehicle: Vehicle) -> Outward:
     """A level, with the bends that suit a vehicle.
 
-    With trailers these are bends in which they follow for long, and the tightest, in which they fold. Who can
-    turn on the spot nearly does so, too: words turn as widely as at full speed.
+    With trailers these are bends in which they follow for long, and the tightest, in which they fold. A
+    vehicle that can turn on the spot nearly does so, too: words turn as widely as at full speed.
     """
     _, level, greed = LEVELS[number]
     if vehicle.min_speed > 0.0:
-        level = level._replace(stride=1.0)  # who cannot stand drives whole steps
+        level = level._replace(stride=1.0)  # what cannot stand drives whole steps
     if isinstance(vehicle, CarWithTrailers):
         share = math.atan(vehicle.wheelbase / word_radius(vehicle)) / vehicle.max_steering
         return level._replace(bends=(1.0, share, 0.0, -share, -1.0), greed=greed, crowding=CROWDING)

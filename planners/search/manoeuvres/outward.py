@@ -46,7 +46,7 @@ class Outward(NamedTuple):
 
     bends: tuple[float, ...] = (1.0, 0.0, -1.0)  # shares of the tightest
     stride: float = 1.0  # share of ``stride_of`` from one look to the next
-    marks: tuple[float, ...] = (3.0, 8.0, 15.0, 30.0, 50.0, 80.0)  # strides after which an arc may end
+    marks: tuple[float, ...] = (3.0, 8.0, 15.0, 30.0, 50.0, 80.0)  # times ``STRIDE``: where arcs may end
     cell: float = 0.05  # side of a cell
     headings: int = 96  # cells of headings, ``MOST_HEADINGS`` at most
     greed: float = 1.5  # weight of the time from the start

@@ -9,7 +9,7 @@ from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
 
 ROUNDING: Final = 1e-9
-SLOWEST: Final = 0.5  # of what one step changes: who may not drive faster than that is about to arrive
+SLOWEST: Final = 0.5  # of what one step changes: what may not drive faster than that is about to arrive
 
 
 @inlined

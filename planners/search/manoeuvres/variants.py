@@ -10,8 +10,8 @@ from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, trailers_of
 
 HITCH_SHARE: Final = 0.8  # of the largest hitch: what a word bends a trailer at most for long
-UNFOLDED: Final = 0.01  # radians: who drives an arc more slowly than the tree may fold so much sooner
-SLOWLY: Final = 1.1  # times the least speed of who cannot stand, so that arcs take whole steps
+UNFOLDED: Final = 0.01  # radians: a train that is slower than the tree may fold so much sooner
+SLOWLY: Final = 1.1  # times the least speed of what cannot stand, so that arcs take whole steps
 
 
 def time_reversed(vehicle: Vehicle) -> Vehicle:
@@ -27,7 +27,7 @@ def at_its_slowest(vehicle: Vehicle) -> Vehicle:
 
 
 def less_folded(vehicle: Vehicle, ends: Floats) -> Vehicle:
-    """The vehicle as trees grow, with hitches that fold a little less far than those of who drives.
+    """The vehicle as trees grow: hitches fold a little less far than those of the vehicle that drives.
 
     ``ends [H]`` are the largest angles at start and goal, to which they fold in any case.
     """

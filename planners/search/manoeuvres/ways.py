@@ -19,7 +19,7 @@ from planners.world.trigonometry import wrapped
 from planners.world.vehicles.vehicle import Vehicle
 
 KEPT: Final = 2  # drives of different kinds: with a third, drives are no shorter by what it takes
-STRAIGHT: Final = 0.3  # radians: who turns less in one gear drives straight on
+STRAIGHT: Final = 0.3  # radians: a part in one gear that turns less leads straight on
 MOST_LEGS: Final = 512
 
 
