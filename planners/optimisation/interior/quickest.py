@@ -45,6 +45,8 @@ MOST_FIRST: Final = 60  # iterations while time counts ...
 MOST_NEAR: Final = 30  # ... of what is nearly optimal: if it takes longer it is mostly in vain
 MOST_LAST: Final = 15  # and of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
+SHORT: Final = 0.9  # of a step of the vehicle: steps that are shorter are divided anew ...
+DIVISIONS: Final = 3  # ... so often at most, the first included
 NEVER: Final = 1 << 30  # steps
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
 
@@ -167,12 +169,8 @@ def _found(
         )
         for k in guesses:
             guess = given[k] if attempt.afresh else guesses[k]
-            steps = len(guess.controls)
-            _fill(drive, guess, given[k].states[0])
-            left_for_it = min(first, most - used)
-            dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, left_for_it)
+            guesses[k], spent = _shortened(drive, guess, given[k].states[0], vehicle, first, most - used)
             used += spent
-            guesses[k] = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
         left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
             below = shorter_than if best is None else len(best.controls)
@@ -188,6 +186,30 @@ def _found(
         if not guesses or used >= most or working_clock() > drive.until:
             break
     return number, best, used
+
+
+def _shortened(
+    drive: _Drive, guess: Plan, start: Floats, vehicle: Vehicle, first: int, most: int
+) -> tuple[Plan, int]:
+    """Change a guess while time counts, until its steps are hardly shorter than the vehicle's.
+
+    Obstacles keep off by what is driven in a step, and speeds change by step: what fits between obstacles in
+    half steps does not in whole ones. Returns the iterations used, too, ``first`` at most for each division.
+    """
+    used = 0
+    for division in range(DIVISIONS):
+        if division > 0:
+            guess = resampled(guess, max(math.ceil(guess.duration_s / vehicle.dt), 1))
+        steps = len(guess.controls)
+        _fill(drive, guess, start)
+        iterations = min(first, most - used)
+        dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, iterations)
+        used += spent
+        model = drive.model
+        guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
+        if dt > SHORT * vehicle.dt or used >= most:
+            break
+    return guess, used
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:

@@ -10,6 +10,7 @@ import pytest
 from planners.search.manoeuvres import manoeuvring
 from planners.search.query import Limits
 from planners.search.registry import plan
+from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import Family, family
@@ -48,12 +49,22 @@ def test_the_narrowest_slots_are_reached_too(name: str, number: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "number"), [("forklift", 0), ("forklift", 2), ("bus", 4), ("bus", 12)])
-def test_who_swings_out_behind_the_wheels_leaves_a_kerb_degree_by_degree(name: str, number: int) -> None:
+def test_a_body_that_swings_out_behind_leaves_a_kerb_degree_by_degree(name: str, number: int) -> None:
     vehicle = said_vehicle(f"docs/vehicles/{name}.yaml")
     problem = to_canonical(family("parallel", "standard", vehicle).draw(91, number))[0]
     found = plan("lattice", problem, generator(0), limits=Limits(expansions=12_000), vehicle=vehicle).plan
     assert found is not None
     assert faults(problem, found, vehicle) == []
+
+
+@pytest.mark.parametrize("number", [2, 43, 47])
+def test_a_quick_small_robot_does_not_creep_into_a_slot(number: int) -> None:
+    vehicle = said_vehicle("docs/vehicles/jackal.yaml")
+    problem = to_canonical(family("parallel", "standard", vehicle).draw(5, number))[0]
+    found = solve(problem, "lattice", vehicle=vehicle).plan
+    assert found is not None
+    assert faults(problem, found, vehicle) == []
+    assert found.duration_s < 5.0  # it crept for 18 to 21 s where a drive fitted in half steps only
 
 
 def test_the_same_question_has_the_same_answer() -> None:
