@@ -6,6 +6,7 @@ again, and only its gaps are closed. What its controls lead to is the answer if 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -21,7 +22,7 @@ from planners.optimisation.interior.buffers import (
 from planners.optimisation.interior.costs import Hold, present_cost, try_change
 from planners.optimisation.interior.drivable import driven
 from planners.optimisation.interior.newton import direction
-from planners.optimisation.interior.retiming import retimed
+from planners.optimisation.interior.retiming import retimed, slowed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
@@ -45,6 +46,7 @@ MOST_FIRST: Final = 60  # iterations while time counts ...
 MOST_NEAR: Final = 30  # ... of what is nearly optimal: if it takes longer it is mostly in vain
 MOST_LAST: Final = 15  # and of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
+SLACK: Final = (1.15, 1.3, 1.6)  # times that, if none of these can be driven
 SHORT: Final = 0.9  # of a step of the vehicle: steps that are shorter are divided anew ...
 DIVISIONS: Final = 3  # ... so often at most, the first included
 NEVER: Final = 1 << 30  # steps
@@ -84,6 +86,7 @@ class _Drive(NamedTuple):
     circles: Floats
     soft: Hold  # at first
     firm: tuple[Hold, ...]  # one after another when little is left to gain; the first while gaps are closed
+    slack: tuple[float, ...]  # times the time that was found, tried if it cannot be driven in little more
     until: float  # of the clock
 
 
@@ -121,14 +124,15 @@ def quickest(
     firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
     close = firm._replace(strength=WEAKER * FIRM_STRENGTH, contact=WEAKER * FIRM_CONTACT_M)
     soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
+    slack = () if is_near else SLACK
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), slack, until)
     most = iterations * len(given)
     if is_near:
         number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], MOST_NEAR, most, NEVER)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
         number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, MOST_FIRST, most, NEVER)
-    drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
+    drive = drive._replace(firm=(hold, hold._replace(barrier=close)), slack=())
     while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
         _, quicker, more = _found(again, drive, vehicle, ATTEMPTS, MOST_FIRST, most - used, below)
@@ -225,17 +229,21 @@ def _in_whole_steps(
 ) -> tuple[Plan | None, int]:
     """Divide a guess into less than ``below`` steps of the vehicle's length and close its gaps.
 
+    Little time is added at first, then much: a drive that fits nowhere at full speed does when it is slower.
     Returns a drive, if there is one, and the iterations used.
     """
     used = 0
     least = max(math.ceil(guess.duration_s / vehicle.dt - LITTLE_LONGER), 1)
-    for more in MORE_STEPS:
-        steps = least + more
+    quick = (resampled(guess, least + more) for more in MORE_STEPS)
+    longer = (math.ceil(slack * guess.duration_s / vehicle.dt) for slack in drive.slack)
+    slow = (slowed(resampled(guess, steps), vehicle) for steps in longer)
+    for tried in itertools.chain(quick, slow):
+        steps = len(tried.controls)
         if min(len(drive.model.controls), below - 1) < steps or used >= iterations:
             break
         if working_clock() > drive.until:
             break
-        _fill(drive, resampled(guess, steps), guess.states[0])
+        _fill(drive, tried, guess.states[0])
         _, spent, found = _descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
         used += spent
         if found is not None:

@@ -57,14 +57,22 @@ def test_a_body_that_swings_out_behind_leaves_a_kerb_degree_by_degree(name: str,
     assert faults(problem, found, vehicle) == []
 
 
-@pytest.mark.parametrize("number", [2, 43, 47])
-def test_a_quick_small_robot_does_not_creep_into_a_slot(number: int) -> None:
-    vehicle = said_vehicle("docs/vehicles/jackal.yaml")
-    problem = to_canonical(family("parallel", "standard", vehicle).draw(5, number))[0]
+@pytest.mark.parametrize(
+    ("name", "difficulty", "seed", "number", "seconds"),
+    [
+        *(("jackal", "standard", 5, number, 5.0) for number in (2, 43, 47)),  # 18 to 21, in half steps only
+        *(("turtlebot", "hard", 92, number, 15.0) for number in (5, 17, 19)),  # 42 to 56, at full speed only
+    ],
+)
+def test_a_small_robot_does_not_creep_into_a_slot_where_a_drive_nearly_fits(
+    name: str, difficulty: str, seed: int, number: int, seconds: float
+) -> None:
+    vehicle = said_vehicle(f"docs/vehicles/{name}.yaml")
+    problem = to_canonical(family("parallel", difficulty, vehicle).draw(seed, number))[0]
     found = solve(problem, "lattice", vehicle=vehicle).plan
     assert found is not None
     assert faults(problem, found, vehicle) == []
-    assert found.duration_s < 5.0  # it crept for 18 to 21 s where a drive fitted in half steps only
+    assert found.duration_s < seconds
 
 
 def test_the_same_question_has_the_same_answer() -> None:
