@@ -6,7 +6,6 @@ again, and only its gaps are closed. What its controls lead to is the answer if 
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -22,7 +21,7 @@ from planners.optimisation.interior.buffers import (
 from planners.optimisation.interior.costs import Hold, present_cost, try_change
 from planners.optimisation.interior.drivable import driven
 from planners.optimisation.interior.newton import direction
-from planners.optimisation.interior.retiming import retimed, slowed
+from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
@@ -42,13 +41,9 @@ LITTLE_S: Final = 0.05  # seconds to gain, with which a stage ends
 SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radians and more
 NO_GAPS: Final = 1e-6  # their sum when the last part cannot close them better ...
 NO_GAIN: Final = 1e-2  # ... if so little is left to gain, in metres
-MOST_FIRST: Final = 60  # iterations while time counts ...
-MOST_NEAR: Final = 30  # ... of what is nearly optimal: if it takes longer it is mostly in vain
-MOST_LAST: Final = 15  # and of each attempt to close gaps
+MOST_LAST: Final = 15  # iterations of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
-SLACK: Final = (1.15, 1.3, 1.6)  # times that, if none of these can be driven
-SHORT: Final = 0.9  # of a step of the vehicle: steps that are shorter are divided anew ...
-DIVISIONS: Final = 3  # ... so often at most, the first included
+SHORT: Final = 0.9  # of a step of the vehicle: a drive whose steps are shorter is divided into fewer
 NEVER: Final = 1 << 30  # steps
 LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
 
@@ -68,6 +63,20 @@ ATTEMPTS: Final = (  # one after another, until a drive is found
     Attempt(0.25, 0.01, 0.001, afresh=True),
     Attempt(0.25, 0.03, 0.001, afresh=True),
 )
+
+
+class Effort(NamedTuple):
+    """What is done for a drive."""
+
+    attempts: tuple[Attempt, ...]
+    first: int  # iterations while time counts, for each division into steps
+    divisions: int  # into steps, as long as these are short
+    longer: tuple[float, ...]  # times the time that was found are tried when ``MORE_STEPS`` do not help
+
+
+WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.15, 1.3, 1.6))
+ONWARD: Final = WHOLE._replace(longer=())  # of a drive that has been found
+NEAR: Final = Effort(ATTEMPTS[:1], 30, 1, ())  # of what is nearly optimal: more is mostly in vain
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
@@ -86,7 +95,6 @@ class _Drive(NamedTuple):
     circles: Floats
     soft: Hold  # at first
     firm: tuple[Hold, ...]  # one after another when little is left to gain; the first while gaps are closed
-    slack: tuple[float, ...]  # times the time that was found, tried if it cannot be driven in little more
     until: float  # of the clock
 
 
@@ -124,18 +132,17 @@ def quickest(
     firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
     close = firm._replace(strength=WEAKER * FIRM_STRENGTH, contact=WEAKER * FIRM_CONTACT_M)
     soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    slack = () if is_near else SLACK
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), slack, until)
+    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if is_near:
-        number, best, used = _found(given, drive, vehicle, ATTEMPTS[:1], MOST_NEAR, most, NEVER)
+        number, best, used = _found(given, drive, vehicle, NEAR, most, NEVER)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
-        number, best, used = _found(guesses, drive, vehicle, ATTEMPTS, MOST_FIRST, most, NEVER)
-    drive = drive._replace(firm=(hold, hold._replace(barrier=close)), slack=())
+        number, best, used = _found(guesses, drive, vehicle, WHOLE, most, NEVER)
+    drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
-        _, quicker, more = _found(again, drive, vehicle, ATTEMPTS, MOST_FIRST, most - used, below)
+        _, quicker, more = _found(again, drive, vehicle, ONWARD, most - used, below)
         used += more
         if quicker is None:
             break
@@ -151,14 +158,13 @@ def _found(
     given: Sequence[Plan],
     around: _Drive,
     vehicle: Vehicle,
-    attempts: Sequence[Attempt],
-    first: int,
+    effort: Effort,
     most: int,
     shorter_than: int,
 ) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    Time counts for ``first`` iterations of each. Only a drive of less than ``shorter_than`` steps will do,
+    Only a drive of less than ``shorter_than`` steps will do,
     and after one attempt it has to promise much less.
     """
     model = around.model
@@ -166,19 +172,19 @@ def _found(
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used = 0
     number, best = -1, None
-    for attempt in attempts:
+    for attempt in effort.attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
         for k in guesses:
             guess = given[k] if attempt.afresh else guesses[k]
-            guesses[k], spent = _shortened(drive, guess, given[k].states[0], vehicle, first, most - used)
+            guesses[k], spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
             used += spent
         left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
             below = shorter_than if best is None else len(best.controls)
-            found, spent = _in_whole_steps(drive, guesses[k], vehicle, below, most - used)
+            found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below, most - used)
             used += spent
             if found is not None:
                 number, best = k, found
@@ -192,21 +198,21 @@ def _found(
     return number, best, used
 
 
-def _shortened(
-    drive: _Drive, guess: Plan, start: Floats, vehicle: Vehicle, first: int, most: int
+def _quickened(
+    drive: _Drive, guess: Plan, start: Floats, vehicle: Vehicle, effort: Effort, most: int
 ) -> tuple[Plan, int]:
     """Change a guess while time counts, until its steps are hardly shorter than the vehicle's.
 
     Obstacles keep off by what is driven in a step, and speeds change by step: what fits between obstacles in
-    half steps does not in whole ones. Returns the iterations used, too, ``first`` at most for each division.
+    half steps does not in whole ones. Returns the iterations used, too.
     """
     used = 0
-    for division in range(DIVISIONS):
+    for division in range(effort.divisions):
         if division > 0:
-            guess = resampled(guess, max(math.ceil(guess.duration_s / vehicle.dt), 1))
+            guess = resampled(guess, _whole_steps(guess.duration_s, vehicle))
         steps = len(guess.controls)
         _fill(drive, guess, start)
-        iterations = min(first, most - used)
+        iterations = min(effort.first, most - used)
         dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, iterations)
         used += spent
         model = drive.model
@@ -214,6 +220,10 @@ def _shortened(
         if dt > SHORT * vehicle.dt or used >= most:
             break
     return guess, used
+
+
+def _whole_steps(seconds: float, vehicle: Vehicle) -> int:
+    return max(math.ceil(seconds / vehicle.dt - LITTLE_LONGER), 1)
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:
@@ -225,25 +235,22 @@ def _drawn_in(goal: Floats, share: float) -> Floats:
 
 
 def _in_whole_steps(
-    drive: _Drive, guess: Plan, vehicle: Vehicle, below: int, iterations: int
+    drive: _Drive, guess: Plan, vehicle: Vehicle, effort: Effort, below: int, iterations: int
 ) -> tuple[Plan | None, int]:
     """Divide a guess into less than ``below`` steps of the vehicle's length and close its gaps.
 
-    Little time is added at first, then much: a drive that fits nowhere at full speed does when it is slower.
-    Returns a drive, if there is one, and the iterations used.
+    Few steps more are tried at first, then many: what cannot be driven at full speed can more slowly. Returns
+    a drive, if there is one, and the iterations used.
     """
     used = 0
-    least = max(math.ceil(guess.duration_s / vehicle.dt - LITTLE_LONGER), 1)
-    quick = (resampled(guess, least + more) for more in MORE_STEPS)
-    longer = (math.ceil(slack * guess.duration_s / vehicle.dt) for slack in drive.slack)
-    slow = (slowed(resampled(guess, steps), vehicle) for steps in longer)
-    for tried in itertools.chain(quick, slow):
-        steps = len(tried.controls)
+    few = [_whole_steps(guess.duration_s, vehicle) + more for more in MORE_STEPS]
+    many = [_whole_steps(share * guess.duration_s, vehicle) for share in effort.longer]
+    for steps in (*few, *(each for each in many if each > few[-1])):
         if min(len(drive.model.controls), below - 1) < steps or used >= iterations:
             break
         if working_clock() > drive.until:
             break
-        _fill(drive, tried, guess.states[0])
+        _fill(drive, resampled(guess, steps), guess.states[0])
         _, spent, found = _descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
         used += spent
         if found is not None:

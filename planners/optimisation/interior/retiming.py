@@ -1,4 +1,4 @@
-"""Guesses for an optimisation: the way of a drive, as quickly as limits allow, or more slowly."""
+"""A guess for an optimisation: the way of a drive, as quickly as speeds and accelerations allow."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from typing import Final
 import numpy as np
 
 from planners.world.arrays import Floats
-from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import control_limits
-from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 
 STANDING_M: Final = 1e-6  # a step that is shorter stands still
 SPEED_SHARE: Final = 0.98  # of full speed
@@ -42,15 +41,6 @@ def retimed(states: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
     found = np.concatenate(guess)
     limits = np.array(control_limits(vehicle))
     return found, np.clip(np.diff(found[:, 3:5], axis=0) / vehicle.dt, -limits, limits)
-
-
-def slowed(guess: Plan, vehicle: Vehicle) -> Plan:
-    """The same way in steps of the vehicle's length, more slowly if these are longer than the guess's."""
-    states = guess.states.copy()
-    states[:, 3] *= guess.dt / vehicle.dt
-    if isinstance(vehicle, DifferentialDrive):
-        states[:, 4] *= guess.dt / vehicle.dt  # a turn rate; a car's wheels stay as they are
-    return Plan(states, np.diff(states[:, 3:5], axis=0) / vehicle.dt, vehicle.dt)
 
 
 def _run(

@@ -17,7 +17,7 @@ from planners.optimisation.interior.costs import SPEED_OFF, Hold, try_change
 from planners.optimisation.interior.drivable import at_asked_speed
 from planners.optimisation.interior.drivable import driven as driven_after
 from planners.optimisation.interior.newton import direction
-from planners.optimisation.interior.retiming import retimed, slowed
+from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
 from planners.optimisation.polish import polish
 from planners.world.arrays import Floats
@@ -272,20 +272,6 @@ def test_a_retimed_drive_goes_the_same_way_within_all_limits(turns: int, waits: 
     assert (states[:, 3] >= CAR.min_speed).all()
     apart = np.hypot(*(states[:, None, :2] - plan.states[None, :, :2]).transpose(2, 0, 1)).min(axis=1)
     assert apart.max() <= CAR.dt * CAR.max_speed
-
-
-@settings(max_examples=20, deadline=None)
-@given(
-    name=st.sampled_from(["car", "differential-drive"]), turns=st.integers(1, 5), share=st.floats(0.3, 1.0)
-)
-def test_a_slowed_drive_goes_the_same_way_in_whole_steps(name: str, turns: int, share: float) -> None:
-    vehicle = {"car": CAR, "differential-drive": DIFFERENTIAL_DRIVE}[name]
-    short = vehicle._replace(dt=share * vehicle.dt)
-    states = simulate(start_state(problem_of([]), vehicle), manoeuvre(turns), short)
-    slow = slowed(Plan(states, manoeuvre(turns), short.dt), vehicle)
-    assert slow.duration_s == pytest.approx(len(manoeuvre(turns)) * vehicle.dt)
-    assert np.allclose(slow.states[:, :3], states[:, :3])
-    assert np.allclose(simulate(slow.states[0], slow.controls, vehicle), slow.states, atol=1e-9)
 
 
 @settings(max_examples=50, deadline=None)
