@@ -62,9 +62,7 @@ def test_a_body_that_swings_out_behind_leaves_a_kerb_degree_by_degree(name: str,
     [
         *(("jackal", "standard", 5, number, 5.0) for number in (2, 43, 47)),  # 18 to 21 without both ways
         ("jackal", "hard", 93, 4, 10.0),  # 34 where it fits in half steps only
-        *(
-            ("turtlebot", "hard", 92, number, 15.0) for number in (5, 17, 19)
-        ),  # 42 to 56 where it is too quick
+        *(("turtlebot", "hard", 92, number, 15.0) for number in (5, 17, 19)),  # 42 to 56 at full speed
     ],
 )
 def test_a_small_robot_does_not_creep_into_a_slot_where_a_drive_nearly_fits(
