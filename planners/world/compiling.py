@@ -72,7 +72,7 @@ class _Told(_Listener):
     def _tell(self) -> None:
         if not self._is_told and self.seconds + time.monotonic() - self._began >= TOLD_AFTER:
             self._is_told = True
-            _LOG.info("Compiling the planners for this machine, once: may take some 30 s.")
+            _LOG.info("Compiling what this needs for this kind of vehicle, once: may take some 30 s.")
 
 
 _told: list[_Told] = []
