@@ -19,7 +19,7 @@ from tasks.attempts.compile_assists import EMPTY
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", ["car", "car-1-trailer"])
+@pytest.mark.parametrize("name", ["car", pytest.param("car-1-trailer", marks=pytest.mark.slow)])
 def test_no_question_needs_a_kernel_that_loading_did_not(name: str, tmp_path: Path) -> None:
     vehicle = VEHICLES[name]
     slot = to_canonical(family(families_of(vehicle)[0], "easy", vehicle).draw(1, 0))[0]
