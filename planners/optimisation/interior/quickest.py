@@ -164,8 +164,8 @@ def _found(
 ) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    Only a drive of less than ``shorter_than`` steps will do,
-    and after one attempt it has to promise much less.
+    Only a drive of less than ``shorter_than`` steps will do, and after one attempt it has to promise much
+    less.
     """
     model = around.model
     room = len(model.controls) - MORE_STEPS[-1]
