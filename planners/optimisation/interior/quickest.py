@@ -13,14 +13,9 @@ from typing import Final, NamedTuple
 from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.guesses import resampled
-from planners.optimisation.interior.buffers import (
-    Interior,
-    accept_change,
-    begin_inside,
-)
-from planners.optimisation.interior.costs import Hold, present_cost, try_change
-from planners.optimisation.interior.drivable import driven
-from planners.optimisation.interior.newton import direction
+from planners.optimisation.interior.buffers import Interior
+from planners.optimisation.interior.costs import Hold
+from planners.optimisation.interior.descending import WEAKER, Drive, descend, fill
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
@@ -30,22 +25,12 @@ from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 
-FIRST_STRENGTH: Final = 3e-3  # metres, of the barrier at limits ...
-WEAKER: Final = 0.1  # ... times this with each hold that follows when little is left to gain
-LAST_STEPS_STRENGTH: Final = 1e-3  # while only gaps are closed
 RANGE_M: Final = 0.3  # of obstacles, as of ``Barrier``
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-6, 1e3  # metres
-TRIES: Final = 8  # shares of a change that are tried
-IN_VAIN: Final = 5  # changes one after another after which there is no hope
-LITTLE_S: Final = 0.05  # seconds to gain, with which a stage ends
-SMALL_GAPS: Final = 1e-2  # their sum when the first part ends, metres and radians and more
-NO_GAPS: Final = 1e-6  # their sum when the last part cannot close them better ...
-NO_GAIN: Final = 1e-2  # ... if so little is left to gain, in metres
 MOST_LAST: Final = 15  # iterations of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
 SHORT: Final = 0.9  # of a step of the vehicle: a drive whose steps are shorter is divided into fewer
 NEVER: Final = 1 << 30  # steps
-LITTLE_LONGER: Final = 1e-6  # share, for derivatives by the length of a step
+ROUNDING: Final = 1e-6  # of a step
 
 
 class Attempt(NamedTuple):
@@ -84,20 +69,6 @@ FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the
 FIRM_PULL: Final = 30.0  # ... and no more
 
 
-class _Drive(NamedTuple):
-    """What stays the same while a drive is optimised."""
-
-    model: Model
-    interior: Interior
-    goal: Floats  # that is aimed at
-    asked: Floats  # and that has to be reached
-    scene: Scene
-    circles: Floats
-    soft: Hold  # at first
-    firm: tuple[Hold, ...]  # one after another when little is left to gain; the first while gaps are closed
-    until: float  # of the clock
-
-
 def quickest(
     given: Sequence[Plan],
     model: Model,
@@ -132,7 +103,7 @@ def quickest(
     firm = barrier._replace(strength=FIRM_STRENGTH, range_m=RANGE_M, contact=FIRM_CONTACT_M)
     close = firm._replace(strength=WEAKER * FIRM_STRENGTH, contact=WEAKER * FIRM_CONTACT_M)
     soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
-    drive = _Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
+    drive = Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if is_near:
         number, best, used = _found(given, drive, vehicle, NEAR, most, NEVER)
@@ -156,7 +127,7 @@ def _guess(way: Floats, vehicle: Vehicle) -> Plan:
 
 def _found(
     given: Sequence[Plan],
-    around: _Drive,
+    around: Drive,
     vehicle: Vehicle,
     effort: Effort,
     most: int,
@@ -199,7 +170,7 @@ def _found(
 
 
 def _quickened(
-    drive: _Drive, guess: Plan, start: Floats, vehicle: Vehicle, effort: Effort, most: int
+    drive: Drive, guess: Plan, start: Floats, vehicle: Vehicle, effort: Effort, most: int
 ) -> tuple[Plan, int]:
     """Change a guess while time counts, until its steps are hardly shorter than the vehicle's.
 
@@ -211,9 +182,9 @@ def _quickened(
         if division > 0:
             guess = resampled(guess, _whole_steps(guess.duration_s, vehicle))
         steps = len(guess.controls)
-        _fill(drive, guess, start)
+        fill(drive, guess, start)
         iterations = min(effort.first, most - used)
-        dt, spent, _ = _descend(drive, steps, vehicle._replace(dt=guess.dt), True, iterations)
+        dt, spent, _ = descend(drive, steps, vehicle._replace(dt=guess.dt), True, iterations)
         used += spent
         model = drive.model
         guess = Plan(model.states[: steps + 1].copy(), model.controls[:steps].copy(), dt)
@@ -223,7 +194,7 @@ def _quickened(
 
 
 def _whole_steps(seconds: float, vehicle: Vehicle) -> int:
-    return max(math.ceil(seconds / vehicle.dt - LITTLE_LONGER), 1)
+    return max(math.ceil(seconds / vehicle.dt - ROUNDING), 1)
 
 
 def _drawn_in(goal: Floats, share: float) -> Floats:
@@ -235,7 +206,7 @@ def _drawn_in(goal: Floats, share: float) -> Floats:
 
 
 def _in_whole_steps(
-    drive: _Drive, guess: Plan, vehicle: Vehicle, effort: Effort, below: int, iterations: int
+    drive: Drive, guess: Plan, vehicle: Vehicle, effort: Effort, below: int, iterations: int
 ) -> tuple[Plan | None, int]:
     """Divide a guess into less than ``below`` steps of the vehicle's length and close its gaps.
 
@@ -250,88 +221,9 @@ def _in_whole_steps(
             break
         if working_clock() > drive.until:
             break
-        _fill(drive, resampled(guess, steps), guess.states[0])
-        _, spent, found = _descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
+        fill(drive, resampled(guess, steps), guess.states[0])
+        _, spent, found = descend(drive, steps, vehicle, False, min(MOST_LAST, iterations - used))
         used += spent
         if found is not None:
             return found, used
     return None, used
-
-
-def _fill(drive: _Drive, guess: Plan, start: Floats) -> None:
-    drive.model.states[: len(guess.states)] = guess.states
-    drive.model.states[0] = start
-    drive.model.controls[: len(guess.controls)] = guess.controls
-
-
-def _descend(
-    drive: _Drive, steps: int, vehicle: Vehicle, time_counts: bool, iterations: int
-) -> tuple[float, int, Plan | None]:
-    """Change the drive in ``drive.model`` until little is left to gain, or it can be driven.
-
-    Returns the length of a step, the iterations used, and a drive where time does not count and one is found.
-    """
-    model, interior = drive.model, drive.interior
-    # each begins with less strength than the one before, so that of closing gaps comes twice
-    hold, *later = (drive.soft, *drive.firm) if time_counts else (drive.firm[0], drive.firm[0])
-    around = drive.scene, drive.circles
-    counts = 1.0 if time_counts else 0.0
-    strength = FIRST_STRENGTH if time_counts else LAST_STEPS_STRENGTH
-    damping, price, in_vain = FIRST_DAMPING, 1.0, 0
-    tried, cost, cost_tried, gaps_tried = vehicle, math.nan, math.inf, math.inf
-    begin_inside(model, interior, steps, strength, vehicle)
-    for iteration in range(iterations):
-        if working_clock() > drive.until:
-            return vehicle.dt, iteration, None
-        if math.isnan(cost):  # not known yet
-            cost = present_cost(
-                *(model, interior, steps, drive.goal, strength, counts, vehicle, *around, hold)
-            )
-        longer = vehicle._replace(dt=vehicle.dt * (1.0 + LITTLE_LONGER))
-        damping, longer_s, share, slope, gaps, dearest = direction(
-            *(model, interior, steps, drive.goal, strength, counts, damping, vehicle, longer, *around, hold)
-        )
-        price = max(min(price, 10.0 * dearest), dearest)
-        gained = False
-        for _ in range(TRIES):
-            if share == 0.0:
-                break
-            tried = vehicle._replace(dt=vehicle.dt + share * longer_s)
-            cost_tried, gaps_tried = try_change(
-                *(model, interior, steps, share, drive.goal, strength, counts, tried, *around, hold)
-            )
-            expected = 1e-4 * share * min(slope - price * gaps, 0.0)
-            if cost_tried + price * gaps_tried <= cost + price * gaps + expected + 1e-9:
-                gained = True
-                break
-            share *= 0.5
-        if not gained:
-            in_vain += 1
-            damping = 10.0 * max(damping, LEAST_DAMPING)
-            if in_vain == IN_VAIN:
-                return vehicle.dt, iteration + 1, None
-            continue
-        in_vain = 0
-        vehicle, cost = tried, cost_tried
-        accept_change(model, interior, steps, strength, vehicle)
-        if not time_counts and gaps_tried < SMALL_GAPS:
-            found = _driven(drive, steps, vehicle)
-            if found is not None or (gaps_tried < NO_GAPS and abs(slope) < NO_GAIN):
-                return vehicle.dt, iteration + 1, found
-        if share > 0.5:
-            damping = max(0.25 * damping, LEAST_DAMPING)
-        elif share < 0.1:
-            damping = min(3.0 * damping, MOST_DAMPING)
-        little = LITTLE_S * vehicle.max_speed + 10.0 * strength
-        if share > 0.3 and abs(slope) < little and gaps_tried < 1e-3 * steps * vehicle.dt:
-            if later:
-                strength, hold, cost = WEAKER * strength, later.pop(0), math.nan
-            elif time_counts and gaps_tried < SMALL_GAPS:
-                return vehicle.dt, iteration + 1, None
-    return vehicle.dt, iterations, None if time_counts else _driven(drive, steps, vehicle)
-
-
-def _driven(drive: _Drive, steps: int, vehicle: Vehicle) -> Plan | None:
-    """The drive that the controls in ``drive.model`` lead to, if it is free and arrives as asked."""
-    model = drive.model
-    return driven(model, steps, drive.asked, vehicle, drive.scene)
