@@ -24,7 +24,6 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "strict"))
 TESTS: Final = Path(__file__).parent
 LONGEST: Final = (  # files that take more than ten seconds, the longest first (docs/studies/code.md)
     "flows/test_run.py",
-    "docs/test_tutorial.py",
     "tasks/servers/test_prefect_server.py",
     "flows/cli/test_closed_commands.py",
     "tasks/champions/test_conclude.py",

@@ -13,6 +13,7 @@ from tests.worlds import SHARED
 needs_worlds = pytest.mark.skipif(not SHARED.is_dir(), reason="the real worlds are not here")
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 @needs_worlds
 def test_the_commands_work_in_their_order_and_leave_the_pictures(tmp_path: Path) -> None:
