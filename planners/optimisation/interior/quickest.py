@@ -59,8 +59,7 @@ class Effort(NamedTuple):
     longer: tuple[float, ...]  # times the time that was found are tried when ``MORE_STEPS`` do not help
 
 
-WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.15, 1.3, 1.6))
-ONWARD: Final = WHOLE._replace(longer=())  # of a drive that has been found
+WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6))
 NEAR: Final = Effort(ATTEMPTS[:1], 30, 1, ())  # of what is nearly optimal: more is mostly in vain
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
@@ -113,7 +112,7 @@ def quickest(
     drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
-        _, quicker, more = _found(again, drive, vehicle, ONWARD, most - used, below)
+        _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below)
         used += more
         if quicker is None:
             break

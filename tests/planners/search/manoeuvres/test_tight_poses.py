@@ -76,6 +76,17 @@ def test_a_small_robot_does_not_creep_into_a_slot_where_a_drive_nearly_fits(
     assert found.duration_s < seconds
 
 
+@pytest.mark.parametrize(("number", "seconds"), [(4, 30.0), (28, 23.0)])  # 46 and 28 in steps at full speed
+def test_a_drive_that_could_be_much_quicker_is_made_so_though_not_as_quick(
+    number: int, seconds: float
+) -> None:
+    problem = to_canonical(family("yard", "hard", CAR_1_TRAILER).draw(6, number))[0]
+    found = solve(problem, "lattice", vehicle=CAR_1_TRAILER).plan
+    assert found is not None
+    assert faults(problem, found, CAR_1_TRAILER) == []
+    assert found.duration_s < seconds
+
+
 def test_the_same_question_has_the_same_answer() -> None:
     problem = slot(family("parallel", "hard"), 0)
     first, second = solved(problem), solved(problem)
