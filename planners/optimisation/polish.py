@@ -26,7 +26,7 @@ from planners.world.vehicles.vehicle import Car, CarWithTrailers, Vehicle, state
 from planners.world.workspace import Workspace
 
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
-ARRIVING_ITERATIONS: Final = 700  # where a drive must arrive as asked; some 60 suffice mostly
+ARRIVING_ITERATIONS: Final = 1000  # where a drive must arrive as asked; some 60 suffice mostly
 GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
 LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
