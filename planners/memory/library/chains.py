@@ -34,11 +34,11 @@ from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
-NODES: Final = 24
+NODES: Final = 128
 ROOM: Final = MOST_STEPS + LONGER  # steps to a node from the one before
 BRANCHES: Final = 2  # stretches that lead on from a node, at most
 CUT: Final = 5  # steps at the end of a sub-plan, behind which a wall may stand
-ALL: Final = 1_000  # looks for all together
+ALL: Final = 8_000  # looks for all together
 EACH: Final = 25  # looks from a node for a sub-plan to the goal
 NEAR: Final = 1.3, 4.0  # it is looked for if the way is at most so many times straight ahead, and so many m
 GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads on ...

@@ -17,8 +17,8 @@ from planners.world.vehicles.dynamics import State
 from planners.world.vehicles.vehicle import Vehicle
 
 LISTED: Final = 24
-GREED: Final = 1.2  # weight of the time to go
-HEADING_S: Final = 0.3  # time to go for each unit of 1 - cos of the angle to turn by
+GREED: Final = 1.1  # weight of the time to go
+HEADING_S: Final = 0.5  # time to go for each unit of 1 - cos of the angle to turn by
 LATE_S: Final = 1.0  # the same for each metre by which braking for the goal comes too late
 
 
