@@ -39,7 +39,7 @@ def checked(plan: Plan, scene: Scene, vehicle: Vehicle = CAR) -> CheckedPlan:
 def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]:
     """The end of the line that shows the heading at the start of ``problem``, x and y.
 
-    On the way to a pose it is shorter: half as long again as the ``vehicle`` is ahead of its axle.
+    On the way to a pose it is shorter, but it always ends well ahead of the ``vehicle``.
     """
     return _tip(problem.start, HEADING_M if problem.arrival is None else _ahead_m(vehicle))
 
@@ -53,7 +53,7 @@ def goal_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float] | 
 
 
 def _ahead_m(vehicle: Vehicle) -> float:
-    return min(HEADING_M, 1.5 * vehicle.front)
+    return min(HEADING_M, vehicle.front + 0.5 * max(vehicle.front, vehicle.width))
 
 
 def _tip(pose: tuple[float, float, float], metres: float) -> tuple[float, float]:

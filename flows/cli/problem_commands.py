@@ -193,7 +193,8 @@ def _write_summary(solved: SolvedMany) -> None:
     count, with_plan = len(seconds), sum(n for name, n in outcomes.items() if not name.startswith("("))
     named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
     now = solved.solved_now
-    speed = f"{now / solved.seconds:,.0f} problems/s"
+    rate = now / solved.seconds
+    speed = f"{rate:,.0f} problems/s" if rate >= 10 else f"{rate:.2g} problems/s"
     mean_s, median_s, ninth_s = solved.planning_seconds
     driving_s = solved.driving_seconds
     write_answer(

@@ -138,7 +138,7 @@ def test_a_gallery_shows_every_example(count: int, straight: Plan) -> None:
     assert sum(text.startswith("caption") for text in texts(figure)) == count
 
 
-@pytest.mark.parametrize("vehicle", VEHICLES.values())
+@pytest.mark.parametrize("vehicle", [*VEHICLES.values(), CAR._replace(front=0.3, width=0.9)])
 def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle) -> None:
     plain = problem()
     asked = replace(plain, start_motion=(2.0,), arrival=Arrival(1.0, 0.1))
@@ -151,6 +151,7 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
     tip = goal_tip(asked, vehicle)
     assert tip is not None
     assert math.atan2(tip[1] - CANONICAL_GOAL[1], tip[0] - CANONICAL_GOAL[0]) == pytest.approx(1.0)
+    assert math.dist(tip, CANONICAL_GOAL) > vehicle.front + 0.4 * vehicle.width  # or the body hides it
     assert goal_tip(plain, vehicle) is None
     state = goal_state(asked, vehicle)
     assert state is not None
