@@ -1,7 +1,8 @@
 """Recalls sub-plans one after another, where no single one leads to the goal: the best way first.
 
 Ways grow from the start like a tree. Its nodes are the ends of sub-plans, and the one from which the goal
-is nearest by time is the next to go on. Where no sub-plan is free, short generic drives go on.
+is nearest by time is the next to go on. An end that is like a better one is left out. Where no sub-plan is
+free, short generic drives go on.
 """
 
 from __future__ import annotations
@@ -30,17 +31,18 @@ from planners.world.arrays import Floats, Integers
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import RADIUS, X, Y
 from planners.world.jit import inlined, lean
-from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import load, step, store
+from planners.world.trigonometry import length, wrapped
+from planners.world.vehicles.dynamics import State, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
 NODES: Final = 128
 ROOM: Final = MOST_STEPS + LONGER  # steps to a node from the one before
-BRANCHES: Final = 2  # stretches that lead on from a node, at most
+BRANCHES: Final = 3  # stretches that lead on from a node, at most
 CUT: Final = 5  # steps at the end of a sub-plan, behind which a wall may stand
 ALL: Final = 8_000  # looks for all together
 EACH: Final = 25  # looks from a node for a sub-plan to the goal
 NEAR: Final = 1.3, 4.0  # it is looked for if the way is at most so many times straight ahead, and so many m
+ALIKE: Final = 0.7, 0.3, 0.7  # ends no farther apart than so many m, radians and m/s lead to the same
 GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads on ...
 GENERICS: Final = 3  # ... of which so many are kept, the best
 PARENT, DRIVEN, ROW, STORED, IS_OPEN = range(5)  # columns of Chains.nodes
@@ -146,6 +148,22 @@ def _write_way(node: int, chains: Chains, r: Recalling, vehicle: Vehicle) -> Non
 
 
 @inlined
+def _is_new(end: State, estimate: float, count: int, chains: Chains, vehicle: Vehicle) -> bool:
+    """Whether no node with a better estimate ends like this."""
+    for node in range(1, count):
+        if chains.estimates[node] > estimate:
+            continue
+        other = load(chains.states[node], chains.nodes[node, DRIVEN], vehicle)
+        if (
+            length(end[0] - other[0], end[1] - other[1]) < ALIKE[0]
+            and abs(wrapped(end[2] - other[2])) < ALIKE[1]
+            and abs(end[3] - other[3]) < ALIKE[2]
+        ):
+            return False
+    return True
+
+
+@inlined
 def _next_node(count: int, chains: Chains) -> int:
     """The open node with the least estimate, -1 if none is open."""
     best = -1
@@ -219,10 +237,11 @@ def recall_chain(
             if ended == BLOCKED or driven <= CUT:
                 continue
             driven -= CUT
-            left = seconds_left(load(r.tried_states, driven, vehicle), ground, vehicle)
-            estimate = (row + driven) * vehicle.dt + GREED * left
-            _put_node(count, node, driven, driven, estimate, chains, r, vehicle)
-            count += 1
+            end = load(r.tried_states, driven, vehicle)
+            estimate = (row + driven) * vehicle.dt + GREED * seconds_left(end, ground, vehicle)
+            if _is_new(end, estimate, count, chains, vehicle):
+                _put_node(count, node, driven, driven, estimate, chains, r, vehicle)
+                count += 1
         if count == before and count < NODES and row + ROOM <= STEPS:
             count = _drive_generic(node, count, ground, chains, r, vehicle, scene)
     return 0, 0

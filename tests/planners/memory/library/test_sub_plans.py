@@ -157,6 +157,25 @@ def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time()
     assert durations[0] == durations[1]
 
 
+@pytest.mark.parametrize("ahead", [-2.0, 0.0, 2.0])
+def test_a_full_turn_to_a_place_beside_the_vehicle_is_not_too_long(ahead: float) -> None:
+    """It takes several times what the way straight there would."""
+    asked = replace(
+        problem_of([]),
+        start=(50.0, 50.0, 0.0),
+        start_motion=(3.0,),
+        goal=(50.0 + ahead, 51.5),
+        goal_radius=0.3,
+    )
+    asked = to_canonical(asked)[0]
+    found = solve(asked, "lattice").plan
+    assert found is not None
+    answer = solve(asked, "gust", "closed", memory=gathered_library("one", CAR, [("one", found)]))
+    assert answer.source == "recalled"
+    assert answer.plan is not None
+    assert answer.plan.duration_s == pytest.approx(found.duration_s, abs=0.3)
+
+
 def test_stretches_are_sub_plans_seen_from_where_they_begin(library: PlanLibrary) -> None:
     subs, stretches = library.sub_plans, library.stretches
     assert stretches.cells[-1] == len(stretches.begins)
