@@ -39,7 +39,7 @@ def checked(plan: Plan, scene: Scene, vehicle: Vehicle = CAR) -> CheckedPlan:
 def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]:
     """The end of the line that shows the heading at the start of ``problem``, x and y.
 
-    On the way to a pose it is shorter, but it always ends well ahead of the ``vehicle``.
+    On the way to a pose it is shorter, but it ends well ahead of the ``vehicle``.
     """
     return _tip(problem.start, HEADING_M if problem.arrival is None else _ahead_m(vehicle))
 

@@ -6,22 +6,28 @@ from pathlib import Path
 from typing import Literal
 
 from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.exchange import problems as problem_files
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
 
 
-def read_problems(path: str | Path, *, vehicle: str = "car") -> list[Problem]:
+def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Problem]:
     """Read a file of problems (docs/problem-files.md).
 
     Args:
         path: a .json, .jsonl or .parquet file.
-        vehicle: what must have room at each start: a name, or the path of a vehicle's .yaml file.
+        vehicle: what must have room at each start: a name, or the path of a vehicle's .yaml file; by default
+            the one that the file states, else the car.
 
     Raises:
         StorageError: The file is missing, or a problem is malformed or impossible; names line and id.
     """
-    return problem_files.read_problems(Path(path), said_vehicle(vehicle))
+    if vehicle is None:
+        driver = problem_files.vehicle_of_problems(Path(path)) or CAR
+    else:
+        driver = said_vehicle(vehicle)
+    return problem_files.read_problems(Path(path), driver)
 
 
 def read_worlds(
@@ -73,7 +79,7 @@ def solve_many(
     planner: str = "lattice",
     assist: str | None = None,
     top_k: int = 5,
-    vehicle: str = "car",
+    vehicle: str | None = None,
     seed: int = 1,
     plans: str | Path | None = None,
 ) -> None:
@@ -89,7 +95,8 @@ def solve_many(
         planner: the planner that searches if no recalled plan can be used: rrt, gust, follow or lattice.
         assist: how the memory helps; by default repair with a memory, none without.
         top_k: how many plans to recall, at least 1.
-        vehicle: its name, or the path of its .yaml file.
+        vehicle: its name, or the path of its .yaml file; by default the one that the file of problems states,
+            else that of the memory, else the car.
         seed: everything random follows from it.
         plans: a folder for the plans, one file each; by default none are written.
 
@@ -97,15 +104,17 @@ def solve_many(
         UsageError: A name is unknown, or a file would be written over another one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
-    from tasks.requests.assistant import AssistantSettings  # late: a robot may not have pyarrow
+    from tasks.registry.settled_vehicle import settled_vehicle  # late: a robot may not have pyarrow
+    from tasks.requests.assistant import AssistantSettings
     from tasks.requests.solve_many import solve_many as solve_file
 
+    stored = None if memory is None else str(memory)
     settings = AssistantSettings(
         planner=planner,
         assist=assist or ("none" if memory is None else "repair"),
         top_k=top_k,
-        memory=None if memory is None else str(memory),
+        memory=stored,
         seed=seed,
-        vehicle=vehicle,
+        vehicle=settled_vehicle(vehicle, Path(problems), stored),
     )
     solve_file(settings, Path(problems), Path(out), None if plans is None else Path(plans))

@@ -40,9 +40,8 @@ from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.view import View
 
 NEAR_M: Final = 6.0  # from a pose: so near sub-plans lead
-AT_ONCE: Final = 2.0  # times the estimate straight ahead, and a full turn: a single sub-plan takes no longer
 LOOKS_AT_ONCE: Final = 100  # for a single sub-plan from the start to the goal
-LONGER: Final = 2.0  # times the estimate, and a full turn: several sub-plans take no longer
+PATIENT: Final = 2.0  # times the estimate, and a full turn: no sub-plans take longer
 MOSTLY: Final = 2  # an answer of whose steps more than one in so many is stored was recalled
 ROWS: Final = 6  # states from which the rest is closed ...
 APART: Final = 6  # ... so many steps apart, and the start
@@ -150,7 +149,7 @@ def sub_plan_answer(
     turn = 1.0 - math.cos(math.atan2(y, x) - start[2])
     seconds = seconds_for(metres, turn, start[3], vehicle)
     full_turn_s = 2.0 * math.pi * radius_at(vehicle.max_speed, vehicle) / vehicle.max_speed
-    within = (AT_ONCE * seconds + full_turn_s) / vehicle.dt
+    within = (PATIENT * seconds + full_turn_s) / vehicle.dt
     steps = stored = int(recall_one(subs, 0, near, within, LOOKS_AT_ONCE, offset, cells, r, vehicle, scene))
     view.lap("check")
     knows_way = steps == 0 or is_long(steps * vehicle.dt, seconds)
@@ -162,7 +161,7 @@ def sub_plan_answer(
         if steps == 0:
             chains = view.workspace.buffers(allocate_chains, state_size(vehicle))
             ground = Ground(cells, ahead_of(goal, go, vehicle))
-            within = min(LONGER * seconds + full_turn_s, STEPS * vehicle.dt)
+            within = min(PATIENT * seconds + full_turn_s, STEPS * vehicle.dt)
             steps, stored = recall_chain(
                 *(subs, library.stretches, near, within, offset, ground, chains, r, vehicle, scene)
             )

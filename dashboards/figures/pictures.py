@@ -19,7 +19,6 @@ from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
     CheckedPlan,
     checked,
-    footprint_spacing_m,
     goal_state,
     goal_tip,
     heading_tip,
@@ -209,8 +208,6 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
     """What the examples show; recalled plans only if there are any."""
     to_poses = [example for example in examples if _is_pose(example)]
     to_places = [example for example in examples if not _is_pose(example)]
-    spacings = {footprint_spacing_m(example.vehicle) for example in examples}
-    every = f"{spacings.pop():.0f} m" if len(spacings) == 1 else "few metres"
     handles: list[Line2D | Patch] = [Line2D([], [], color=INK, marker=">", linestyle="none", label="start")]
     if to_places:
         handles += [
@@ -221,7 +218,7 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
         label = "speed at the start: the way of a second"
         handles.append(Line2D([], [], color=VERMILLION, linewidth=2.4, label=label))
     if any(example.answer is not None for example in to_places):
-        label = f"plan found, with the vehicle every {every}"
+        label = "plan found, with the vehicle every few metres"
         handles.append(Line2D([], [], color=GREEN, linewidth=1.8, label=label))
     if to_poses:
         handles.append(

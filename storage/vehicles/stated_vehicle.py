@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from planners.world.vehicles.vehicle import CAR, Vehicle, name_of
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle, name_of
 from storage.errors import StorageError
 from storage.fields import parse_json, short
 from storage.vehicles.definitions import definition_of, first_difference
@@ -40,7 +40,10 @@ def stated_vehicle(fields: Any) -> Vehicle | None:
         recorded = None
     vehicle = vehicle_recorded(recorded)
     if vehicle is None:
-        raise ValueError(f"vehicle is {short(said)}, which is not a vehicle; give a name or leave it out")
+        raise ValueError(
+            f"vehicle is {short(said)}, expected one of {', '.join(VEHICLES)} or a whole definition, as "
+            "`draw --vehicle FILE` writes it; or leave it out"
+        )
     return vehicle
 
 

@@ -15,8 +15,9 @@ import pytest
 
 import motion_memory
 from planners.memory.library.plan_library import gathered_library
+from planners.world.classes.families import family
 from planners.world.problem import Plan
-from planners.world.vehicles.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR, VEHICLES
 from storage.archives.libraries import save_library
 from storage.exchange.problems import fields_of, write_problems
 from storage.tables.attempts import read_attempts
@@ -100,6 +101,17 @@ def test_many_are_solved_as_by_the_command(folder: Path, tmp_path: Path) -> None
     assert len(motion_memory.read_problems(tmp_path / "problems.jsonl")) == 3
     motion_memory.solve_many(tmp_path / "problems.jsonl", tmp_path / "rows.parquet", memory=folder)
     assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
+
+
+def test_without_a_vehicle_that_of_the_file_is_meant(tmp_path: Path) -> None:
+    vehicle = VEHICLES["differential-drive"]
+    asked = family("parallel", vehicle=vehicle).draw(1, 0)
+    write_problems(tmp_path / "problems.jsonl", [asked], vehicle, for_it_alone=True)
+    assert len(motion_memory.read_problems(tmp_path / "problems.jsonl")) == 1
+    motion_memory.solve_many(tmp_path / "problems.jsonl", tmp_path / "rows.parquet")
+    assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
+    with pytest.raises(motion_memory.StorageError, match="differential-drive"):
+        motion_memory.read_problems(tmp_path / "problems.jsonl", vehicle="car")
 
 
 def test_problems_are_cut_from_a_map(tmp_path: Path) -> None:

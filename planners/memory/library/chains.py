@@ -1,8 +1,8 @@
 """Recalls sub-plans one after another, where no single one leads to the goal: the best way first.
 
 Ways grow from the start like a tree. Its nodes are the ends of sub-plans, and the one from which the goal
-is nearest by time is the next to go on. An end that is like a better one is left out. Where no sub-plan is
-free, short generic drives go on.
+is nearest by time is the next to go on. An end that is like a better one found before is left out. Where no
+sub-plan leads to a new end, short generic drives go on.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ NODES: Final = 128
 ROOM: Final = MOST_STEPS + LONGER  # steps to a node from the one before
 BRANCHES: Final = 3  # stretches that lead on from a node, at most
 CUT: Final = 5  # steps at the end of a sub-plan, behind which a wall may stand
-ALL: Final = 8_000  # looks for all together
+ALL: Final = 8_000  # looks for all together, drives and lists not counted
 EACH: Final = 25  # looks from a node for a sub-plan to the goal
 NEAR: Final = 1.3, 4.0  # it is looked for if the way is at most so many times straight ahead, and so many m
-ALIKE: Final = 0.7, 0.3, 0.7  # ends no farther apart than so many m, radians and m/s lead to the same
-GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads on ...
+SAME_END: Final = 0.7, 0.3, 0.7  # ends no farther apart than so many m, radians and m/s lead to the same
+GENERIC: Final = Lattice(steps=8, speeds=3)  # drives where no sub-plan leads to a new end ...
 GENERICS: Final = 3  # ... of which so many are kept, the best
 PARENT, DRIVEN, ROW, STORED, IS_OPEN = range(5)  # columns of Chains.nodes
 
@@ -149,15 +149,15 @@ def _write_way(node: int, chains: Chains, r: Recalling, vehicle: Vehicle) -> Non
 
 @inlined
 def _is_new(end: State, estimate: float, count: int, chains: Chains, vehicle: Vehicle) -> bool:
-    """Whether no node with a better estimate ends like this."""
+    """Whether no node so far that has a better estimate ends like this."""
     for node in range(1, count):
         if chains.estimates[node] > estimate:
             continue
         other = load(chains.states[node], chains.nodes[node, DRIVEN], vehicle)
         if (
-            length(end[0] - other[0], end[1] - other[1]) < ALIKE[0]
-            and abs(wrapped(end[2] - other[2])) < ALIKE[1]
-            and abs(end[3] - other[3]) < ALIKE[2]
+            length(end[0] - other[0], end[1] - other[1]) < SAME_END[0]
+            and abs(wrapped(end[2] - other[2])) < SAME_END[1]
+            and abs(end[3] - other[3]) < SAME_END[2]
         ):
             return False
     return True
@@ -189,7 +189,8 @@ def recall_chain(
     """Find sub-plans, one after another, from ``r.states[0]`` to a goal, in ``within`` seconds.
 
     From a node a sub-plan to the goal is sought if the way there is nearly straight, then stretches that lead
-    on; if none is free, generic drives lead on. Returns all steps, 0 for no answer, and how many are stored.
+    on; if none leads to a new end, generic drives do. Returns all steps, 0 for no answer, and how many are
+    stored.
     """
     r.work[LOOKS] = 0
     chains.nodes[0].fill(0)
@@ -210,6 +211,8 @@ def recall_chain(
             driven = recall_one(subs, row, goal, most, EACH, blindly, ground.cells, r, vehicle, scene)
             if driven > 0:
                 return int(row + driven), int(stored + driven)
+        if count == NODES:
+            continue
         store(r.tried_states, 0, start)
         before = count
         spent = row * vehicle.dt
@@ -242,6 +245,6 @@ def recall_chain(
             if _is_new(end, estimate, count, chains, vehicle):
                 _put_node(count, node, driven, driven, estimate, chains, r, vehicle)
                 count += 1
-        if count == before and count < NODES and row + ROOM <= STEPS:
+        if count == before and row + ROOM <= STEPS:
             count = _drive_generic(node, count, ground, chains, r, vehicle, scene)
     return 0, 0

@@ -21,7 +21,8 @@ SECOND_LOOK: Final = 400  # expansions in search of a quicker plan than one at h
 DETOURS: Final = {"lattice": 1.03}
 CLOSE: Final = 1.01  # nor is a plan that takes hardly longer than straight on from rest
 
-_FROM_MOTION: Final = 1.5  # the same where a drive begins in any direction, at any speed
+# From any motion a plan is a detour that takes so many times as long as what ``seconds_for`` estimates.
+_FROM_MOTION: Final = 1.5
 _SLOW: Final = 0.56  # of the time that it takes to reach full speed first, this share is lost
 _TURN_S: Final = 0.68  # time for each unit of 1 - cos of the angle to turn by
 

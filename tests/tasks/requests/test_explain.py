@@ -123,7 +123,8 @@ def test_it_says_what_parts_of_plans_had_for_a_question(
     stored = load_library(library, CAR)
     told = {}
     pose = Arrival(CANONICAL_START[2], 0.05)
-    for question in [replace(strewn(seed, 60), arrival=pose) for seed in (20, 41, 56)]:
+    seeds = (20, 41, 56)  # recalled; a search finds a quicker plan; no parts are found
+    for question in [replace(strewn(seed, 60), arrival=pose) for seed in seeds]:
         write_problems(tmp_path / "one.json", [question])
         asked = ["plan", str(tmp_path / "one.json"), "--memory", str(library), "--assist", "closed"]
         assert call([*asked, "--explain"]) == 0

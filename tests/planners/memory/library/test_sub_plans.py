@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import pytest
 
 from planners.attempt import SUB_PLANS
 from planners.maps.questions import question_in
+from planners.memory.library.chains import DRIVEN, NODES, PARENT, SAME_END, STORED, allocate_chains
 from planners.memory.library.driving import ARRIVED, drive_again
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.library.recalling import allocate_recalling
@@ -26,6 +28,7 @@ from planners.memory.library.sub_plans import (
     turn_cell,
 )
 from planners.solve import solve
+from planners.sub_plan_answers import sub_plan_answer
 from planners.world.alignment import mirrored, to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
@@ -33,7 +36,8 @@ from planners.world.geometry.collision import scene_of
 from planners.world.goal import place
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR
+from planners.world.vehicles.vehicle import CAR, state_size
+from planners.world.view import View
 from tests.worlds import problem_of
 
 ORIGIN = np.array([20.0, 25.0])
@@ -174,6 +178,28 @@ def test_a_full_turn_to_a_place_beside_the_vehicle_is_not_too_long(ahead: float)
     assert answer.source == "recalled"
     assert answer.plan is not None
     assert answer.plan.duration_s == pytest.approx(found.duration_s, abs=0.3)
+
+
+def test_no_end_is_like_a_better_one_before_it(library: PlanLibrary) -> None:
+    """Generic drives, of which no step is stored, are not compared."""
+    compared = 0
+    for number in range(12):
+        view = View(question(6, number))
+        sub_plan_answer(library, view, CAR)
+        chains = view.workspace.buffers(allocate_chains, state_size(CAR))
+        driven, stored = chains.nodes[:, DRIVEN], chains.nodes[:, STORED]
+        parents = chains.nodes[:, PARENT]
+        nodes = [k for k in range(1, NODES) if driven[k] > 0 and stored[k] > stored[parents[k]]]
+        ends = {k: chains.states[k, driven[k]] for k in nodes}
+        for later, earlier in itertools.combinations(reversed(nodes), 2):
+            if chains.estimates[earlier] > chains.estimates[later]:
+                continue
+            compared += 1
+            off = np.abs(ends[later] - ends[earlier])
+            turn = abs(math.remainder(off[2], 2.0 * math.pi))
+            metres = math.hypot(off[0], off[1])
+            assert metres >= SAME_END[0] or turn >= SAME_END[1] or off[3] >= SAME_END[2]
+    assert compared > 100
 
 
 def test_stretches_are_sub_plans_seen_from_where_they_begin(library: PlanLibrary) -> None:
