@@ -81,7 +81,7 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     Raises JudgementError if the authority refuses a plan.
     """
     request = chunk.request
-    sources, vehicle, workspace = _sources(request, request.digest), request.settings.vehicle, Workspace()
+    sources, vehicle, workspace = read_sources(request, request.digest), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
     for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
         drawn = _question(sources, number)
@@ -127,7 +127,7 @@ def gather_pieces(
     Returns:
         the results of all pieces from the first on. They do not depend on who does how many at a time.
     """
-    longest = max(source.most for source in _sources(request, request.digest)) * len(request.sources)
+    longest = max(source.most for source in read_sources(request, request.digest)) * len(request.sources)
     results: list[Gathered] = []
     answered = asked = 0
     while answered < request.plans and asked < GIVE_UP * request.plans and len(results) * PIECE < longest:
@@ -140,8 +140,13 @@ def gather_pieces(
 
 
 @functools.lru_cache(maxsize=1)
-def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
-    """The sources of this process, which keeps the worlds that it has read as long as they are the same."""
+def read_sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
+    """Read the sources for this process, which keeps what it has read as long as that is the same.
+
+    Raises:
+        UsageError: a family is not for the vehicle.
+        StorageError: a source cannot be read.
+    """
     how = (request.plans, request.poses, request.difficulty, request.settings)
     return [question_source(name, *how) for name in request.sources]
 

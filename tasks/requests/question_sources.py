@@ -18,6 +18,7 @@ from storage.exchange.problems import read_problems
 from storage.fields import nearest
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import Source, source_at
+from tasks.settings.errors import UsageError
 
 OWN_SEEDS: Final = 1 << 32  # larger than any seed with which users draw problems
 
@@ -59,12 +60,16 @@ def question_source(
         settings: how worlds and maps are read, for which vehicle, and the seed of everything.
 
     Raises:
+        UsageError: the family is not for the vehicle.
         StorageError: the path does not exist or cannot be read.
     """
     vehicle = settings.vehicle
     seed = OWN_SEEDS + settings.seed
     if is_drawn(name):
-        drawn = class_or_family(name, difficulty, vehicle)
+        try:
+            drawn = class_or_family(name, difficulty, vehicle)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
         draw = partial(drawn.draw, seed)
         return QuestionSource(draw) if name in FAMILIES else _asked_in(draw, poses, settings)
     source = named_source(name)

@@ -15,13 +15,15 @@ from flows.cli.main import call
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.classes.families import family
+from planners.world.vehicles.vehicle import VEHICLES
 from storage.archives.libraries import load_library
+from storage.errors import StorageError
 from storage.exchange.problems import write_problems
 from storage.worlds.importing import ImportSettings
 from tasks.requests import gather, part_folder
 from tasks.requests import gather_pieces as pieces
 from tasks.requests.question_sources import question_source
-from tasks.settings.errors import RunError
+from tasks.settings.errors import RunError, UsageError
 from tests.storage.worlds.samples import town_cells, write_map
 from tests.worlds import strewn, walled_goal
 
@@ -205,6 +207,17 @@ def test_sources_that_have_changed_are_read_again_in_the_same_process(tmp_path: 
         write_problems(problems, [strewn(seed, 10)])
         gather.gather([str(problems)], out, 1, 0.0, "standard", ImportSettings())
         assert load_library(out).questions == (f"strewn-{seed}-10",)
+
+
+def test_a_source_that_cannot_be_asked_is_told_before_workers_start(tmp_path: Path) -> None:
+    def flow(_: object) -> list[pieces.Gathered]:
+        raise AssertionError
+
+    write_problems(tmp_path / "trailer.jsonl", [strewn(1, 10)], VEHICLES["car-1-trailer"])
+    for source, error in (("dock", UsageError), (str(tmp_path / "trailer.jsonl"), StorageError)):
+        with pytest.raises(error):
+            gather.gather([source], tmp_path / "library", 60, 0.0, "standard", ImportSettings(), 2, flow)
+        assert list(tmp_path.iterdir()) == [tmp_path / "trailer.jsonl"]
 
 
 def test_without_any_answer_nothing_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
