@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final
 
 from cyclopts import App, CycloptsError, Group, Parameter
 from cyclopts.config import Toml
+from cyclopts.exceptions import UnusedCliTokensError
 
 from flows.cli import map_commands as maps
 from flows.cli import problem_commands as problems
@@ -130,6 +131,11 @@ def _is_wrong_use(error: Exception) -> bool:
 
 def _one_line(error: Exception) -> str:
     text = " ".join(str(error).split())
+    if isinstance(error, UnusedCliTokensError):
+        text = (
+            f"too many arguments: {' '.join(error.unused_tokens or ())}; leave them out, or write their "
+            "option before each, as in --worlds A --worlds B."
+        )
     return redacted(text) or type(error).__name__
 
 

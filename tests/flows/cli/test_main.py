@@ -32,6 +32,7 @@ COMMANDS = (
         (["run", "--speed", "3"], 2, "--speed"),
         (["run", "--data"], 2, "--data"),
         (["run", "--workers", "0"], 2, "0 workers: give 1 or more."),
+        (["run", "--worlds", "one", "two", "three"], 2, "two three"),
         (["run", "--worlds", "/nowhere"], 2, "/nowhere does not exist"),
         (["train", "--objective", "luck"], 2, '"luck" for --objective. Choose from'),
         (["train", "--epochs", "0"], 2, "0 epochs: give 1 or more."),
