@@ -23,11 +23,9 @@ def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Probl
     Raises:
         StorageError: The file is missing, or a problem is malformed or impossible; names line and id.
     """
-    if vehicle is None:
-        driver = problem_files.vehicle_of_problems(Path(path)) or CAR
-    else:
-        driver = said_vehicle(vehicle)
-    return problem_files.read_problems(Path(path), driver)
+    file = Path(path)
+    driver = (problem_files.vehicle_of_problems(file) or CAR) if vehicle is None else said_vehicle(vehicle)
+    return problem_files.read_problems(file, driver)
 
 
 def read_worlds(

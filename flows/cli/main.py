@@ -130,12 +130,13 @@ def _is_wrong_use(error: Exception) -> bool:
 
 
 def _one_line(error: Exception) -> str:
-    text = " ".join(str(error).split())
     if isinstance(error, UnusedCliTokensError):
         text = (
             f"too many arguments: {' '.join(error.unused_tokens or ())}; leave them out, or write their "
             "option before each, as in --worlds A --worlds B."
         )
+    else:
+        text = " ".join(str(error).split())
     return redacted(text) or type(error).__name__
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from planners.world.classes.families import FAMILIES, class_or_family
+from planners.world.classes.families import FAMILIES
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.problem_files import format_of
 from storage.exchange.problems import write_problems
 from storage.vehicles.vehicle_files import said_vehicle
+from tasks.requests.question_sources import drawn_source
 from tasks.settings.checks import check_count, check_known, check_picture, check_seed, checked_vehicle
-from tasks.settings.errors import UsageError
 
 PICTURED: Final = 6  # problems at most in a picture
 
@@ -43,10 +43,7 @@ def draw_problems(
     check_picture(drawing)
     format_of(out)
     driven = said_vehicle(checked_vehicle(vehicle))
-    try:
-        source = class_or_family(name, difficulty, driven)
-    except ValueError as error:
-        raise UsageError(str(error)) from None
+    source = drawn_source(name, difficulty, driven)
     drawn = [source.draw(seed, index) for index in range(problems)]
     write_problems(out, drawn, driven, for_it_alone=name in FAMILIES)
     if drawing is not None:

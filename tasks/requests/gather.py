@@ -163,7 +163,7 @@ def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> 
         if flow is None or workers == 1 or request.plans <= FEW_PLANS:
             results = gather_pieces(request, partial(do_here, GATHER))
         else:
-            read_sources(request, request.digest)  # so that a wrong one is told before workers start
+            read_sources(request)  # so that a wrong one is told before workers start
             with part_workers(request.out, workers):
                 results = flow(request)
         kept, tried = _kept(request, results)

@@ -81,7 +81,7 @@ def gather_piece(chunk: GatherPiece) -> Gathered:
     Raises JudgementError if the authority refuses a plan.
     """
     request = chunk.request
-    sources, vehicle, workspace = read_sources(request, request.digest), request.settings.vehicle, Workspace()
+    sources, vehicle, workspace = read_sources(request), request.settings.vehicle, Workspace()
     asked, rows, kept = [], [], []
     for number in range(chunk.index * PIECE, (chunk.index + 1) * PIECE):
         drawn = _question(sources, number)
@@ -127,7 +127,7 @@ def gather_pieces(
     Returns:
         the results of all pieces from the first on. They do not depend on who does how many at a time.
     """
-    longest = max(source.most for source in read_sources(request, request.digest)) * len(request.sources)
+    longest = max(source.most for source in read_sources(request)) * len(request.sources)
     results: list[Gathered] = []
     answered = asked = 0
     while answered < request.plans and asked < GIVE_UP * request.plans and len(results) * PIECE < longest:
@@ -139,14 +139,18 @@ def gather_pieces(
     return results
 
 
-@functools.lru_cache(maxsize=1)
-def read_sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
+def read_sources(request: GatherRequest) -> list[QuestionSource]:
     """Read the sources for this process, which keeps what it has read as long as that is the same.
 
     Raises:
         UsageError: a family is not for the vehicle.
         StorageError: a source cannot be read.
     """
+    return _sources(request, request.digest)
+
+
+@functools.lru_cache(maxsize=1)
+def _sources(request: GatherRequest, _digest: str) -> list[QuestionSource]:
     how = (request.plans, request.poses, request.difficulty, request.settings)
     return [question_source(name, *how) for name in request.sources]
 

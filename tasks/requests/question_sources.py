@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Final
 
 from planners.maps.questions import question_in
-from planners.world.classes.families import FAMILIES, class_or_family
-from planners.world.classes.problem_classes import CLASSES
+from planners.world.classes.families import FAMILIES, Family, class_or_family
+from planners.world.classes.problem_classes import CLASSES, ProblemClass
 from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
 from storage.errors import StorageError
 from storage.exchange.problems import read_problems
 from storage.fields import nearest
@@ -34,6 +35,14 @@ class QuestionSource:
 def is_drawn(name: str) -> bool:
     """Whether the name is that of a class or a family, whatever files and folders there are."""
     return name in (*CLASSES, *FAMILIES)
+
+
+def drawn_source(name: str, difficulty: str, vehicle: Vehicle) -> ProblemClass | Family:
+    """The class or family of a name for a vehicle; raises UsageError if the family is not for it."""
+    try:
+        return class_or_family(name, difficulty, vehicle)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def named_source(name: str) -> Source:
@@ -66,10 +75,7 @@ def question_source(
     vehicle = settings.vehicle
     seed = OWN_SEEDS + settings.seed
     if is_drawn(name):
-        try:
-            drawn = class_or_family(name, difficulty, vehicle)
-        except ValueError as error:
-            raise UsageError(str(error)) from None
+        drawn = drawn_source(name, difficulty, vehicle)
         draw = partial(drawn.draw, seed)
         return QuestionSource(draw) if name in FAMILIES else _asked_in(draw, poses, settings)
     source = named_source(name)
