@@ -68,7 +68,7 @@ def drive_answer(
         blindly: picks any drives; None picks those that promise most.
     """
     drives, problem = library.drives, view.problem
-    start, goal = start_state(problem, vehicle), goal_of(problem)
+    start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
     order = np.zeros(TRIED, np.int32)
     if blindly is None:
         count, quickest, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)

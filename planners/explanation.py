@@ -102,7 +102,9 @@ def drive_found(
     answer = drive_answer(library, View(problem), vehicle, math.inf)
     if answer.plan is None or attempt.recalled != (answer.number,):
         return None
-    return MovedDrive(answer, placed_drive(library.drives, answer.entry, goal_of(problem), vehicle.dt))
+    return MovedDrive(
+        answer, placed_drive(library.drives, answer.entry, goal_of(problem, vehicle), vehicle.dt)
+    )
 
 
 def parts_found(

@@ -86,7 +86,7 @@ def answer_from(
         return answer._replace(plan=plan, source="recalled", is_long=is_long)
     library = memory if isinstance(memory, PlanLibrary) else memory.library
     drive = DriveAnswer()
-    if improves and use in JOINS and suits(goal_of(problem), vehicle):
+    if improves and use in JOINS and suits(goal_of(problem, vehicle), vehicle):
         drive = drive_answer(library, view, vehicle, until, blindly)
         if drive.plan is not None:
             return MemoryAnswer(

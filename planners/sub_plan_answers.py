@@ -139,7 +139,7 @@ def sub_plan_answer(
     start = start_state(problem, vehicle)
     r.states[0] = start
     r.work.fill(0)
-    goal = goal_of(problem)
+    goal = goal_of(problem, vehicle)
     exact = asks_for_more(goal)
     near = place(*problem.goal, max(NEAR_M, problem.goal_radius)) if exact else goal
     offset = 0 if blindly is None else int(blindly.integers(1, len(subs.begins)))

@@ -181,7 +181,7 @@ class Adaptation:
     def _to_place(self, stored: Plan, question: str, canonical: bool, workspace: Workspace) -> Adapted:
         guess = retimed(stored, self.old, self.new)
         asked = _asked(guess, None, question, canonical, self.new)
-        scene, goal = scene_of(asked), goal_of(asked)
+        scene, goal = scene_of(asked), goal_of(asked, self.new)
         states = np.empty((2 * len(guess) + 60, guess.shape[1]))
         controls = np.empty((len(states) - 1, 2))
         states[0] = guess[0]

@@ -13,6 +13,7 @@ from planners.world.goal import (
     HITCHES,
     LEAST_SPEED,
     MOST_SPEED,
+    MOST_TURN,
     RADIUS,
     X,
     Y,
@@ -52,6 +53,7 @@ def aim_near(end: Floats, goal: Floats, aim: Floats, inside: float) -> None:
         off = wrapped(end[2] - goal[HEADING])
         aim[2] = end[2] - off + min(max(off, -most), most)
     aim[3] = min(max(end[3], goal[LEAST_SPEED]), goal[MOST_SPEED])
+    aim[4] = min(max(end[4], -goal[MOST_TURN]), goal[MOST_TURN])
     for k in range((goal.shape[0] - HITCHES) // 2):
         most = goal[HITCHES + 2 * k + 1] - _edge(goal[HITCHES + 2 * k + 1], inside)
         off = end[5 + k] - goal[HITCHES + 2 * k]

@@ -3,7 +3,8 @@
 A drive that arrives is pressed into fewer steps, as a guess whose steps do not quite lead from state to
 state: time is taken from where it is slow, such as at stops. One sweep closes the gaps (multiple shooting:
 Mastalli et al., Crocoddyl, 2020), further ones bring the end to the goal again. If that succeeds the drive is
-kept, and pressed again. The speed at the end is exact: it bounds the speeds before.
+kept, and pressed again. Speed and turn rate at the end are exact: they bound those
+before.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from planners.optimisation.descent import (
     copy_drive,
     drive_changed,
 )
-from planners.optimisation.gains import effort, sweep_back
+from planners.optimisation.gains import LastMotion, effort, sweep_back
 from planners.optimisation.gaps import Barrier
 from planners.optimisation.local_model import (
     Model,
@@ -33,6 +34,7 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import (
     LEAST_SPEED,
     MOST_SPEED,
+    MOST_TURN,
     SLACK,
     reaches,
 )
@@ -112,10 +114,10 @@ def shorten(
     Returns:
         Iterations used, and whether it succeeded.
     """
-    speeds = (goal[LEAST_SPEED], goal[MOST_SPEED])
+    last = LastMotion(goal[LEAST_SPEED], goal[MOST_SPEED], goal[MOST_TURN])
     aim = model.vectors[5]
     aim_at(model, steps, goal)
-    press(model, steps, fewer, way.even, speeds, vehicle)
+    press(model, steps, fewer, way.even, last, vehicle)
     after = steps - fewer
     effortless = way.hold > 0.0
     used = 0
@@ -131,12 +133,12 @@ def shorten(
                 differentiate_nearness(model, k, vehicle, scene, circles, barrier)
             pull_to_aim(model, after, goal)
         hold = way.hold if gapped else min(way.hold, GENTLE_HOLD)
-        linear, quadratic = sweep_back(model, after, speeds, damping, hold, gapped, vehicle)
+        linear, quadratic = sweep_back(model, after, last, damping, hold, gapped, vehicle)
         used += 1
         share = 1.0
         tried = math.inf
         for _ in range(TRIES):
-            drive_changed(model, after, share, speeds, vehicle)
+            drive_changed(model, after, share, last, vehicle)
             allowed = cost + LEAST_SHARE * share * (linear + share * quadratic)
             tried = _cost(
                 *(model.tried_states, model.tried_controls, after, effortless, aim, goal),

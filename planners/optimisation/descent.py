@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from planners.optimisation.gains import Aim, effort, in_time, miss, pull, sweep_back
+from planners.optimisation.gains import Aim, LastMotion, effort, in_time, miss, pull, sweep_back
 from planners.optimisation.gaps import Barrier
 from planners.optimisation.local_model import (
     Model,
@@ -29,7 +29,7 @@ TRIES: Final = 6  # shares 1, 1/2 ... of a change that are tried
 LEAST_SHARE: Final = 0.1  # of the expected gain that a change must bring
 FIRST_DAMPING: Final = 0.01
 MOST_DAMPING: Final = 1e3
-ANY_SPEED: Final = (-math.inf, math.inf)
+ANY_MOTION: Final = LastMotion(-math.inf, math.inf, math.inf)
 TURN_GAIN: Final = 10.0  # of the controller that drives along points
 
 
@@ -63,13 +63,8 @@ def _cost(
 
 
 @lean
-def drive_changed(
-    model: Model, steps: int, share: float, speeds: tuple[float, float], vehicle: Vehicle
-) -> None:
-    """Drive with a share of the change, and its feedback, into ``model.tried_states``.
-
-    ``speeds``: the least and the largest of the last state, in m/s.
-    """
+def drive_changed(model: Model, steps: int, share: float, last: LastMotion, vehicle: Vehicle) -> None:
+    """Drive with a share of the change, and its feedback, into ``model.tried_states``."""
     states, tried = model.states, model.tried_states
     size = states.shape[1]
     most_0, most_1 = control_limits(vehicle)
@@ -85,7 +80,7 @@ def drive_changed(
         here = load(tried, k, vehicle)
         first = min(max(first, -most_0), most_0)
         second = min(max(second, -most_1), most_1)
-        first, second = in_time(here, first, second, steps - k - 1, speeds, vehicle)
+        first, second = in_time(here, first, second, steps - k - 1, last, vehicle)
         model.tried_controls[k, 0] = first
         model.tried_controls[k, 1] = second
         store(tried, k + 1, step(here, first, second, vehicle))
@@ -181,7 +176,7 @@ def descend(
             cost = _cost(
                 *(model.states, model.controls, steps, aim, vehicle, scene, circles, barrier, math.inf)
             )
-        linear, quadratic = sweep_back(model, steps, ANY_SPEED, damping, 0.0, False, vehicle)
+        linear, quadratic = sweep_back(model, steps, ANY_MOTION, damping, 0.0, False, vehicle)
         used += 1
         if -(linear + quadratic) < stage.least_gain:
             if steps_to_goal(model.states, steps, goal, vehicle) >= 0 or steps == model.controls.shape[0]:
@@ -193,7 +188,7 @@ def descend(
         share = 1.0
         found = False
         for _ in range(TRIES):
-            drive_changed(model, steps, share, ANY_SPEED, vehicle)
+            drive_changed(model, steps, share, ANY_MOTION, vehicle)
             allowed = cost + LEAST_SHARE * share * (linear + share * quadratic)
             tried = _cost(
                 *(model.tried_states, model.tried_controls, steps, aim, vehicle, scene, circles, barrier),

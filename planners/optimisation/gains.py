@@ -20,6 +20,14 @@ EFFORT: Final = 0.01  # metres, of a step of full steering rate; keeps controls 
 GENTLE: Final = 0.1  # the share of that for full acceleration
 
 
+class LastMotion(NamedTuple):
+    """How the last state may move."""
+
+    least_speed: float  # m/s
+    most_speed: float
+    most_turn: float  # rad/s to either side, of a turn rate
+
+
 class Aim(NamedTuple):
     """What the last state is to come near to: how far it is from the goal along the approach."""
 
@@ -88,7 +96,7 @@ def _least(
 def sweep_back(
     model: Model,
     steps: int,
-    speeds: tuple[float, float],
+    last: LastMotion,
     damping: float,
     hold: float,
     gapped: bool,
@@ -99,7 +107,7 @@ def sweep_back(
     Args:
         model: a drive and its derivatives; ``gradient`` and ``curvature`` of its last state hold all costs.
         steps: of the drive.
-        speeds: the least and the largest speed of the last state, in m/s.
+        last: how the last state may move.
         damping: keeps the change small, as if it were so much more effort (metres).
         hold: what a change of the way by a metre or radian costs in each step, in metres; if it is above 0,
             controls cost nothing, only their change does.
@@ -178,7 +186,7 @@ def sweep_back(
             ahead[c] = across[0, c]
             slope[c] = across[1, c]
         change_0, change_1 = _feed_back(
-            *(model, k, steps, speeds, q0, q1, q00 + damping_0, q01, q11 + damping_1, ahead, slope, vehicle)
+            *(model, k, steps, last, q0, q1, q00 + damping_0, q01, q11 + damping_1, ahead, slope, vehicle)
         )
         linear += change_0 * q0 + change_1 * q1
         quadratic += 0.5 * (
@@ -229,14 +237,17 @@ def pull(model: Model, steps: int, aim: Aim) -> None:
 
 @inlined
 def in_time(
-    state: State, first: float, second: float, left: int, speeds: tuple[float, float], vehicle: Vehicle
+    state: State, first: float, second: float, left: int, last: LastMotion, vehicle: Vehicle
 ) -> tuple[float, float]:
-    """The controls, reduced if the speed after them could not become one of ``speeds`` in ``left`` steps.
+    """The controls, reduced if the motion after them could not become that of ``last`` in ``left`` steps.
 
     Who is too fast for that already gets a control beyond its limit, which ``shorten`` does not accept.
     """
-    change = left * control_limits(vehicle)[0] * vehicle.dt
-    first = kept_within(first, state[3], speeds[0] - change, speeds[1] + change, vehicle.dt)
+    limit_0, limit_1 = control_limits(vehicle)
+    change = left * limit_0 * vehicle.dt
+    first = kept_within(first, state[3], last.least_speed - change, last.most_speed + change, vehicle.dt)
+    most_turn = last.most_turn + left * limit_1 * vehicle.dt
+    second = kept_within(second, state[4], -most_turn, most_turn, vehicle.dt)
     return admissible(state, first, second, vehicle)
 
 
@@ -245,7 +256,7 @@ def _feed_back(
     model: Model,
     k: int,
     steps: int,
-    speeds: tuple[float, float],
+    last: LastMotion,
     q0: float,
     q1: float,
     h00: float,
@@ -261,8 +272,8 @@ def _feed_back(
     """
     most_0, most_1 = control_limits(vehicle)
     here = load(model.states, k, vehicle)
-    high_0, high_1 = in_time(here, most_0, most_1, steps - k - 1, speeds, vehicle)
-    low_0, low_1 = in_time(here, -most_0, -most_1, steps - k - 1, speeds, vehicle)
+    high_0, high_1 = in_time(here, most_0, most_1, steps - k - 1, last, vehicle)
+    low_0, low_1 = in_time(here, -most_0, -most_1, steps - k - 1, last, vehicle)
     u = model.controls[k, 0]
     w = model.controls[k, 1]
     low = (low_0 - u, low_1 - w)

@@ -102,7 +102,7 @@ def optimise(
     alone = Plan(start[None], np.empty((0, 2)), vehicle.dt)
     if count_free_prefix(alone.states, vehicle, scene) == 0:
         return ended(Ending.START_BLOCKED)
-    if reaches(load(alone.states, 0, vehicle), goal_of(problem)):
+    if reaches(load(alone.states, 0, vehicle), goal_of(problem, vehicle)):
         return ended(Ending.CONVERGED, alone)
     building = perf_counter()
     field = clearance_field(problem, settings.cell_m)

@@ -233,7 +233,7 @@ def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace)
     room = ROOM * (1 + steps // ROOM)
     model = workspace.buffers(allocate_model, room, state_size(vehicle))
     model.states[0] = start_state(problem, vehicle)
-    return model, goal_of(problem)
+    return model, goal_of(problem, vehicle)
 
 
 def _widest_hitch(vehicle: Vehicle) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from planners.optimisation.gains import LastMotion
 from planners.optimisation.local_model import Model
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import admissible, control_limits, load, step
@@ -42,13 +43,10 @@ def _time_left(speed: float, taken: float, even: float, vehicle: Vehicle) -> flo
 
 
 @lean
-def press(
-    model: Model, steps: int, fewer: int, even: float, speeds: tuple[float, float], vehicle: Vehicle
-) -> None:
+def press(model: Model, steps: int, fewer: int, even: float, last: LastMotion, vehicle: Vehicle) -> None:
     """Guess a drive of fewer steps on the way of ``model.best_states``, into ``model.states``, with its gaps.
 
-    Time is taken from slow steps first; ``even`` as in ``Way``. ``speeds``: the least and the largest at the
-    end, in m/s.
+    Time is taken from slow steps first; ``even`` as in ``Way``.
     """
     given, states, controls = model.best_states, model.states, model.controls
     size = states.shape[1]
@@ -75,9 +73,11 @@ def press(
         share = min(max((i - before) / here, 0.0), 1.0)
         for c in range(size):
             states[i, c] = given[k, c] + share * (given[k + 1, c] - given[k, c])
-        change = (after - i) * most_0 * vehicle.dt
+        left = (after - i) * vehicle.dt
         speed = min(max(states[i, 3] / here, vehicle.min_speed), vehicle.max_speed)
-        states[i, 3] = min(max(speed, speeds[0] - change), speeds[1] + change)
+        states[i, 3] = min(max(speed, last.least_speed - left * most_0), last.most_speed + left * most_0)
+        most_turn = last.most_turn + left * most_1
+        states[i, 4] = min(max(states[i, 4], -most_turn), most_turn)
     for i in range(after):
         state = load(states, i, vehicle)
         first = min(max((states[i + 1, 3] - states[i, 3]) / vehicle.dt, -most_0), most_0)

@@ -167,7 +167,7 @@ def search_and_polish(
         with the work and the time of all; and whether it is the given plan.
     """
     until = working_clock() + query.limits.seconds
-    goal, vehicle = goal_of(query.problem), query.vehicle
+    goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
     if planner == "lattice" and suits(goal, vehicle):
         query = replace(query, is_tight=is_tight(goal, vehicle, query.scene))
     varies = query.is_tight is not None and (

@@ -29,7 +29,7 @@ class GuidedSearch:
         problem, vehicle = query.problem, query.vehicle
         self._query, self._dt = query, vehicle.dt
         self._tree = query.workspace.buffers(trees.allocate_tree, NODES, state_size(vehicle))
-        self._goal = goal_of(problem)
+        self._goal = goal_of(problem, vehicle)
         self._grow = growing(query, guide)
         self._prefix = len(prefix.states)
         self._restart_at, self._trial = RRT.restart_after, 0

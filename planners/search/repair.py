@@ -148,7 +148,7 @@ def repair(
     problem, scene, vehicle, workspace = query.problem, query.scene, query.vehicle, query.workspace
     reference = np.ascontiguousarray(stored.states)
     states, controls = workspace.buffers(allocate_drive, state_size(vehicle))
-    goal, window = goal_of(problem), window_of(problem)
+    goal, window = goal_of(problem, vehicle), window_of(problem)
     at = len(drive.states)  # the reference state from which to look for a free part
     beyond_m = settings.rejoin_beyond_m
     checks = expansions = nodes = 0

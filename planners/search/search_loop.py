@@ -69,7 +69,7 @@ def attempt(
     problem, scene, limits, vehicle = query.problem, query.scene, query.limits, query.vehicle
     began = working_clock()
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
-    goal = goal_of(problem)
+    goal = goal_of(problem, vehicle)
     prefix = query.prefix
     if prefix is None:
         prefix = Plan(start_state(problem, vehicle)[np.newaxis], NO_CONTROLS, vehicle.dt)

@@ -12,19 +12,23 @@ from planners.world.jit import inlined
 from planners.world.problem import Problem
 from planners.world.trigonometry import length, wrapped
 from planners.world.vehicles.dynamics import State
+from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
 
-# of a goal [7 + 2 n]; then follow angle and tolerance (radians) of each hitch that counts
-X, Y, RADIUS, HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, HITCHES = range(8)
-SLACK: Final = 1e-9  # m/s and radians: what sums of controls round away
+# of a goal [8 + 2 n]; then follow angle and tolerance (radians) of each hitch that counts
+X, Y, RADIUS, HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, MOST_TURN, HITCHES = range(9)
+SLACK: Final = 1e-9  # m/s, rad/s and radians: what sums of controls round away
 
 
 def place(x: float, y: float, radius: float) -> Floats:
-    """Make the goal ``[7]`` of whoever is to get into a disc (metres), with any heading and speed."""
-    return np.array([x, y, radius, 0.0, math.inf, -math.inf, math.inf])
+    """Make the goal ``[8]`` of whoever is to get into a disc (metres), with any heading and motion."""
+    return np.array([x, y, radius, 0.0, math.inf, -math.inf, math.inf, math.inf])
 
 
-def goal_of(problem: Problem) -> Floats:
-    """Return what a problem asks for at its end, ``[7 + 2 n]`` with n hitch angles."""
+def goal_of(problem: Problem, vehicle: Vehicle) -> Floats:
+    """Return what a problem asks of a vehicle at its end, ``[8 + 2 n]`` with n hitch angles.
+
+    Who is to be at rest and has a turn rate that takes time to change must not turn either.
+    """
     goal = place(*problem.goal, problem.goal_radius)
     arrival = problem.arrival
     if arrival is None:
@@ -32,6 +36,8 @@ def goal_of(problem: Problem) -> Floats:
     if arrival.heading is not None:
         goal[HEADING : HEADING_TOLERANCE + 1] = arrival.heading, arrival.heading_tolerance + SLACK
     goal[LEAST_SPEED : MOST_SPEED + 1] = arrival.least_speed - SLACK, arrival.most_speed + SLACK
+    if isinstance(vehicle, DifferentialDrive) and not vehicle.first_order and arrival.is_rest:
+        goal[MOST_TURN] = SLACK
     hitches = [
         (hitch, tolerance + SLACK)
         for hitch, tolerance in zip(arrival.hitches, arrival.hitch_tolerances, strict=True)
@@ -52,6 +58,8 @@ def reaches(state: State, goal: Floats) -> bool:
         return False
     if not (goal[LEAST_SPEED] <= state[3] <= goal[MOST_SPEED]):
         return False
+    if abs(state[4]) > goal[MOST_TURN]:
+        return False
     if abs(wrapped(state[2] - goal[HEADING])) > goal[HEADING_TOLERANCE]:
         return False
     for k in range((goal.shape[0] - HITCHES) // 2):
@@ -69,5 +77,5 @@ def asks_for_more(goal: Floats) -> bool:
 
 
 def goal_of_pose(x: float, y: float, heading: float) -> Floats:
-    """Make the goal ``[7]`` of whoever is to stand at a pose (metres, radians), with the usual tolerances."""
-    return np.array([x, y, 0.1, heading, 0.05, -SLACK, SLACK])
+    """Make the goal ``[8]`` of whoever is to stand at a pose (metres, radians), with the usual tolerances."""
+    return np.array([x, y, 0.1, heading, 0.05, -SLACK, SLACK, math.inf])

@@ -44,6 +44,11 @@ class Arrival(NamedTuple):
     hitches: tuple[float, ...] = ()  # radians, one a trailer; none: any
     hitch_tolerances: tuple[float, ...] = ()  # radians, one a trailer
 
+    @property
+    def is_rest(self) -> bool:
+        """Whether the vehicle is to stand: a differential drive must not turn then either."""
+        return self.least_speed == self.most_speed == 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:

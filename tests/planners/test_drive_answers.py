@@ -137,7 +137,7 @@ def test_the_drive_that_was_moved_is_found_again(slots: PlanLibrary) -> None:
 
 
 def test_a_drive_is_put_to_a_goal_as_it_was_driven_or_as_in_a_mirror(slots: PlanLibrary) -> None:
-    goal = goal_of(drawn("parallel", "hard", 6, 1))
+    goal = goal_of(drawn("parallel", "hard", 6, 1), CAR)
     for drive, number in enumerate(slots.drives.plans):
         stored = slots.plans[number]
         for entry, side in ((drive, 1.0), (-1 - drive, -1.0)):

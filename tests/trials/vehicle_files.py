@@ -1,7 +1,8 @@
 """Vehicles in docs/vehicles, from scratch and by command: are they answered, how soon, how long is the drive?
 
-``python -m tests.trials.vehicle_files FOLDER [VEHICLE.yaml …]`` does two things for each. It solves 50
-problems of each class with each planner, and has every plan judged. Then it calls the command line as a user
+``python -m tests.trials.vehicle_files FOLDER [VEHICLE.yaml …]`` does three things for each. It solves 50
+problems of each class with each planner, and has every plan judged. It asks for 50 poses at rest in worlds of
+each class, for first plans and for improved ones, all judged. Then it calls the command line as a user
 would: a smoke run of one class, one plan with the memory of that run, one route over a map of the vehicle's
 size, each with the file as ``--vehicle`` and all of it below FOLDER. It prints rows of Markdown.
 """
@@ -18,8 +19,10 @@ from typing import Any, Final
 import numpy as np
 import pyarrow.dataset as ds
 
+from planners.maps.questions import question_in
 from planners.search.registry import PLANNERS
 from planners.solve import solve
+from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.vehicles.vehicle import Vehicle, name_of
@@ -53,6 +56,30 @@ def from_scratch(vehicle: Vehicle) -> list[str]:
         times = f"{1e3 * np.median(seconds):.2f} ms | {np.median(driven):.1f} s" if solved else "- | -"
         rows.append(f"| {name_of(vehicle)} | {planner} | {solved} of {total} | {refused} | {times} |")
     return rows
+
+
+def to_poses(vehicle: Vehicle) -> str:
+    """A row of Markdown: how many poses are reached; median and mean planning (ms), and mean driving (s)."""
+    workspace, cells = Workspace(), []
+    asked = []
+    for name in CLASSES:
+        drawn = problem_class(name, vehicle=vehicle)
+        questions = (question_in(drawn.draw(7, k), k, 7, vehicle, pose=True) for k in range(COUNT))
+        asked += [to_canonical(question)[0] for question in questions if question is not None]
+    for polished in (False, True):
+        seconds, driven, refused = [], [], 0
+        solve(asked[0], "lattice", vehicle=vehicle, workspace=workspace, polished=polished)  # compiles
+        for problem in asked:
+            attempt = solve(
+                problem, "lattice", vehicle=vehicle, seed=1, workspace=workspace, polished=polished
+            )
+            if attempt.plan is not None:
+                seconds.append(1e3 * attempt.planning_seconds)
+                driven.append(attempt.plan.duration_s)
+                refused += bool(faults(problem, attempt.plan, vehicle))
+        times = f"{np.median(seconds):.1f} | {np.mean(seconds):.1f} | {np.mean(driven):.2f}"
+        cells.append(f"{len(driven)} of {len(asked)} | {refused} | {times}")
+    return f"| {name_of(vehicle)} | " + " | ".join(cells) + " |"
 
 
 def by_command(file: Path, folder: Path) -> str:
@@ -101,7 +128,7 @@ def _call(*arguments: object) -> str:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the three tables."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("files", type=Path, nargs="*", default=EXAMPLES)
@@ -109,6 +136,8 @@ def main() -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     for file in options.files:
         print(*from_scratch(read_vehicle(file)), sep="\n", flush=True)
+    for file in options.files:
+        print(to_poses(read_vehicle(file)), flush=True)
     for file in options.files:
         print(by_command(file, options.folder), flush=True)
 

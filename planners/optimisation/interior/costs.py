@@ -17,13 +17,14 @@ from planners.optimisation.local_model import (
 )
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
-from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, RADIUS
+from planners.world.goal import HEADING_TOLERANCE, HITCHES, LEAST_SPEED, MOST_SPEED, MOST_TURN, RADIUS
 from planners.world.jit import inlined, jit, lean
-from planners.world.vehicles.dynamics import load, step
+from planners.world.vehicles.dynamics import load, step, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
-# metres; what it costs to be full speed off the speed that is asked at the end. A little speed is always left
-# that is worth the braking that it saves; taking it away must not move the vehicle out of its goal
+# metres; what it costs to be full speed off the speed that is asked at the end, or to turn at full rate where
+# none is asked. A little speed is always left that is worth the braking that it saves; taking it away must
+# not move the vehicle out of its goal
 SPEED_OFF: Final = 50_000.0
 
 
@@ -46,7 +47,10 @@ def weight_of_error(c: int, goal: Floats, hold: Hold, vehicle: Vehicle) -> float
     elif c == 3:
         asked = goal[MOST_SPEED] - goal[LEAST_SPEED] < math.inf
         return 2.0 * SPEED_OFF / (vehicle.max_speed * vehicle.max_speed) if asked else 0.0
-    elif c == 4 or c - 5 >= (goal.shape[0] - HITCHES) // 2:
+    elif c == 4:
+        most = turn_limit(vehicle)
+        return 2.0 * SPEED_OFF / (most * most) if goal[MOST_TURN] < math.inf else 0.0
+    elif c - 5 >= (goal.shape[0] - HITCHES) // 2:
         return 0.0
     else:
         return hold.pull * bend_of_error(goal[HITCHES + 2 * (c - 5) + 1])

@@ -1,4 +1,4 @@
-"""Makes what an optimisation found a drive: its controls within all limits, its end at the asked speed."""
+"""Makes what an optimisation found a drive: its controls within all limits, its end in the asked motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from planners.optimisation.descent import steps_to_goal
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
+from planners.world.goal import LEAST_SPEED, MOST_SPEED, MOST_TURN, SLACK
 from planners.world.jit import jit
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import admissible, control_limits, load, simulate, step, store
@@ -19,7 +19,7 @@ def driven(model: Model, steps: int, goal: Floats, vehicle: Vehicle, scene: Scen
     """The drive that the controls in ``model`` lead to, with its feedback, if it is free and arrives."""
     controls: Floats = np.empty((steps, 2))
     states = _follow(model, controls, vehicle)
-    controls = at_asked_speed(controls, float(states[-1, 3]), goal, vehicle)
+    controls = in_asked_motion(controls, states[-1], goal, vehicle)
     states = simulate(states[0], controls, vehicle)
     arrives = steps_to_goal(states[-1:], 0, goal, vehicle) == 0
     if not arrives or count_free_prefix(states, vehicle, scene) <= len(controls):
@@ -27,22 +27,25 @@ def driven(model: Model, steps: int, goal: Floats, vehicle: Vehicle, scene: Scen
     return Plan(states, controls, vehicle.dt)
 
 
-def at_asked_speed(controls: Floats, speed: float, goal: Floats, vehicle: Vehicle) -> Floats:
-    """Controls ``[T - 1, 2]`` that end at a speed that is asked for, where these end at ``speed`` (m/s).
+def in_asked_motion(controls: Floats, last: Floats, goal: Floats, vehicle: Vehicle) -> Floats:
+    """Controls ``[T - 1, 2]`` that end as fast and turning as is asked for, where these end in ``last [S]``.
 
     Rounding leaves a little speed, which the last steps take away. What they are to leave lies within what is
     asked by its slack, so that rounding again does no harm.
     """
-    most = control_limits(vehicle)[0]
-    asked = min(max(speed, goal[LEAST_SPEED] + SLACK), goal[MOST_SPEED] - SLACK)
-    missing = (asked - speed) / vehicle.dt
+    most_turn = goal[MOST_TURN] - SLACK
+    low = goal[LEAST_SPEED] + SLACK, -most_turn
+    high = goal[MOST_SPEED] - SLACK, most_turn
     controls = controls.copy()
-    for k in range(len(controls) - 1, -1, -1):
-        before = controls[k, 0]
-        controls[k, 0] = min(max(before + missing, -most), most)
-        missing -= controls[k, 0] - before
-        if missing == 0.0:
-            break
+    for c, most in enumerate(control_limits(vehicle)):
+        moves = last[3 + c]
+        missing = (min(max(moves, low[c]), high[c]) - moves) / vehicle.dt
+        for k in range(len(controls) - 1, -1, -1):
+            if missing == 0.0:
+                break
+            before = controls[k, c]
+            controls[k, c] = min(max(before + missing, -most), most)
+            missing -= controls[k, c] - before
     return controls
 
 

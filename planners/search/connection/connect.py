@@ -14,7 +14,7 @@ from planners.search.connection.connection import Connection, heading_at, last_s
 from planners.search.connection.profile import fill_run
 from planners.search.connection.words import PARTS
 from planners.world.arrays import Floats
-from planners.world.goal import HEADING_TOLERANCE, RADIUS, X, Y, reaches
+from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, X, Y, reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length, sincos, wrapped
 from planners.world.vehicles.dynamics import (
@@ -35,6 +35,7 @@ CORRECTIONS: Final = 8  # of a word's lengths
 CLOSER: Final = 0.7  # a correction that leaves more of the error than this may happen once
 AIMED: Final = 0.5  # the share of the tolerances that the end is brought within
 DAMPING: Final = 1e-6  # metres squared
+SMALLEST_BEND: Final = 1e-9  # 1/m
 GEAR, BEND, LENGTH, TIME = range(4)  # rows of ``Connection.parts``
 
 
@@ -57,7 +58,7 @@ def _take(c: Connection, number: int, radius: float, bend: float) -> int:
 @lean
 def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: float, vehicle: Vehicle) -> int:
     """Fill in the speeds, and when each part ends. Returns the steps; -1 if that is not possible."""
-    acceleration = control_limits(vehicle)[0]
+    acceleration, turning = control_limits(vehicle)
     parts = c.parts
     at = 0
     k = 0
@@ -73,6 +74,9 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
         begin = gear * c.states[0, 3] if k == 0 else 0.0
         last = 0.0
         if end == count:
+            if goal[MOST_TURN] < math.inf:  # then the turn has to end as the speed does
+                curvature = abs(curvature_of(parts[BEND, count - 1], vehicle))
+                acceleration = min(acceleration, turning / max(curvature, SMALLEST_BEND))
             last = min(last_speed(gear, begin, metres, goal, acceleration), fastest)
         after = fill_run(c.speeds, at, metres, begin, last, fastest, gear, acceleration, vehicle.dt)
         if after < 0:

@@ -48,7 +48,7 @@ class Drive(NamedTuple):
     counts: Indices  # [3] steps; looks at obstacles; parts of known endings
     levels: Indices  # [STRIDES + 1] which of the ``PACES`` is free at each stride of an arc
     limits: Floats  # [STRIDES + 1] and the speed that this allows, in m/s
-    target: Floats  # [7] as of ``goal_of``: the node
+    target: Floats  # [8] as of ``goal_of``: the node
     connection: Connection
     join: Join
     ways: Ways
@@ -62,7 +62,7 @@ def allocate_drive(state_size: int) -> Drive:
         np.zeros(3, np.int64),
         np.zeros(STRIDES + 1, np.int64),
         np.zeros(STRIDES + 1),
-        np.array([0.0, 0.0, NEAR_M, 0.0, NEAR_M, -SLACK, SLACK]),
+        np.array([0.0, 0.0, NEAR_M, 0.0, NEAR_M, -SLACK, SLACK, math.inf]),
         allocate_connection(state_size),
         allocate_join(state_size),
         allocate_ways(),

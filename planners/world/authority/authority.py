@@ -20,7 +20,7 @@ from planners.world.authority.authority_equations import (
 )
 from planners.world.authority.authority_sweeps import sweep_faults
 from planners.world.problem import Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, Vehicle, state_size
+from planners.world.vehicles.vehicle import CAR, CarWithTrailers, DifferentialDrive, Vehicle, state_size
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
 BETWEEN = 0.01  # radians: how far a hitch may pass its limit between two states within it
@@ -60,12 +60,12 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     if miss > problem.goal_radius + ROUNDING:
         found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
     if problem.arrival is not None:
-        found += _arrival_faults(states[-1].tolist(), problem.arrival)
+        found += _arrival_faults(states[-1].tolist(), problem.arrival, vehicle)
     return found + sweep_faults(problem, states, controls, vehicle)
 
 
-def _arrival_faults(last: list[float], arrival: Arrival) -> list[str]:
-    """What is wrong with heading, speed and hitch angles of the ``last [S]`` state."""
+def _arrival_faults(last: list[float], arrival: Arrival, vehicle: Vehicle) -> list[str]:
+    """What is wrong with heading, speed, turn rate and hitch angles of the ``last [S]`` state."""
     found = []
     if arrival.heading is not None:
         off = abs(math.remainder(last[2] - arrival.heading, math.tau))
@@ -75,6 +75,9 @@ def _arrival_faults(last: list[float], arrival: Arrival) -> list[str]:
     low, high = arrival.least_speed, arrival.most_speed
     if not low - TOLERANCE <= last[3] <= high + TOLERANCE:
         found.append(f"Arrival: the last speed is {last[3]:.3g} m/s; asked are {low:g} to {high:g} m/s.")
+    has_turn_rate = isinstance(vehicle, DifferentialDrive) and not vehicle.first_order
+    if has_turn_rate and (low, high) == (0.0, 0.0) and abs(last[4]) > TOLERANCE:
+        found.append(f"Turn: the last turn rate is {last[4]:.3g} rad/s; at rest it is 0.")
     asked = zip(last[5:], arrival.hitches, arrival.hitch_tolerances, strict=bool(arrival.hitches))
     for number, (angle, wanted, allowed) in enumerate(asked, start=1):
         off = abs(angle - wanted)

@@ -14,8 +14,8 @@ from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
 from planners.optimisation.interior.costs import SPEED_OFF, Hold, try_change
-from planners.optimisation.interior.drivable import at_asked_speed
 from planners.optimisation.interior.drivable import driven as driven_after
+from planners.optimisation.interior.drivable import in_asked_motion
 from planners.optimisation.interior.newton import direction
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import allocate_model
@@ -66,7 +66,7 @@ def test_the_direction_solves_newtons_equations(seed: int, time_counts: float) -
     rng = np.random.default_rng(seed)
     steps, size = 6, 5
     problem, plan = driven(rng.uniform(-1.0, 1.0, (steps, 2)), box(27.0, 26.2, 0.3, 0.5, 0.4))
-    goal, scene = goal_of(problem), scene_of(problem)
+    goal, scene = goal_of(problem, CAR), scene_of(problem)
     model, interior = allocate_model(steps, size), allocate_interior(steps, size)
     model.states[:] = plan.states + rng.normal(0.0, 0.05, plan.states.shape)
     model.controls[:] = plan.controls
@@ -102,7 +102,7 @@ def test_controls_that_pass_a_limit_leave_gaps(seed: int, vehicle: Vehicle) -> N
     rng = np.random.default_rng(seed)
     steps, size = 6, 5 + len(trailers_of(vehicle))
     problem, _ = driven(np.zeros((steps, 2)), vehicle=vehicle)
-    goal, scene = goal_of(problem), scene_of(problem)
+    goal, scene = goal_of(problem, vehicle), scene_of(problem)
     model, interior = allocate_model(steps, size), allocate_interior(steps, size)
     model.states[:] = start_state(problem, vehicle)
     most = np.array([vehicle.max_speed, turn_limit(vehicle)])
@@ -286,19 +286,25 @@ def test_feedback_keeps_a_drive_within_all_limits(seed: int, off: float, vehicle
     model.states[1:] += rng.normal(0.0, off, model.states[1:].shape)
     model.controls[:] = controls
     model.feedback[:] = rng.normal(0.0, 20.0, model.feedback.shape)
-    found = driven_after(model, 8, goal_of(problem), vehicle, scene_of(problem))
+    found = driven_after(model, 8, goal_of(problem, vehicle), vehicle, scene_of(problem))
     assert found is not None
     assert faults(problem, found, vehicle) == []
 
 
 @settings(max_examples=50, deadline=None)
-@given(seed=st.integers(0, 10**6), left=st.floats(-0.01, 0.01))
-def test_what_rounding_leaves_of_a_speed_does_not_count(seed: int, left: float) -> None:
+@given(
+    seed=st.integers(0, 10**6),
+    left=st.tuples(st.floats(-0.01, 0.01), st.floats(-0.01, 0.01)),
+    vehicle=st.sampled_from([CAR, DIFFERENTIAL_DRIVE]),
+)
+def test_what_rounding_leaves_of_a_motion_does_not_count(
+    seed: int, left: tuple[float, float], vehicle: Vehicle
+) -> None:
     rng = np.random.default_rng(seed)
     controls = np.concatenate([manoeuvre(2), rng.normal(0.0, 1e-3, (3, 2))])
-    problem, plan = driven(controls)
-    controls[-1, 0] += (left - plan.states[-1, 3]) / CAR.dt
-    start = start_state(problem, CAR)
-    speed = float(simulate(start, controls, CAR)[-1, 3])
-    ended = simulate(start, at_asked_speed(controls, speed, goal_of(problem), CAR), CAR)
-    assert reaches(tuple(ended[-1]), goal_of(problem))
+    problem, plan = driven(controls, vehicle=vehicle)
+    controls[-1] += (left - plan.states[-1, 3:5]) / vehicle.dt
+    start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
+    last = simulate(start, controls, vehicle)[-1]
+    ended = simulate(start, in_asked_motion(controls, last, goal, vehicle), vehicle)
+    assert reaches(tuple(ended[-1]), goal)

@@ -119,7 +119,7 @@ def test_the_controller_follows_a_plan_from_its_start_to_its_goal(seed):
     problem = problem_of([])
     states, controls = np.empty((2000, 5)), np.empty((2000, 2))
     states[0] = start_state(problem)
-    goal = goal_of(problem)
+    goal = goal_of(problem, CAR)
     ended, last, _ = track(states, controls, 0, stored.states, 0, goal, TRACKING, CAR, scene_of(problem))
     assert ended == ARRIVED
     assert last <= 1.5 * len(stored.states)
@@ -135,7 +135,7 @@ def test_the_controller_stops_before_an_obstacle():
     states, controls = np.empty((2000, 5)), np.empty((2000, 2))
     states[0] = start_state(problem)
     scene = scene_of(problem)
-    goal = goal_of(problem)
+    goal = goal_of(problem, CAR)
     ended, last, _ = track(states, controls, 0, stored.states, 0, goal, TRACKING, CAR, scene)
     assert ended == BLOCKED
     assert count_free_prefix(states[: last + 1], CAR, scene) == last + 1

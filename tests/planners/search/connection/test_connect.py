@@ -12,7 +12,7 @@ from planners.search.connection.connect import connect
 from planners.search.connection.connection import allocate_connection
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of, simulate_again
-from planners.world.goal import goal_of_pose, reaches
+from planners.world.goal import MOST_TURN, SLACK, goal_of_pose, reaches
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle, state_size
 
@@ -67,6 +67,22 @@ def test_connections_are_lawful_drives_to_the_goal_and_nearly_always_there(
                 assert limit.values.min() >= limit.low - 1e-9
                 assert limit.values.max() <= limit.high + 1e-9
     assert closed >= (0.8 if moving else 0.98) * len(asked)
+
+
+@pytest.mark.parametrize("turn_acceleration", [0.5, 1.5, 4.0])
+def test_a_differential_drive_stands_still_at_the_end_however_slowly_its_turn_ends(
+    turn_acceleration: float,
+) -> None:
+    brisk = DIFFERENTIAL_DRIVE._replace(max_acceleration=20.0, max_turn_acceleration=turn_acceleration)
+    closed = []
+    for most_turn in (math.inf, SLACK):
+        closed.append(0)
+        for start, goal in questions(brisk, False, 60, 4):
+            goal[MOST_TURN] = most_turn
+            drive = connection(start, goal, brisk, brisk.max_speed)
+            closed[-1] += drive is not None
+            assert drive is None or abs(drive[0][-1, 4]) <= most_turn
+    assert closed[1] >= 0.95 * closed[0] > 0.0  # to stand is hardly harder
 
 
 @pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE], ids=["car", "differential-drive"])

@@ -38,7 +38,7 @@ def test_arcs_of_a_tree_are_driven_exactly(name: str) -> None:
     failed = arcs = 0
     for number in range(4):
         problem = to_canonical(family(name, "hard").draw(3, number))[0]
-        scene, goal = scene_of(problem), goal_of(problem)
+        scene, goal = scene_of(problem), goal_of(problem, CAR)
         occupied = drawing_of(problem, Workspace()).occupied
         fill_cost_to_go(occupied, *problem.start[:2], 0.1, window_of(problem), go)
         known = FromStart(

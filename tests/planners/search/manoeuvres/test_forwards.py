@@ -57,10 +57,10 @@ def test_poses_are_reached_without_reversing(name: str) -> None:
 def test_who_cannot_stand_is_not_asked_to() -> None:
     unicycle = FORWARDS["unicycle that cannot stand"]
     problem = asked(0, unicycle)
-    assert suits(goal_of(problem), unicycle)
+    assert suits(goal_of(problem, unicycle), unicycle)
     at_rest = replace(problem, arrival=Arrival(0.0, 0.1, 0.0, 0.0))
-    assert not suits(goal_of(at_rest), unicycle)
-    assert not suits(goal_of(problem), unicycle._replace(first_order=False))
+    assert not suits(goal_of(at_rest, unicycle), unicycle)
+    assert not suits(goal_of(problem, unicycle), unicycle._replace(first_order=False))
 
 
 def in_a_dead_end(seed: int, vehicle: Vehicle) -> Problem:

@@ -35,7 +35,7 @@ def shape(problem):
 def build(problem, settings, seed=0, guide=ANYWHERE):
     scene = scene_of(problem)
     roadmap = allocate_roadmap(settings.most_nodes, settings.neighbours)
-    goal = goal_of(problem)
+    goal = goal_of(problem, CAR)
     start = np.array([*problem.start, 0.0, 0.0])
     joined = build_roadmap(roadmap, start, goal, guide, settings, CAR, scene, generator(seed).bit_generator)
     return roadmap, joined, scene

@@ -20,7 +20,7 @@ from planners.world.goal import goal_of, reaches
 from planners.world.problem import Arrival, Plan, obstacles_of, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, Vehicle
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle
 from tests.planners.world.motions import exact_motion
 from tests.planners.world.strategies import box_corners, clutter, problem_with, seeds
 
@@ -186,7 +186,28 @@ def test_an_arrival_is_judged_as_the_planners_judge_it(
     if not arrival.least_speed <= plan.states[-1, 3] <= arrival.most_speed:
         wrong.add("Arrival")
     assert set(kinds(faults(asked, plan))) == wrong
-    assert reaches(tuple(plan.states[-1]), goal_of(asked)) == (not wrong)
+    assert reaches(tuple(plan.states[-1]), goal_of(asked, CAR)) == (not wrong)
+
+
+@given(
+    turn=st.sampled_from([0.0, -2.0, 1e-4, 2.0]),
+    most=st.sampled_from([0.0, 0.5]),
+    heading=st.sampled_from([None, 0.0]),
+    vehicle=st.sampled_from([CAR, DIFFERENTIAL_DRIVE, DIFFERENTIAL_DRIVE._replace(first_order=True)]),
+)
+def test_who_is_to_rest_must_not_turn(
+    turn: float, most: float, heading: float | None, vehicle: Vehicle
+) -> None:
+    """Of a car the fifth number is its steering, and a unicycle of the first order stops at once."""
+    turn = min(max(turn, -0.5), 0.5) if vehicle is CAR else turn
+    arrival = Arrival(heading, 0.1, 0.0, most)
+    asked = replace(
+        EMPTY, start=(10.0, 10.0, 0.0), goal=(10.0, 10.0), start_motion=(0.0, turn), arrival=arrival
+    )
+    plan = Plan(start_state(asked, vehicle)[np.newaxis], np.empty((0, 2)))
+    wrong = ["Turn"] if vehicle is DIFFERENTIAL_DRIVE and most == 0.0 and turn != 0.0 else []
+    assert kinds(faults(asked, plan, vehicle)) == wrong
+    assert reaches(tuple(plan.states[-1]), goal_of(asked, vehicle)) == (not wrong)
 
 
 def test_hitch_angles_at_the_goal_are_judged() -> None:
@@ -195,7 +216,7 @@ def test_hitch_angles_at_the_goal_are_judged() -> None:
     for asked, wrong in (((0.25, -0.2), []), ((0.1, -0.2), ["Hitch 1"]), ((0.3, 0.0), ["Hitch 2"])):
         problem = replace(start, arrival=Arrival(hitches=asked, hitch_tolerances=(0.1, 0.1)))
         assert kinds(faults(problem, plan, CAR_2_TRAILERS)) == wrong
-        assert reaches(tuple(plan.states[-1]), goal_of(problem)) == (not wrong)
+        assert reaches(tuple(plan.states[-1]), goal_of(problem, CAR_2_TRAILERS)) == (not wrong)
 
 
 def test_a_long_thin_piece_two_decimetres_away_is_not_met() -> None:
