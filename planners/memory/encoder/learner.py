@@ -8,10 +8,9 @@ from torch import Tensor
 from torch.nn.functional import pad
 
 from planners.memory.encoder.adamw import AdamW, FlatParameters, one_cycle
-from planners.memory.encoder.device import forward_on
 from planners.memory.encoder.encoder import Weights
 from planners.memory.encoder.objectives import Objective
-from planners.memory.encoder.torch_network import embed_all, unpacked
+from planners.memory.encoder.torch_network import embed, embed_all, unpacked
 from planners.memory.plans.cell_masks import CELL_SCORES, MOST_CELLS
 from planners.world.arrays import Flags, Floats32, Integers
 from planners.world.geometry.occupancy import ALL_CELLS, GRID, Bits, Grid
@@ -47,7 +46,6 @@ class Learner:
         self._cell_scores = torch.from_numpy(CELL_SCORES).to(device)
         self._parameters = FlatParameters(weights | own, device)
         self._optimiser = AdamW(self._parameters.values, weight_decay)
-        self._forward = forward_on(device)
         self._best = self._parameters.values.detach().clone()
 
     def epoch(self, objective: Objective, order: Integers, batch: int, steps: int, rate: float) -> float:
@@ -59,7 +57,7 @@ class Learner:
         rng = torch.Generator(self._bits.device).manual_seed(self._optimiser.steps)
         for part in torch.split(torch.from_numpy(order).to(self._bits.device), batch):
             named = self._parameters.named()
-            embeddings = self._forward(named, self._bits[part])
+            embeddings = embed(named, self._bits[part])
             if objective.dropout:
                 kept = torch.rand(embeddings.shape, generator=rng, device=embeddings.device)
                 embeddings = embeddings * (kept >= objective.dropout) / (1.0 - objective.dropout)
