@@ -22,7 +22,7 @@ from planners.search.guides.detour import SECOND_LOOK
 from planners.search.guides.guidance import published_guidance
 from planners.search.help import fresh_guide
 from planners.search.outcome import Status
-from planners.search.query import Limits, Query
+from planners.search.query import Limits, Query, usual_limits
 from planners.search.registry import PLANNERS
 from planners.world.arrays import Integers
 from planners.world.compiling import working_clock
@@ -78,7 +78,7 @@ def solve(
         top_k: how many plans to recall.
         memory: to recall from; ``none`` and ``fresh`` ignore it.
         seed: of all random choices.
-        limits: when the search gives up; by default those of ``Limits``.
+        limits: when the search gives up; by default ``usual_limits``.
         vehicle: what is to be driven.
         strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
         workspace: the caller's buffers; by default new ones.
@@ -91,7 +91,7 @@ def solve(
     fault = _fault(problem, planner, assist, memory, vehicle)
     if fault is not None:
         raise ValueError(fault)
-    limits = limits or Limits()
+    limits = limits or usual_limits(problem)
     view = View(problem, workspace)
     improves = polished and problem.arrival is not None
     if assist in WITHOUT_MEMORY or memory is None:

@@ -40,6 +40,7 @@ class Endings(NamedTuple):
     follows: Integers  # [K] the part that comes after it, always one before in this order; -1: the goal
 
 
+POSE_EXPANSIONS = 60_000
 NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1, 0)
 
 
@@ -54,6 +55,12 @@ class Limits:
     further: int = (
         0  # expansions at least for drives of other kinds after a first to a pose; not with trailers
     )
+
+
+def usual_limits(problem: Problem) -> Limits:
+    """The limits if none are given: a pose is worth more, since with trailers it may take some seconds."""
+    is_pose = problem.arrival is not None and problem.arrival.heading is not None
+    return Limits(expansions=POSE_EXPANSIONS) if is_pose else Limits()
 
 
 @dataclass(frozen=True, eq=False)

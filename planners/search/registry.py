@@ -11,7 +11,7 @@ from planners.search.follow import FollowSettings, follow
 from planners.search.gust import GustSettings, gust
 from planners.search.lattice import LatticeSettings, lattice
 from planners.search.outcome import Outcome
-from planners.search.query import Guide, Limits, Query
+from planners.search.query import Guide, Limits, Query, usual_limits
 from planners.search.rrt import RrtSettings, rrt
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.problem import Plan, Problem
@@ -42,5 +42,5 @@ def plan(
     The arguments are the fields of ``Query``. Scene, limits and workspace are made if they are not given.
     """
     ready = scene_of(problem) if scene is None else scene
-    query = Query(problem, rng, ready, workspace or Workspace(), guide, limits or Limits(), vehicle, prefix)
-    return PLANNERS[name](query)
+    buffers, most = workspace or Workspace(), limits or usual_limits(problem)
+    return PLANNERS[name](Query(problem, rng, ready, buffers, guide, most, vehicle, prefix))

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from planners.maps.questions import question_in
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
+from planners.solve import solve
+from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
+from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
+from storage.vehicles.vehicle_files import read_vehicle
 from tests.worlds import strewn
 
 
@@ -57,3 +63,16 @@ def test_a_better_plan_than_a_given_one_still_arrives() -> None:
     limits = Limits(bound_s=0.95 * first.duration_s)
     better = plan("lattice", problem, generator(1), limits=limits).plan
     assert better is None or (better.duration_s < limits.bound_s and faults(problem, better) == [])
+
+
+def test_a_train_is_given_the_time_that_its_poses_take() -> None:
+    """The lorry backs into this one after more expansions than a place is worth."""
+    lorry = read_vehicle(Path("docs/vehicles/semitrailer.yaml"))
+    world = problem_class("curves", vehicle=lorry).draw(7, 36)
+    question = question_in(world, 36, 7, lorry, pose=True)
+    assert question is not None
+    asked, _ = to_canonical(question)
+    assert solve(asked, "lattice", seed=1, limits=Limits(), vehicle=lorry, polished=False).plan is None
+    found = solve(asked, "lattice", seed=1, vehicle=lorry, polished=False).plan
+    assert found is not None
+    assert faults(asked, found, lorry) == []
