@@ -26,6 +26,7 @@ from storage.exchange.problem_files import (
 from storage.exchange.question_fields import (
     goal_of,
     hint_of_degrees,
+    hint_of_radius,
     numbers_of,
     question_fields,
     start_motion_of,
@@ -144,7 +145,7 @@ def _checked(
             yield where, f'id "{problem.id}" occurs twice; give every problem its own'
             continue
         seen.add(problem.id)
-        hint = hint_of_degrees(problem) if warns else None
+        hint = (hint_of_degrees(problem) or hint_of_radius(fields, vehicle)) if warns else None
         if hint is not None:
             _LOG.warning("%s: %s.", with_id, hint)
             warns = False

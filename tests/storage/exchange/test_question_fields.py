@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.world.problem import BOUNDS, Arrival, Problem, obstacles_of
-from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, VEHICLES, state_names
+from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, VEHICLES, About, state_names
 from storage.exchange.problem_files import FIELDS, FORMATS
 from storage.exchange.problems import fields_of, problem_of, read_problems, write_problems
 from tests.storage.samples import quick
@@ -134,6 +134,25 @@ def test_a_malformed_question_is_told_in_one_line(vehicle: Any, changes: dict[st
         assert json.loads(json.dumps(fields_of(asked, vehicle), allow_nan=False))
     assert "\n" not in told
     assert len(told) < 600
+
+
+@pytest.mark.parametrize(
+    ("goal", "scale", "is_wide"),
+    [
+        ({}, 0.5, True),
+        ({}, 1.0, False),
+        ({"goal_radius": 2.0}, 0.5, False),
+        ({"goal": [50.0, 50.0, 1.0]}, 0.5, False),
+    ],
+)
+def test_a_small_robot_is_told_how_wide_a_goal_is_whose_radius_is_left_out(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, goal: dict[str, Any], scale: float, is_wide: bool
+) -> None:
+    path = tmp_path / "near.json"
+    path.write_text(json.dumps({name: value for name, value in GOOD.items() if name != "goal_radius"} | goal))
+    (asked,) = read_problems(path, CAR._replace(scale=scale, front=0.8, about=About(b"small")))
+    assert [record.levelname for record in caplog.records] == ["WARNING"] * is_wide
+    assert scale * asked.goal_radius == pytest.approx(0.1 if len(goal.get("goal", [])) == 3 else 2.0)
 
 
 @pytest.mark.parametrize(
