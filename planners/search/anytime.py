@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from time import perf_counter
 from typing import NamedTuple
 
 from planners.optimisation.polish import most_iterations, polish, polish_quickest
@@ -84,7 +83,7 @@ def improve(
         name: of the planner that searches.
         problem: what to solve.
         given: a plan for the problem to begin with, if there is one.
-        seconds: when to end.
+        seconds: when to end; compiling does not count.
         expansions: after how many expansions of all searches together to end.
         seed: of all random choices.
         scene: ``scene_of(problem)``, if the caller has it already.
@@ -96,7 +95,7 @@ def improve(
     """
     if not math.isfinite(seconds) and expansions is None:
         raise ValueError("improving a plan never ends by itself: give seconds or expansions")
-    began = perf_counter()
+    began = working_clock()
     scene = scene_of(problem) if scene is None else scene
     workspace = workspace or Workspace()
     most = math.inf if expansions is None else expansions
@@ -112,7 +111,7 @@ def improve(
         if best is not None and plan.duration_s >= best.duration_s:
             return False
         best = plan
-        history.append(Improvement(perf_counter() - began, spent, plan.duration_s))
+        history.append(Improvement(working_clock() - began, spent, plan.duration_s))
         return True
 
     def consider(plan: Plan) -> bool:
@@ -120,14 +119,14 @@ def improve(
         nonlocal spent
         kept = keep(plan)  # at once: polishing takes milliseconds
         iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
-        left = seconds - (perf_counter() - began)
+        left = seconds - (working_clock() - began)
         better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
         spent += EXPANSIONS_AN_ITERATION * better.iterations
         return keep(better.plan or plan) or kept
 
     if given is not None:
         consider(given)
-    while spent < most and (left := seconds - (perf_counter() - began)) > 0.0:
+    while spent < most and (left := seconds - (working_clock() - began)) > 0.0:
         limits = Limits(
             expansions=int(min(budget, most - spent)),
             seconds=min(left, Limits.seconds),
@@ -145,7 +144,7 @@ def improve(
         else:
             budget *= GROWTH
             slack *= SLACK_KEPT
-    return Improved(best, tuple(history), perf_counter() - began, checks, spent, nodes, is_given)
+    return Improved(best, tuple(history), working_clock() - began, checks, spent, nodes, is_given)
 
 
 def search_and_polish(

@@ -39,6 +39,7 @@ from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
 # of an improver after its first polish: enough for one free and one guided search
 WARM_EXPANSIONS: Final = 1000
+WARM_IMPROVING_S: Final = 0.5  # what is not reached by then is not counted when it is compiled later
 
 
 class AssistantSettings(NamedTuple):
@@ -139,6 +140,7 @@ class Assistant:
             work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
             improve(
                 *(self.settings.planner, other, attempts[0].plan),
+                seconds=WARM_IMPROVING_S,
                 expansions=work,
                 seed=seed,
                 vehicle=self.vehicle,
