@@ -55,7 +55,8 @@ class LatticeSettings(NamedTuple):
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
-    head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight
+    head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight ...
+    joining_slice: int = 256  # ... and at once later
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
@@ -135,12 +136,18 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                 at_random(tree, goal, until)
 
     def join(tree: trees.Tree, is_tight: bool) -> bool:
-        """Aim at known endings with as much work as all else has had: what is found alone is found still."""
+        """Aim at known endings with as much work as all else has had: what is found alone is found still.
+
+        Work is counted in expansions and in looks at obstacles, of which one expansion may take many.
+        """
         nonlocal joined
         if joining is None:
             return False
-        more = int(tree.counts[trees.EXPANSIONS]) + (settings.head_start if is_tight else 0)
-        found = joining.advance(tree, more - joining.expansions)
+        ahead = max(settings.head_start - joining.expansions, 0) if is_tight else 0
+        behind = min(int(tree.counts[trees.EXPANSIONS]) - joining.expansions, settings.joining_slice)
+        if joining.checks >= tree.counts[trees.CHECKS]:
+            behind = 0
+        found = joining.advance(tree, max(ahead, behind))
         joined = found and joining.joined
         return found
 

@@ -20,6 +20,7 @@ from planners.world.problem import Arrival, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR
 from planners.world.workspace import Workspace
 from tests.planners.world.strategies import problem_with
+from tests.worlds import box
 
 SLOTS = range(6)
 
@@ -59,6 +60,27 @@ def test_ends_of_stored_plans_are_joined_and_the_drive_is_right(workspace: Works
         assert not faults(slot(number), attempt.plan, CAR)
     searched = sum(alone(number, workspace).expansions for number in SLOTS)
     assert sum(attempt.expansions for attempt in joined) < searched
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_ends_that_do_not_help_cost_about_as_much_as_all_else(number: int, workspace: Workspace) -> None:
+    """Aiming at them takes more looks at obstacles an expansion, which counts; a little is in advance."""
+    asked = slot(number)
+    left, low, right, high = asked.bounds
+    x, y = left - 10.0, 0.5 * (low + high)
+    walls = [box(x, y + side * 4.0, 0.0, 5.0, 0.2) for side in (-1.0, 1.0)]
+    walls += [box(x + side * 4.0, y, 0.0, 0.2, 4.0) for side in (-1.0, 1.0)]
+    shut_in = replace(
+        asked,
+        start=(x, y, 0.0),
+        bounds=(x - 8.0, min(low, y - 8.0), right, max(high, y + 8.0)),
+        obstacles=obstacles_of([[piece] for piece in [*asked.obstacles.pieces(), *walls]]),
+    )
+    question, library = to_canonical(shut_in)[0], library_of(SLOTS, workspace)
+    without = solve(question, "lattice", workspace=workspace, polished=False)
+    joining = solve(question, "lattice", "join", memory=library, workspace=workspace, polished=False)
+    assert without.plan is joining.plan is None
+    assert joining.collision_checks <= 2.5 * without.collision_checks
 
 
 def test_what_is_only_recalled_joins_nothing(workspace: Workspace) -> None:
