@@ -62,7 +62,7 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     asked = goal_state(problem, vehicle)
     if asked is None:
         disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
-        axes.add_patch(disc).set_zorder(2)
+        axes.add_patch(disc).set_zorder(0.5)  # below obstacles, which it may meet
     else:
         _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
     standing = start_state(problem, vehicle)[np.newaxis]

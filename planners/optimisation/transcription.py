@@ -21,7 +21,7 @@ import numpy as np
 from planners.optimisation.clearance_field import ClearanceField
 from planners.optimisation.equations import discs_of, limits_of, step_of
 from planners.world.arrays import Floats
-from planners.world.goal import MOST_TURN, goal_of
+from planners.world.goal import must_not_turn
 from planners.world.problem import Arrival, Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
@@ -132,7 +132,7 @@ def transcribe(
     last_low, last_high = all_low[-size - 1 : -1], all_high[-size - 1 : -1]
     last_low[3] = max(last_low[3], arrival.least_speed)
     last_high[3] = min(last_high[3], arrival.most_speed)
-    if goal_of(problem, vehicle)[MOST_TURN] < math.inf:
+    if must_not_turn(arrival, vehicle):
         last_low[4] = last_high[4] = 0.0
     for k, (hitch, tolerance) in enumerate(zip(arrival.hitches, arrival.hitch_tolerances, strict=True)):
         last_low[5 + k] = max(last_low[5 + k], hitch - GOAL_SHY * tolerance)

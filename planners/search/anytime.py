@@ -61,6 +61,11 @@ class Improved:
     is_given: bool  # the plan is the given one, polished or not
 
 
+def _is_there(plan: Plan | None) -> bool:
+    """Whether a plan takes no time: the start is what is asked for, and nothing is quicker."""
+    return plan is not None and len(plan.controls) == 0
+
+
 def improve(
     name: str,
     problem: Problem,
@@ -126,7 +131,7 @@ def improve(
 
     if given is not None:
         consider(given)
-    while spent < most and (left := seconds - (working_clock() - began)) > 0.0:
+    while spent < most and not _is_there(best) and (left := seconds - (working_clock() - began)) > 0.0:
         limits = Limits(
             expansions=int(min(budget, most - spent)),
             seconds=min(left, Limits.seconds),

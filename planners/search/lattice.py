@@ -56,7 +56,7 @@ class LatticeSettings(NamedTuple):
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
     head_start: int = 300  # expansions of the search that aims at known endings, if the goal is tight ...
-    joining_slice: int = 256  # ... and at once later
+    joining_slice: int = 256  # ... and at most so many each time that it has a turn later
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
@@ -143,11 +143,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         nonlocal joined
         if joining is None:
             return False
-        ahead = max(settings.head_start - joining.expansions, 0) if is_tight else 0
+        in_advance = max(settings.head_start - joining.expansions, 0) if is_tight else 0
         behind = min(int(tree.counts[trees.EXPANSIONS]) - joining.expansions, settings.joining_slice)
         if joining.checks >= tree.counts[trees.CHECKS]:
             behind = 0
-        found = joining.advance(tree, max(ahead, behind))
+        found = joining.advance(tree, max(in_advance, behind))
         joined = found and joining.joined
         return found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.jit import inlined
-from planners.world.problem import Problem
+from planners.world.problem import Arrival, Problem
 from planners.world.trigonometry import length, wrapped
 from planners.world.vehicles.dynamics import State
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
@@ -24,11 +24,13 @@ def place(x: float, y: float, radius: float) -> Floats:
     return np.array([x, y, radius, 0.0, math.inf, -math.inf, math.inf, math.inf])
 
 
-def goal_of(problem: Problem, vehicle: Vehicle) -> Floats:
-    """Return what a problem asks of a vehicle at its end, ``[8 + 2 n]`` with n hitch angles.
+def must_not_turn(arrival: Arrival, vehicle: Vehicle) -> bool:
+    """Whether a vehicle is to be at rest that has a turn rate which takes time to change."""
+    return isinstance(vehicle, DifferentialDrive) and not vehicle.first_order and arrival.is_rest
 
-    Who is to be at rest and has a turn rate that takes time to change must not turn either.
-    """
+
+def goal_of(problem: Problem, vehicle: Vehicle) -> Floats:
+    """Return what a problem asks of a vehicle at its end, ``[8 + 2 n]`` with n hitch angles."""
     goal = place(*problem.goal, problem.goal_radius)
     arrival = problem.arrival
     if arrival is None:
@@ -36,7 +38,7 @@ def goal_of(problem: Problem, vehicle: Vehicle) -> Floats:
     if arrival.heading is not None:
         goal[HEADING : HEADING_TOLERANCE + 1] = arrival.heading, arrival.heading_tolerance + SLACK
     goal[LEAST_SPEED : MOST_SPEED + 1] = arrival.least_speed - SLACK, arrival.most_speed + SLACK
-    if isinstance(vehicle, DifferentialDrive) and not vehicle.first_order and arrival.is_rest:
+    if must_not_turn(arrival, vehicle):
         goal[MOST_TURN] = SLACK
     hitches = [
         (hitch, tolerance + SLACK)

@@ -17,7 +17,6 @@ QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
 POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
 _NAME_IT: Final = "name the vehicle that the problem is for (--vehicle)"
 ANY_HEADING: Final = 3.15  # rad; half a turn, rounded up, allows any heading
-WIDE: Final = 2.0  # times a vehicle's length: a goal disc of a larger radius is hardly meant
 ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
 
 
@@ -135,15 +134,18 @@ def hint_of_degrees(problem: Problem) -> str | None:
     )
 
 
-def hint_of_radius(fields: Mapping[str, Any], vehicle: Vehicle) -> str | None:
-    """What to say if the radius of a goal is left out, and the usual one is wide for the vehicle, or None."""
+def hint_of_tolerance(fields: Mapping[str, Any], vehicle: Vehicle) -> str | None:
+    """What to say if it is left out how near to end, and the usual is far for the vehicle, or None."""
+    is_pose = len(fields["goal"]) == 3
+    field, usual, lengths = (
+        ("goal_tolerance", POSE_TOLERANCE[0], 0.5) if is_pose else ("goal_radius", GOAL_RADIUS, 2.0)
+    )
     length = vehicle.scale * (vehicle.front + vehicle.rear)
-    is_given = len(fields["goal"]) == 3 or fields.get("goal_radius") is not None
-    if is_given or WIDE * length >= GOAL_RADIUS:
+    if fields.get(field) is not None or usual <= lengths * length:
         return None
     return (
-        f"goal_radius is left out, so a plan may end {GOAL_RADIUS:g} m from the goal, "
-        f"{GOAL_RADIUS / length:.0f} times the length of {short(name_of(vehicle))}; give it to end nearer"
+        f"{field} is left out, so a plan may end {usual:g} m from the goal, "
+        f"{usual / length:.1f} times the length of {short(name_of(vehicle))}; give it to end nearer"
     )
 
 

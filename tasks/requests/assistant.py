@@ -17,6 +17,7 @@ from planners.memory.plans.free import turned
 from planners.memory.recall import RECALLS
 from planners.optimisation.polish import most_iterations
 from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
+from planners.search.query import Limits, usual_limits
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
@@ -39,7 +40,8 @@ from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 WARM_SECONDS: Final = 0.15  # hundreds of attempts that recall, or a hundred that search
 # of an improver after its first polish: enough for one free and one guided search
 WARM_EXPANSIONS: Final = 1000
-WARM_IMPROVING_S: Final = 0.5  # what is not reached by then is not counted when it is compiled later
+# of one attempt, and of an improvement: what is not reached by then is not counted when it is compiled later
+WARM_WORK_S: Final = 0.5
 
 
 class AssistantSettings(NamedTuple):
@@ -126,8 +128,10 @@ class Assistant:
         other = mirrored(canonical)
         deadline = perf_counter() + WARM_SECONDS
         seed = self.settings.seed
+        assists = dict.fromkeys((self.settings.assist, UNASSISTED.name))
+        limits = replace(usual_limits(other), seconds=WARM_WORK_S)
         while True:
-            attempts = [self.attempt(other, assist, seed + 1) for assist in (None, UNASSISTED.name)]
+            attempts = [self.attempt(other, assist, seed + 1, limits) for assist in assists]
             if perf_counter() + sum(attempt.planning_seconds for attempt in attempts) > deadline:
                 break
             seed += 1
@@ -140,7 +144,7 @@ class Assistant:
             work = WARM_EXPANSIONS + EXPANSIONS_AN_ITERATION * most_iterations(other)
             improve(
                 *(self.settings.planner, other, attempts[0].plan),
-                seconds=WARM_IMPROVING_S,
+                seconds=WARM_WORK_S,
                 expansions=work,
                 seed=seed,
                 vehicle=self.vehicle,
@@ -149,8 +153,14 @@ class Assistant:
         OtherWork()()
         self.warm_classes.add(problem.class_name)
 
-    def attempt(self, canonical: Problem, assist: str | None = None, seed: int | None = None) -> Attempt:
-        """Attempt a canonical problem, with another assist or seed if given; the plan is not checked."""
+    def attempt(
+        self,
+        canonical: Problem,
+        assist: str | None = None,
+        seed: int | None = None,
+        limits: Limits | None = None,
+    ) -> Attempt:
+        """Attempt a canonical problem, with other settings if given; the plan is not checked."""
         assist = assist or self.settings.assist
         return solve(
             canonical,
@@ -159,6 +169,7 @@ class Assistant:
             self.settings.top_k,
             None if assist in WITHOUT_MEMORY else self.memory_of(canonical.class_name),
             self.settings.seed if seed is None else seed,
+            limits,
             vehicle=self.vehicle,
             strategy=self.settings.recall,
             workspace=self._workspace,

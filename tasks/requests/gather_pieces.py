@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from planners.memory.plans.experience import Experience
 from planners.optimisation.polish import polish
 from planners.search.manoeuvres.endings import worth_storing
-from planners.search.query import Limits
+from planners.search.query import POSE_EXPANSIONS, Limits
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import scene_of
@@ -31,7 +31,7 @@ from tasks.requests.question_sources import QuestionSource, is_drawn, named_sour
 COLLECTOR: Final = "lattice"
 MARGIN_M: Final = 0.4  # that plans to a place keep from obstacles where there is room, to fit more questions
 # what is found once is recalled often: in narrow places the search goes on for drives of other kinds
-EFFORT: Final = Limits(expansions=35_000, seconds=600.0, further=15_000)
+EFFORT: Final = Limits(expansions=POSE_EXPANSIONS + 15_000, seconds=600.0, further=15_000)
 PIECE: Final = 10  # numbers of questions: a killed worker loses some three seconds of work
 GIVE_UP: Final = 5  # questions asked for each wanted plan
 

@@ -7,6 +7,6 @@ from collections.abc import Callable
 
 
 def ticks(seconds: float = 0.005) -> Callable[[], float]:
-    """A clock in place of ``perf_counter`` that goes on by ``seconds`` whenever it is read."""
+    """A clock in place of a real one that goes on by ``seconds`` whenever it is read."""
     numbers = itertools.count()
     return lambda: seconds * next(numbers)

@@ -25,7 +25,7 @@ from planners.world.vehicles.vehicle import Vehicle
 # metres; what it costs to be full speed off the speed that is asked at the end, or to turn at full rate where
 # none is asked. A little speed is always left that is worth the braking that it saves; taking it away must
 # not move the vehicle out of its goal
-SPEED_OFF: Final = 50_000.0
+MOTION_OFF: Final = 50_000.0
 
 
 class Hold(NamedTuple):
@@ -46,10 +46,10 @@ def weight_of_error(c: int, goal: Floats, hold: Hold, vehicle: Vehicle) -> float
         return hold.pull * bend_of_error(goal[HEADING_TOLERANCE]) if asked else 0.0
     elif c == 3:
         asked = goal[MOST_SPEED] - goal[LEAST_SPEED] < math.inf
-        return 2.0 * SPEED_OFF / (vehicle.max_speed * vehicle.max_speed) if asked else 0.0
+        return 2.0 * MOTION_OFF / (vehicle.max_speed * vehicle.max_speed) if asked else 0.0
     elif c == 4:
         most = turn_limit(vehicle)
-        return 2.0 * SPEED_OFF / (most * most) if goal[MOST_TURN] < math.inf else 0.0
+        return 2.0 * MOTION_OFF / (most * most) if goal[MOST_TURN] < math.inf else 0.0
     elif c - 5 >= (goal.shape[0] - HITCHES) // 2:
         return 0.0
     else:

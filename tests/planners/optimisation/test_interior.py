@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from planners.optimisation.arrival_error import USUAL
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior, begin_inside
-from planners.optimisation.interior.costs import SPEED_OFF, Hold, try_change
+from planners.optimisation.interior.costs import MOTION_OFF, Hold, try_change
 from planners.optimisation.interior.drivable import driven as driven_after
 from planners.optimisation.interior.drivable import in_asked_motion
 from planners.optimisation.interior.newton import direction
@@ -124,7 +124,7 @@ def cost_model(model, interior, goal, damping, time_counts) -> tuple[Floats, Flo
     number = steps * (size + 2) + 1
     hessian, gradient = np.zeros((number, number)), np.zeros(number)
     limits = np.array([CAR.max_acceleration, CAR.max_steering_rate])
-    bends = np.array([100.0, 100.0, 400.0, 2.0 * SPEED_OFF / CAR.max_speed**2, 0.0])
+    bends = np.array([100.0, 100.0, 400.0, 2.0 * MOTION_OFF / CAR.max_speed**2, 0.0])
     for k in range(steps):
         at = slice(k * size, (k + 1) * size)
         gradient[at] += model.gradient[k + 1]

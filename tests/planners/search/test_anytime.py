@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,3 +90,13 @@ def test_what_has_no_solution_ends_too(name):
 def test_without_a_limit_nothing_is_begun():
     with pytest.raises(ValueError, match="give seconds or expansions"):
         improve("rrt", problem_of([]))
+
+
+@EVERY
+@pytest.mark.parametrize("limit", [{"expansions": 100_000}, {"seconds": 60.0}])
+def test_who_is_there_already_is_done(name, limit):
+    there = replace(problem_of([]), start=(20.0, 20.0, 0.0), goal=(20.5, 20.0))
+    found = improve(name, there, **limit)
+    assert found.plan is not None
+    assert found.plan.duration_s == 0.0
+    assert found.seconds < 30.0

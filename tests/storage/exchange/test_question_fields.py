@@ -143,9 +143,11 @@ def test_a_malformed_question_is_told_in_one_line(vehicle: Any, changes: dict[st
         ({}, 1.0, False),
         ({"goal_radius": 2.0}, 0.5, False),
         ({"goal": [50.0, 50.0, 1.0]}, 0.5, False),
+        ({"goal": [50.0, 50.0, 1.0]}, 0.1, True),
+        ({"goal": [50.0, 50.0, 1.0], "goal_tolerance": [0.1, 0.05]}, 0.1, False),
     ],
 )
-def test_a_small_robot_is_told_how_wide_a_goal_is_whose_radius_is_left_out(
+def test_a_small_robot_is_told_how_far_from_its_goal_it_may_end_if_that_is_left_out(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, goal: dict[str, Any], scale: float, is_wide: bool
 ) -> None:
     path = tmp_path / "near.json"
@@ -153,6 +155,19 @@ def test_a_small_robot_is_told_how_wide_a_goal_is_whose_radius_is_left_out(
     (asked,) = read_problems(path, CAR._replace(scale=scale, front=0.8, about=About(b"small")))
     assert [record.levelname for record in caplog.records] == ["WARNING"] * is_wide
     assert scale * asked.goal_radius == pytest.approx(0.1 if len(goal.get("goal", [])) == 3 else 2.0)
+
+
+def test_each_kind_of_hint_is_told_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rows = [
+        {"id": "near"},
+        {"id": "turned", "start": [10.0, 12.0, 90.0]},
+        {"id": "both", "start": [10.0, 12.0, 45.0]},
+    ]
+    path = tmp_path / "two.jsonl"
+    path.write_text("\n".join(json.dumps(GOOD | row) for row in rows))
+    read_problems(path, CAR._replace(scale=0.5, front=0.8))
+    told = [record.getMessage() for record in caplog.records]
+    assert ["near" in told[0], "turned" in told[1], len(told)] == [True, True, 2]
 
 
 @pytest.mark.parametrize(
