@@ -27,6 +27,15 @@ class Status(StrEnum):
     INFEASIBLE = "infeasible"  # it is certain that no drive leads to the goal
 
 
+MEANINGS: Final = {
+    Status.BUDGET_SPENT: "the search gave up, so there may be a plan or none",
+    Status.TIME_SPENT: "its time was up, so there may be a plan or none",
+    Status.START_BLOCKED: "at the start the vehicle meets an obstacle or the bounds",
+    Status.GOAL_BLOCKED: "no place in the goal is free",
+    Status.INFEASIBLE: "it is certain that no drive leads there",
+}  # of an attempt without a plan, for people
+
+
 class Other(NamedTuple):
     """A drive that was found besides the plan."""
 

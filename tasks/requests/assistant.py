@@ -32,7 +32,7 @@ from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork, no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
+from tasks.requests.plan_answers import meaning_of, no_plan, plan_answer, write_answer_file
 from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
@@ -258,7 +258,10 @@ def plan_one(
         save_picture(figure, drawing)
     if explained:
         _explain(assistant, problem, attempt, recalled, drive)
-    failure = None if plan else no_plan(problem.id or str(file), summary, out, written)
+    failure = None
+    if plan is None:
+        why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
+        failure = no_plan(problem.id or str(file), why, out, written)
     parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
     answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
     return PlannedOne(attempt, plan, answer, failure, written)

@@ -6,6 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from dashboards.world_outlines import cusps_of
+from planners.search.free_goal import has_free_goal, with_free_goal
+from planners.search.outcome import MEANINGS, Status
+from planners.world.alignment import to_canonical
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import Problem
+from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, plan_fields, write_plan
 
 
@@ -21,6 +27,17 @@ def no_plan(name: str, summary: str, out: Path | None, written: Path | None) -> 
     """The line that says that there is no plan for the problem ``name``, and that an older one is kept."""
     kept = f"; {out} is left as it was" if out != written else ""
     return f"No plan for {name}: {summary}{kept}."
+
+
+def meaning_of(problem: Problem, status: str, vehicle: Vehicle) -> str:
+    """What it means, in words, that an attempt at a problem ended with a status and without a plan."""
+    canonical, _ = to_canonical(problem)
+    scene = scene_of(canonical)
+    if has_free_goal(with_free_goal(canonical, vehicle, scene), vehicle, scene):
+        return MEANINGS[Status(status)]
+    return (
+        "at the goal pose, and beside it as far as is tolerated, the vehicle meets an obstacle or the bounds"
+    )
 
 
 def plan_answer(record: PlanRecord, out: Path | None, verified: bool | None) -> dict[str, Any]:
