@@ -19,11 +19,8 @@ from planners.world.problem import Problem
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
 
-OFF: Final = (
-    0.25,
-    0.5,
-    0.75,
-)  # shares of the tolerated distance by which poses beside are off, nearest first
+# shares of the tolerated distance by which poses beside are off, nearest first
+OFF: Final = (0.25, 0.5, 0.75, 0.9)
 BEARINGS: Final = 16  # of these poses
 TURNED: Final = (0.0, 0.5, -0.5)  # shares of the tolerated angle by which they are turned
 
@@ -42,10 +39,8 @@ def with_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> Problem:
     arrival, last = problem.arrival, _last(problem, vehicle)
     if arrival is None or last is None or _is_free(last, vehicle, scene):
         return problem
-    a_step = np.zeros(len(last))
-    a_step[3] = min(
-        control_limits(vehicle)[0] * vehicle.dt, 0.5 * vehicle.max_speed
-    )  # as fast one step before
+    a_step = np.zeros(len(last))  # as fast as the vehicle is a step before it stands
+    a_step[3] = min(control_limits(vehicle)[0] * vehicle.dt, 0.5 * vehicle.max_speed)
     beside = last.copy()
     for before in (a_step, 0.0 * a_step):
         for off, turned, bearing in itertools.product(OFF, TURNED, range(BEARINGS)):
