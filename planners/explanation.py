@@ -15,6 +15,7 @@ from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
 from planners.memory_answers import least_blocked
+from planners.search.free_goal import aimed_view
 from planners.search.help import PATIENCE
 from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
@@ -99,12 +100,12 @@ def drive_found(
     if attempt.recall != DRIVES:
         return None
     library = memory.library if isinstance(memory, Memory) else memory
-    answer = drive_answer(library, View(problem), vehicle, math.inf)
+    view = aimed_view(problem, vehicle)
+    answer = drive_answer(library, view, vehicle, math.inf)
     if answer.plan is None or attempt.recalled != (answer.number,):
         return None
-    return MovedDrive(
-        answer, placed_drive(library.drives, answer.entry, goal_of(problem, vehicle), vehicle.dt)
-    )
+    goal = goal_of(view.problem, vehicle)
+    return MovedDrive(answer, placed_drive(library.drives, answer.entry, goal, vehicle.dt))
 
 
 def parts_found(
@@ -119,7 +120,7 @@ def parts_found(
     library = memory.library if isinstance(memory, Memory) else memory
     is_blind = attempt.assist.startswith("random-")
     blindly = generator(attempt.seed, "random-plans", problem.id) if is_blind else None
-    return sub_plan_answer(library, View(problem), vehicle, blindly)
+    return sub_plan_answer(library, aimed_view(problem, vehicle), vehicle, blindly)
 
 
 def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:

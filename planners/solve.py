@@ -18,7 +18,7 @@ from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.free import turned
 from planners.memory_answers import LateHelp, MemoryAnswer, answer_from
 from planners.search.anytime import improve, search_and_polish
-from planners.search.free_goal import with_free_goal
+from planners.search.free_goal import aimed_view
 from planners.search.guides.detour import SECOND_LOOK
 from planners.search.guides.guidance import published_guidance
 from planners.search.help import fresh_guide
@@ -93,9 +93,8 @@ def solve(
     if fault is not None:
         raise ValueError(fault)
     limits = limits or usual_limits(problem)
-    view = View(problem, workspace)
-    if problem.arrival is not None:
-        view.problem = problem = with_free_goal(problem, vehicle, view.scene)
+    view = aimed_view(problem, vehicle, workspace)
+    problem = view.problem
     improves = polished and problem.arrival is not None
     if assist in WITHOUT_MEMORY or memory is None:
         memory, found = None, MemoryAnswer()

@@ -18,6 +18,8 @@ from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.problem import Problem
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
+from planners.world.view import View
+from planners.world.workspace import Workspace
 
 # shares of the tolerated distance by which poses beside are off, nearest first
 OFF: Final = (0.25, 0.5, 0.75, 0.9)
@@ -57,6 +59,14 @@ def with_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> Problem:
                     arrival=arrival._replace(heading=float(beside[2]), heading_tolerance=left),
                 )
     return problem
+
+
+def aimed_view(problem: Problem, vehicle: Vehicle, workspace: Workspace | None = None) -> View:
+    """A problem as an attempt sees it: with a free goal pose, if there is one."""
+    view = View(problem, workspace)
+    if problem.arrival is not None:  # others do not need the scene for it
+        view.problem = with_free_goal(problem, vehicle, view.scene)
+    return view
 
 
 def has_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:

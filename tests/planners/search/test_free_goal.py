@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planners.attempt import DRIVES
+from planners.explanation import drive_found
+from planners.memory.library.plan_library import gathered_library
 from planners.search.free_goal import has_free_goal, with_free_goal
 from planners.search.outcome import MEANINGS, Status
 from planners.solve import solve
@@ -58,6 +62,20 @@ def test_a_pose_beside_a_wall_is_reached_within_its_tolerance(gap: float, vehicl
     found = solve(asked, "lattice", vehicle=vehicle, polished=False).plan
     assert found is not None
     assert faults(asked, found, vehicle) == []
+
+
+def test_the_drive_that_was_moved_to_a_pose_beside_a_wall_is_found_again() -> None:
+    asked = to_canonical(beside_a_wall(-0.1, CAR))[0]
+    stored = solve(asked, "lattice").plan
+    assert stored is not None
+    library = gathered_library("walls", CAR, [("wall", stored)])
+    attempt = solve(asked, "lattice", "repair", memory=library)
+    assert attempt.recall == DRIVES
+    found = drive_found(asked, attempt, library, CAR)
+    assert found is not None
+    assert found.answer.plan is not None
+    assert attempt.plan is not None
+    assert np.array_equal(found.answer.plan.states, attempt.plan.states)
 
 
 def test_a_pose_within_a_wall_stays_as_it_is() -> None:
