@@ -25,8 +25,7 @@ from storage.exchange.problem_files import (
 )
 from storage.exchange.question_fields import (
     goal_of,
-    hint_of_degrees,
-    hint_of_tolerance,
+    hints_of,
     numbers_of,
     question_fields,
     start_motion_of,
@@ -127,7 +126,7 @@ def _checked(
     path: Path, raw: Iterable[tuple[int, Any]], vehicle: Vehicle, *, warns: bool = True
 ) -> Iterator[tuple[str, Problem | str]]:
     seen: set[str] = set()
-    told: set[str] = set() if warns else {"degrees", "tolerance"}  # hints that need no second line
+    told: set[str] = set()  # kinds of hints
     first = None  # whether the first problem states its vehicle
     for number, fields in raw:
         where = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
@@ -146,11 +145,8 @@ def _checked(
             yield where, f'id "{problem.id}" occurs twice; give every problem its own'
             continue
         seen.add(problem.id)
-        for kind, hint in (
-            ("degrees", hint_of_degrees(problem)),
-            ("tolerance", hint_of_tolerance(fields, vehicle)),
-        ):
-            if hint is not None and kind not in told:
+        for kind, hint in (hints_of(fields, problem, vehicle) if warns else {}).items():
+            if kind not in told:
                 _LOG.warning("%s: %s.", with_id, hint)
                 told.add(kind)
         yield where, problem

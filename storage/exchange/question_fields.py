@@ -119,6 +119,12 @@ def question_fields(problem: Problem, vehicle: Vehicle) -> dict[str, Any]:
     return start | goal
 
 
+def hints_of(fields: Mapping[str, Any], problem: Problem, vehicle: Vehicle) -> dict[str, str]:
+    """What to say of a problem that ``fields`` describe and that is hardly what was meant, by kind."""
+    hints = {"degrees": hint_of_degrees(problem), "tolerance": hint_of_tolerance(fields, vehicle)}
+    return {kind: hint for kind, hint in hints.items() if hint is not None}
+
+
 def hint_of_degrees(problem: Problem) -> str | None:
     """What to say of a problem with angles that are hardly meant as radians, or None.
 
