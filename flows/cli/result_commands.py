@@ -11,17 +11,20 @@ from flows.cli.run_options import worker_count
 from flows.cli.terminal import telling, write, write_answer, write_files
 
 
-def verify(folder: Path, *, sample: float = 0.02, workers: int | None = None) -> None:
-    """Check every shard, archive and stored plan of a data folder, and make some attempts again.
+def verify(
+    path: Path, *, problems: Path | None = None, sample: float = 0.02, workers: int | None = None
+) -> None:
+    """Judge the plans of a file or folder, or check a whole data folder and make some attempts again.
 
     Args:
-        folder: The data folder; or the folder of one memory or library, whose plans are judged.
-        sample: Share of the benchmark's problems that are attempted again, 0 to 1.
-        workers: Worker processes; default one for each core.
+        path: A plan's file, a folder of them, the folder of a memory or library, or a data folder.
+        problems: With the files of plans: the file of their problems, in which each is judged.
+        sample: With a data folder: share of the benchmark's problems that are attempted again, 0 to 1.
+        workers: With a data folder: worker processes; default one for each core.
     """
     from tasks.requests.verify import verify as task
 
-    checked = task(folder, sample, worker_count(workers))
+    checked = task(path, problems, sample, worker_count(workers))
     lines = [f"{count:9,} {what}" for what, count in checked.items()]
     write_answer(*lines, "No fault found.", checked=dict(checked))
 

@@ -13,8 +13,7 @@ from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
 from storage.errors import StorageError
 from storage.exchange.plans import PlanRecord, read_plan
-from storage.places.files import read_json, whole_file
-from storage.vehicles.recorded_vehicle import vehicle_recorded
+from storage.places.files import whole_file
 
 MOST_TRAILERS: Final = 1  # of dynobench's models
 
@@ -24,20 +23,14 @@ def export_plan(path: Path, out: Path) -> None:
 
     Raises StorageError if it is not a plan, holds none, or is for a vehicle that dynobench has no model for.
     """
-    fields = read_json(path)
-    vehicle = vehicle_recorded(fields.get("vehicle")) if isinstance(fields, dict) else None
-    if vehicle is None:
-        raise StorageError(
-            f"{path} is not a plan for a known vehicle; give a file that `plan` or `solve` wrote."
-        )
-    if len(trailers_of(vehicle)) > MOST_TRAILERS:
+    record = read_plan(path)
+    if len(trailers_of(record.vehicle)) > MOST_TRAILERS:
         raise StorageError(
             f"{path} is for a car with more than one trailer, for which dynobench has no model."
         )
-    record = read_plan(path, vehicle)
     if record.plan is None:
         raise StorageError(f"{path} holds no plan: its status is {record.status!r}.")
-    text = trajectory_of(record, record.plan, vehicle)
+    text = trajectory_of(record, record.plan, record.vehicle)
     with whole_file(out) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -12,12 +12,12 @@ from planners.world.alignment import scaled, shifted
 from planners.world.arrays import Floats, Point
 from planners.world.checked_problem import FAR_M, FARTHEST_M
 from planners.world.geometry.polygons import LARGEST_COORDINATE_M
-from planners.world.problem import Plan
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names
 from storage.errors import StorageError
 from storage.fields import check_fields, number_of, short, text_of
 from storage.places.files import read_json, write_json
-from storage.vehicles.recorded_vehicle import record_of, refuse_another
+from storage.vehicles.recorded_vehicle import record_of, refuse_another, vehicle_recorded
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
 FIELDS: Final = (
@@ -40,6 +40,11 @@ class PlanRecord:
     vehicle: Vehicle = CAR
     scale: float = 1.0  # real metres in one metre of the plan
     offset: Point = (0.0, 0.0)  # real metres: where the plan's origin lies in the frame of the file
+
+    def plan_in_frame_of(self, problem: Problem) -> Plan | None:
+        """The plan where ``problem`` has its origin, whose scale is that of the plan; None without a plan."""
+        x, y = ((a - b) / problem.scale for a, b in zip(self.offset, problem.offset, strict=True))
+        return self.plan and shifted(self.plan, (x, y))
 
 
 def write_plan(path: Path, record: PlanRecord) -> None:
@@ -77,19 +82,29 @@ def is_plan_file(path: Path) -> bool:
     return isinstance(fields, dict) and set(fields) <= set(FIELDS) and "states" in fields
 
 
-def read_plan(path: Path, vehicle: Vehicle = CAR) -> PlanRecord:
-    """The plan for a ``vehicle`` in the file at ``path``, in its problem's units, and where it came from.
+def read_plan(path: Path, vehicle: Vehicle | None = None) -> PlanRecord:
+    """The plan in the file at ``path``, in its problem's units, and where it came from.
 
-    Raises StorageError if the file is missing or is not JSON, has an unknown field or lacks one, was made for
-    another vehicle, or holds what no vehicle could have driven.
+    Args:
+        path: the file.
+        vehicle: the vehicle that must drive the plan; None takes the one that the file names.
+
+    Raises:
+        StorageError: the file is missing or is not JSON, has an unknown field or lacks one, was made for
+            another vehicle or one that is not known, or holds what no vehicle could have driven.
     """
     fields = read_json(path)
     try:
         if not isinstance(fields, dict):
             raise ValueError(f"holds {short(fields)}, expected the object of a plan")
         check_fields(list(fields), FIELDS)
-        refuse_another(path, fields.get("vehicle", name_of(CAR)), vehicle)  # once all files were for the car
-        return _record(fields, vehicle)
+        made_for = fields.get("vehicle", name_of(CAR))  # once all files were for the car
+        if vehicle is not None:
+            refuse_another(path, made_for, vehicle)
+        driver = vehicle or vehicle_recorded(made_for)
+        if driver is None:
+            raise ValueError(f"is for vehicle {short(made_for)}, which this program does not know")
+        return _record(fields, driver)
     except KeyError as error:
         raise StorageError(f"{path} lacks the field {error}; is it a plan?") from None
     except ValueError as error:

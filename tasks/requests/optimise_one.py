@@ -14,7 +14,6 @@ from planners.optimisation.clearance_field import least_clearance
 from planners.optimisation.guesses import straight_line
 from planners.optimisation.optimise import DEFAULT_SETTINGS, Optimised, optimise
 from planners.search.registry import PLANNERS, plan
-from planners.world.alignment import shifted
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import Vehicle
@@ -43,10 +42,10 @@ class InitialGuess:
         """Return the guess and the name of its planner. Raises RunError if there is no plan to start from."""
         if self.plan is not None:
             record = read_plan(self.plan, self.vehicle)
-            if record.plan is None or len(record.plan.controls) == 0:
+            stored = record.plan_in_frame_of(problem)
+            if stored is None or len(stored.controls) == 0:
                 raise RunError(f"{self.plan} holds no plan to start from: its status is {record.status!r}.")
-            x, y = ((a - b) / problem.scale for a, b in zip(record.offset, problem.offset, strict=True))
-            return shifted(record.plan, (x, y)), record.planner
+            return stored, record.planner
         if self.planner is None:
             return straight_line(problem, self.vehicle), STRAIGHT
         rng = generator(self.seed, "search", problem.id, self.planner)

@@ -1,7 +1,9 @@
-"""``verify`` of one memory or library: each plan is judged, and what its vehicle cannot drive is a fault."""
+"""``verify`` of memories, libraries and plan files: each plan is judged, and each fault is told."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +11,14 @@ import pytest
 
 from flows.cli.main import call
 from planners.memory.library.plan_library import gathered_library
+from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR
 from storage.archives.libraries import save_library
+from storage.exchange.problems import write_problems
 from tests.tasks.served import write_memory
+from tests.worlds import box, problem_of
 
 
 def _driven(acceleration: float, steps: int = 40) -> Plan:
@@ -42,3 +47,57 @@ def test_a_folder_of_something_else_is_refused_in_a_line(
 ) -> None:
     assert call(["verify", str(tmp_path)]) == 1
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("far_m", [0.0, 9_484_378_811.0])
+def test_plans_in_files_are_judged_in_their_problems_or_by_themselves(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], far_m: float
+) -> None:
+    problems, plans = tmp_path / "problems.jsonl", tmp_path / "plans"
+    near = [problem_class("random").draw(5, index) for index in range(3)]
+    write_problems(problems, [replace(each, offset=(far_m, -far_m)) for each in near])
+    assert call(["solve", str(problems), "--out", str(tmp_path / "rows.parquet"), "--plans", str(plans)]) == 0
+    capsys.readouterr()
+    for options in ([], ["--problems", str(problems)]):
+        assert call(["verify", str(plans), *options, "--json"]) == 0
+        assert sum(json.loads(capsys.readouterr().out)["answer"]["checked"].values()) == 3
+
+    one = plans / f"{near[0].id}.json"
+    fields = json.loads(one.read_text())
+    fields["controls"][3][0] += 0.01  # no longer what leads from state to state
+    one.write_text(json.dumps(fields))
+    for options in ([], ["--problems", str(problems)]):
+        assert call(["verify", str(plans), *options]) == 1
+        told = capsys.readouterr().err
+        assert near[0].id in told
+        assert near[1].id not in told
+
+
+def test_a_plan_is_judged_in_the_world_as_it_is_now(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world, changed, plan = (tmp_path / name for name in ("world.json", "changed.json", "plan.json"))
+    free = problem_of([], "room")
+    write_problems(world, [free])
+    assert call(["plan", str(world), "--out", str(plan)]) == 0
+    x, y = np.array(json.loads(plan.read_text())["states"])[40, :2].tolist()
+    write_problems(changed, [problem_of([box(x, y, 0.0, 1.0, 1.0)], "room-with-a-box")])
+    assert call(["verify", str(plan), "--problems", str(world)]) == 0
+    capsys.readouterr()
+    assert call(["verify", str(plan), "--problems", str(changed)]) == 1
+    told = capsys.readouterr().err
+    assert "room-with-a-box" in told
+    assert "Collision" in told
+    write_problems(changed, [replace(free, scale=0.5)])
+    assert call(["verify", str(plan), "--problems", str(changed)]) == 1
+    assert "scale" in capsys.readouterr().err
+
+
+def test_problems_are_refused_beside_what_holds_no_plan_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_memory(tmp_path / "memory", plans=4)
+    write_problems(tmp_path / "room.json", [problem_of([], "room")])
+    assert call(["verify", str(tmp_path / "memory"), "--problems", str(tmp_path / "room.json")]) == 2
+    assert call(["verify", str(tmp_path / "room.json")]) == 1
+    assert capsys.readouterr().err.count("\n") == 2
