@@ -91,7 +91,7 @@ class FilePart:
 class PartResult(NamedTuple):
     """Whether a part was solved."""
 
-    fault: str | None  # where the first malformed problem is, and why; then nothing was written
+    faults: list[str]  # where malformed problems are, and what is wrong; if there are any, nothing is solved
 
 
 def parts_of(request: SolveRequest) -> list[FilePart]:
@@ -131,7 +131,7 @@ def _identity(part: ProblemSlice) -> tuple[str, int, int, int]:
 
 
 def solve_part(chunk: FilePart) -> PartResult:
-    """Solve the problems of a part and write their rows; write nothing if one of them is malformed."""
+    """Solve the problems of a part and write their rows; solve none if one of them is malformed."""
     return solve_part_reporting(chunk, lambda: None)
 
 
@@ -149,12 +149,13 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
             solved.clear()
         write_attempts(path, rows, key=chunk.key)
 
-    problems = problems_or_faults_of(chunk.problem_slice, assistant.vehicle)
+    read = list(problems_or_faults_of(chunk.problem_slice, assistant.vehicle))
+    problems = [problem for _, problem in read if not isinstance(problem, str)]
+    if len(problems) < len(read):
+        return PartResult([f"{place}: {fault}" for place, fault in read if isinstance(fault, str)])
     with no_garbage_collection(), _kept_if_interrupted(lambda: keep(chunk.begun)):
         kept = time.monotonic()
-        for number, (location, problem) in enumerate(problems):
-            if isinstance(problem, str):
-                return PartResult(f"{location}: {problem}")
+        for number, problem in enumerate(problems):
             if number < before:
                 on_problem()
                 continue
@@ -178,7 +179,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
                 gc.collect()
     keep(chunk.shard)
     chunk.begun.unlink(missing_ok=True)
-    return PartResult(None)
+    return PartResult([])
 
 
 @contextmanager

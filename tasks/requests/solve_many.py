@@ -35,7 +35,7 @@ from tasks.requests.problem_parts import (
     solve_part_reporting,
 )
 from tasks.settings.checks import check_outputs
-from tasks.settings.errors import UsageError
+from tasks.settings.errors import UsageError, tell_faults
 
 if TYPE_CHECKING:
     from tasks.champions.drift_watch import BenchmarkedMemory
@@ -134,7 +134,7 @@ def solve_many(
             if flow is not None and len(results) < len(left):
                 with part_workers(out, workers):
                     results += flow(request)
-            faults = list(dict.fromkeys(result.fault for result in results if result.fault))
+            faults = list(dict.fromkeys(fault for result in results for fault in result.faults))
             if faults:
                 raise _malformed(faults)
             seconds = time.monotonic() - began
@@ -167,10 +167,14 @@ def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[Par
 
 
 def _malformed(faults: Sequence[str]) -> StorageError:
-    more = len(faults) - 1
-    others = f" {more} more {'part has' if more == 1 else 'parts have'} a malformed problem." if more else ""
+    """One malformed problem is the error; several are told before it."""
+    if len(faults) == 1:
+        what, which = faults[0].rstrip("."), "it"
+    else:
+        tell_faults(faults)
+        what, which = f"{len(faults):,} problems are malformed", "them"
     return StorageError(
-        f"{faults[0].rstrip('.')}.{others} All other parts are solved and kept: correct the problem and "
+        f"{what}. All parts of the file without a malformed problem are solved and kept: correct {which} and "
         "repeat the command."
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import multiprocessing
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -42,7 +41,7 @@ from tasks.attempts.attempt_rows import same_outcome
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.inputs.problem_sources import held_back, source_of
 from tasks.inputs.taught_experiences import taught_experiences
-from tasks.settings.errors import RunError
+from tasks.settings.errors import RunError, tell_faults
 from tasks.settings.recorded_settings import recorded_settings
 from tasks.settings.run_settings import RunSettings
 from tasks.stages.benchmark import CHUNK_PROBLEMS
@@ -50,9 +49,6 @@ from tasks.stages.measure_recall import LONGEST_ORDER
 
 LABELS_EVERY: Final = 50  # one hallucinated problem in this many has its grid and labels computed again
 COLLECTED: Final[tuple[Table, ...]] = ("candidates", "learned", "curated", "experiences")
-MOST_FAULTS_TOLD: Final = 20
-
-_LOG = logging.getLogger(__name__)
 
 Findings = tuple[Counter[str], list[str]]  # counts of what was checked, and a line for each fault
 Check = Callable[[], Findings]
@@ -86,7 +82,7 @@ def verify_folder(folder: Path, sample: float, workers: int) -> Counter[str]:
             checked += counts
             faults_found += new_faults
     if faults_found:
-        _LOG.error("\n".join(faults_found[:MOST_FAULTS_TOLD]))
+        tell_faults(faults_found)
         raise RunError(
             f"{len(faults_found)} faults in {folder}; delete the files that are named, and repeat the "
             "command that made them."

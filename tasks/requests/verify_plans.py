@@ -16,10 +16,9 @@ from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.exchange.plans import PlanRecord, is_plan_file, read_plan
 from storage.exchange.problems import problems_or_faults
 from tasks.fan_out.progress import progress
-from tasks.settings.errors import RunError
+from tasks.settings.errors import RunError, tell_faults
 
 _ROOM_M: Final = 1e6  # around a plan that is judged by itself
-_MOST_FAULTS_TOLD: Final = 20
 _BY_ITSELF: Final = "plans driven again by their controls, within their vehicle's limits"
 _IN_PROBLEM: Final = "plans driven again by their controls, from start to goal of their problems, and swept"
 _NO_PLAN: Final = "files that hold no plan, but say why there is none"
@@ -150,5 +149,5 @@ def _by_itself(plan: Plan) -> Problem:
 
 def _refuse(wrong: Sequence[str], what_now: str) -> None:
     if wrong:
-        _LOG.error("\n".join(wrong[:_MOST_FAULTS_TOLD]))
+        tell_faults(wrong)
         raise RunError(f"{len(wrong)} fault{'s' * (len(wrong) > 1)}{what_now}.")

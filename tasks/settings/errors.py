@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Sequence
+from typing import Final
+
+_MOST_FAULTS_TOLD: Final = 20
+_LOG = logging.getLogger(__name__)
+
 
 class UsageError(ValueError):
     """A command received an impossible value; the message says what to give instead (exit code 2)."""
@@ -9,3 +16,8 @@ class UsageError(ValueError):
 
 class RunError(RuntimeError):
     """A stage cannot continue; the message says in one line why, and what to do (exit code 1)."""
+
+
+def tell_faults(faults: Sequence[str]) -> None:
+    """Log the first of many ``faults``, a line each, before an error says how many there are."""
+    _LOG.error("\n".join(faults[:_MOST_FAULTS_TOLD]))

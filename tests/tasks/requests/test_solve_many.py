@@ -214,16 +214,24 @@ def test_another_question_never_takes_the_parts_of_this_one(
 
 
 def test_a_malformed_line_is_named_and_only_its_part_is_left_to_do(
-    undisturbed: pd.DataFrame, problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    undisturbed: pd.DataFrame,
+    problems: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
     path, out = tmp_path / "problems.jsonl", tmp_path / "rows.parquet"
     lines = problems.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), *lines[5:]]))
-    with pytest.raises(
-        StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All other parts are"
-    ):
+    with pytest.raises(StorageError, match=r"problems.jsonl line 5 .*nearest is 'goal'.* All parts"):
         solve_many(ASSISTANT, path, out)
     assert not out.exists()
+    wrong = lines[5].replace("[", "[true, ", 1)
+    path.write_text("".join([*lines[:4], lines[4].replace('"goal"', '"gaol"'), wrong, *lines[6:]]))
+    with pytest.raises(StorageError, match=r"2 problems are malformed"), caplog.at_level("ERROR"):
+        solve_many(ASSISTANT, path, out)
+    assert "line 5" in caplog.text
+    assert "line 6" in caplog.text
     path.write_text("".join(lines))
     counting = Counting()
     monkeypatch.setattr(parts, "write_attempts", counting)
