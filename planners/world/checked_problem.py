@@ -85,5 +85,5 @@ def checked_problem(
     )
     fault = problem_fault(problem, vehicle)
     if fault is not None:
-        raise ValueError(fault if scale == 1.0 else f"with all lengths divided by scale {scale:g}: {fault}")
+        raise ValueError(fault)
     return problem

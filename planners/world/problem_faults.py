@@ -32,29 +32,31 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
 
     The obstacles must be well formed. Checked are, in this order: the numbers are finite and not too large,
     the bounds, the goal radius, how the drive begins and is to end, and whether the footprint at the start
-    and the goal's centre are free.
+    and the goal's centre are free. Lengths are told as they are outside, in real metres.
     """
+    scale = problem.scale
     heading = None if problem.arrival is None else problem.arrival.heading
     headings = {"start": problem.start[2], "goal": heading or 0.0}
     numbers = (*problem.start[:2], *problem.goal, problem.goal_radius, *problem.bounds)
     if not all(math.isfinite(number) for number in (*numbers, *headings.values())):
         return "start, goal, goal_radius and bounds must be finite numbers; correct them"
     if max(abs(number) for number in numbers) > LARGEST_COORDINATE_M:
-        return (
-            f"lies farther than {LARGEST_COORDINATE_M:.0f} m from the origin; move the origin near the start"
-        )
+        farthest = scale * LARGEST_COORDINATE_M
+        return f"lies farther than {farthest:.0f} m from the origin; move the origin near the start"
     for end, angle in headings.items():
         if abs(angle) > LARGEST_HEADING:
             return f"{end} heading is {angle:g} rad; expected an angle of -pi to pi, turns may be added"
     x_min, y_min, x_max, y_max = problem.bounds
     if not (x_min < x_max and y_min < y_max):
-        return f"bounds {list(problem.bounds)} are inverted; expected [x_min, y_min, x_max, y_max] in metres"
+        return f"bounds {_bounds(problem)} are inverted; expected [x_min, y_min, x_max, y_max] in metres"
     if max(x_max - x_min, y_max - y_min) > WIDEST_BOUNDS_M:
-        return f"bounds {list(problem.bounds)} are wider than {WIDEST_BOUNDS_M:.0f} m; are they in metres?"
+        return (
+            f"bounds {_bounds(problem)} are wider than {scale * WIDEST_BOUNDS_M:.0f} m; are they in metres?"
+        )
     if problem.goal_radius <= 0.0:
         name = "goal_radius" if heading is None else "goal_tolerance"
-        return f"{name} is {problem.goal_radius}; expected a length above 0 m"
-    fault = _start_fault(problem, vehicle) or _arrival_fault(problem.arrival, vehicle)
+        return f"{name} is {scale * problem.goal_radius:g}; expected a length above 0 m"
+    fault = _start_fault(problem, vehicle) or _arrival_fault(problem.arrival, scale, vehicle)
     if fault is not None:
         return fault
     entries, start_is_free, goal_is_free = _room(
@@ -68,12 +70,15 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if entries > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"
     if not start_is_free:
+        size = "" if scale == 1.0 else f" (scale {scale:g})"
         return (
-            f"start footprint of {name_of(vehicle)} at {_point(problem.start)} is not free or leaves the "
-            "bounds; move the start, or name the vehicle that the problem is for"
+            f"start footprint of {name_of(vehicle)}{size} at {_point(problem, problem.start)} is not free or "
+            "leaves the bounds; move the start, or name the vehicle that the problem is for"
         )
     if not goal_is_free:
-        return f"goal centre {_point(problem.goal)} lies in an obstacle or out of bounds; move the goal"
+        return (
+            f"goal centre {_point(problem, problem.goal)} lies in an obstacle or out of bounds; move the goal"
+        )
     return None
 
 
@@ -86,22 +91,24 @@ def _start_fault(problem: Problem, vehicle: Vehicle) -> str | None:
         low, high = _limits(name, vehicle)
         if not low <= value <= high:
             unit = {"speed": "m/s", "turn_rate": "rad/s"}.get(name, "rad")
-            return f"start {name} is {value:g} {unit}; the vehicle allows {low:g} to {high:g}"
+            size = problem.scale if name == "speed" else 1.0
+            allowed = f"{size * low:g} to {size * high:g}"
+            return f"start {name} is {size * value:g} {unit}; the vehicle allows {allowed}"
     return None
 
 
-def _arrival_fault(arrival: Arrival | None, vehicle: Vehicle) -> str | None:
+def _arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> str | None:
     """What is wrong with what is asked at the goal."""
     if arrival is None:
         return None
     if arrival.heading is not None and not arrival.heading_tolerance > 0.0:
         return f"goal_tolerance is {arrival.heading_tolerance:g} rad; expected an angle above 0"
-    asked = f"goal_speed [{arrival.least_speed:g}, {arrival.most_speed:g}]"
+    asked = f"goal_speed [{scale * arrival.least_speed:g}, {scale * arrival.most_speed:g}]"
     if not arrival.least_speed <= arrival.most_speed:
         return f"{asked} is inverted; expected the least and the most m/s"
     low, high = _limits("speed", vehicle)
     if arrival.least_speed > high or arrival.most_speed < low:
-        return f"{asked} is beyond the vehicle, which drives {low:g} to {high:g} m/s"
+        return f"{asked} is beyond the vehicle, which drives {scale * low:g} to {scale * high:g} m/s"
     trailers = len(state_names(vehicle)) - 5
     angles, tolerances = len(arrival.hitches), len(arrival.hitch_tolerances)
     if (angles, tolerances) not in ((0, 0), (trailers, trailers)):
@@ -169,5 +176,17 @@ def _room(
     return entries, start_is_free, goal_is_free
 
 
-def _point(coordinates: tuple[float, ...]) -> str:
-    return f"({', '.join(f'{coordinate:g}' for coordinate in coordinates)})"
+def _outside(problem: Problem, x: float, y: float) -> Point:
+    """A point of the problem in real metres, where the problem comes from."""
+    return problem.scale * x + problem.offset[0], problem.scale * y + problem.offset[1]
+
+
+def _bounds(problem: Problem) -> list[float]:
+    x_min, y_min, x_max, y_max = problem.bounds
+    return [*_outside(problem, x_min, y_min), *_outside(problem, x_max, y_max)]
+
+
+def _point(problem: Problem, place: tuple[float, ...]) -> str:
+    """A place in words: x, y in real metres, and the heading if it has one."""
+    told = (*_outside(problem, *place[:2]), *place[2:])
+    return f"({', '.join(f'{coordinate:.10g}' for coordinate in told)})"

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
-from planners.world.problem import CANONICAL_DISTANCE, Arrival, start_state
+from planners.world.problem import CANONICAL_DISTANCE, Arrival, obstacles_of, start_state
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from tests.planners.world.strategies import angles, seeds
+from tests.worlds import box, problem_of
 
 
 @pytest.mark.parametrize("vehicle", [CAR, CAR_1_TRAILER])
@@ -45,3 +46,20 @@ def test_a_heading_of_countless_turns_is_told_as_such(end: str, heading: float, 
     assert problem_fault(problem) == (
         f"{end} heading is {sign * heading:g} rad; expected an angle of -pi to pi, turns may be added"
     )
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "told"),
+    [
+        ("start", (10.0, 0.0, 0.0), "(1005, 2000, 0)"),
+        ("goal", (100.0, 0.0), "(1050, 2000)"),
+        ("start_motion", (9.0,), "4.5 m/s"),
+        ("bounds", (20.0, 0.0, 10.0, 1.0), "[1010.0, 2000.0, 1005.0, 2000.5]"),
+    ],
+)
+def test_lengths_are_told_in_real_metres(field: str, value: object, told: str) -> None:
+    obstacles = obstacles_of([[box(10.0, 0.0, 0.0, 1.0, 1.0)]])
+    problem = replace(problem_of([]), obstacles=obstacles, scale=0.5, offset=(1000.0, 2000.0))
+    fault = problem_fault(replace(problem, **{field: value}))  # type: ignore[arg-type]
+    assert fault is not None
+    assert told in fault

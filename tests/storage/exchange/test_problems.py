@@ -153,7 +153,7 @@ def test_coordinates_are_rounded_to_float32_and_then_kept(tmp_path: Path) -> Non
         ({"goal": [10**400, 50]}, "finite"),
         ({"start": [0, 0, 1e300]}, "start heading is 1e+300"),
         ({"goal": [80, 50]}, "goal centre (80, 50)"),
-        ({"scale": 20.0}, "divided by scale 20: start footprint"),
+        ({"scale": 20.0}, "start footprint of car (scale 20) at (0, 0,"),
         ({"goal": [50, 50, 0, 0]}, "goal must be a list of 2 numbers, or 3"),
         ({"goal": [50, 50, math.nan]}, "has goal_radius"),
         ({"goal_tolerance": [0.1, 0.1]}, "has goal_tolerance, but a place has goal_radius"),
