@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
-from planners.optimisation.gains import Aim, LastMotion, effort, in_time, miss, pull, sweep_back
+from planners.optimisation.approach import Aim, aim_from, miss, pull
+from planners.optimisation.gains import LastMotion, effort, in_time, sweep_back
 from planners.optimisation.gaps import Barrier
 from planners.optimisation.local_model import (
     Model,
@@ -123,14 +124,6 @@ def _gone_on(model: Model, steps: int, goal: Floats, vehicle: Vehicle) -> int:
 
 
 @lean
-def _aim_from(model: Model, steps: int, goal: Floats) -> Aim:
-    dx = model.states[steps, 0] - goal[0]
-    dy = model.states[steps, 1] - goal[1]
-    far = max(length(dx, dy), 1e-9)
-    return Aim(goal[0], goal[1], goal[2], dx / far, dy / far, max(far, goal[2]))
-
-
-@lean
 def descend(
     model: Model,
     steps: int,
@@ -164,11 +157,11 @@ def descend(
     ended = False
     damping = 0.0
     anew = True
-    aim = _aim_from(model, steps, goal)
+    aim = aim_from(model, steps, goal)
     cost = 0.0
     while used < iterations:
         if anew:
-            aim = _aim_from(model, steps, goal)
+            aim = aim_from(model, steps, goal)
             differentiate_steps(model, steps, vehicle)
             for k in range(1, steps + 1):
                 differentiate_nearness(model, k, vehicle, scene, circles, barrier)

@@ -28,26 +28,6 @@ class LastMotion(NamedTuple):
     most_turn: float  # rad/s to either side, of a turn rate
 
 
-class Aim(NamedTuple):
-    """What the last state is to come near to: how far it is from the goal along the approach."""
-
-    x: float  # metres
-    y: float
-    radius: float
-    away_x: float  # unit vector from the goal to the last state
-    away_y: float
-    distance: float  # metres, for how much it costs to be beside the approach
-
-
-@inlined
-def miss(x: float, y: float, aim: Aim) -> float:
-    """The distance from the goal along the approach, negative beyond it; to be beside it costs, too."""
-    dx = x - aim.x
-    dy = y - aim.y
-    across = dx * aim.away_y - dy * aim.away_x
-    return dx * aim.away_x + dy * aim.away_y + 0.5 * across * across / aim.distance
-
-
 @inlined
 def effort(first: float, second: float, vehicle: Vehicle) -> float:
     """What the controls of a step cost, in metres."""
@@ -218,21 +198,6 @@ def sweep_back(
                 hessian[r, c] = mean
                 hessian[c, r] = mean
     return linear, quadratic
-
-
-@lean
-def pull(model: Model, steps: int, aim: Aim) -> None:
-    """Add what ``miss`` costs to gradient and curvature of the last state."""
-    gradient, curvature = model.gradient[steps], model.curvature[steps]
-    dx = model.states[steps, 0] - aim.x
-    dy = model.states[steps, 1] - aim.y
-    beside = (dx * aim.away_y - dy * aim.away_x) / aim.distance
-    gradient[0] += aim.away_x + beside * aim.away_y
-    gradient[1] += aim.away_y - beside * aim.away_x
-    curvature[0, 0] += aim.away_y * aim.away_y / aim.distance
-    curvature[1, 1] += aim.away_x * aim.away_x / aim.distance
-    curvature[0, 1] -= aim.away_x * aim.away_y / aim.distance
-    curvature[1, 0] -= aim.away_x * aim.away_y / aim.distance
 
 
 @inlined
