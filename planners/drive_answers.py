@@ -28,7 +28,7 @@ from planners.world.view import View
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
 # A drive may not be the best if it takes longer than both of these allow.
 LONG: Final = 1.5  # times what it would take without obstacles
-UNUSUAL: Final = 1.15  # times what the quickest of the stored drives takes that begin nearest
+UNUSUAL: Final = 1.3  # times what the quickest of the stored drives takes that begin nearest
 
 
 class DriveAnswer(NamedTuple):

@@ -6,6 +6,7 @@ the compiling of kernels, which happens once on a machine.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -209,9 +210,10 @@ def _searched(
         view.lap("guide")
     is_given = False  # whether the plan that comes of the search is that of the memory, polished
     if improves:
-        searched, is_given = search_and_polish(
-            planner, query, seed, None if found.is_polished else found.plan
-        )
+        rough, below_s = found.plan, math.inf
+        if found.plan is not None and found.is_polished:
+            rough, below_s = None, found.plan.duration_s
+        searched, is_given = search_and_polish(planner, query, seed, rough, below_s)
     else:
         searched = PLANNERS[planner](query)
     work = np.array([searched.collision_checks + found.checks, searched.expansions, searched.nodes])

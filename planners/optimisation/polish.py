@@ -82,8 +82,12 @@ def polish_quickest(
     iterations: int | None = None,
     margin_m: float = 0.0,
     seconds: float = math.inf,
+    below_s: float = math.inf,
 ) -> tuple[int, Polished]:
     """Polish several plans of which only the one that gets quickest is wanted; arguments as of ``polish``.
+
+    With ``below_s`` only a plan that takes less time is wanted, and what does not promise to is left as it
+    is.
 
     Returns:
         The number of the plan that got quickest, and what it is now.
@@ -91,10 +95,11 @@ def polish_quickest(
     most = most_iterations(problem) if iterations is None else iterations
     around = vehicle, scene, workspace
     until = working_clock() + seconds
-    number, best, was_pressed = _polished_once(problem, plans, *around, most, margin_m, until)
+    below = NEVER if math.isinf(below_s) else round(below_s / vehicle.dt)
+    number, best, was_pressed = _polished_once(problem, plans, *around, most, margin_m, until, below)
     left = most
     while was_pressed and best.plan is not None and left > 0 and working_clock() < until:
-        _, better, was_pressed = _polished_once(problem, [best.plan], *around, left, margin_m, until)
+        _, better, was_pressed = _polished_once(problem, [best.plan], *around, left, margin_m, until, below)
         left -= better.iterations
         is_better = better.plan is not None and better.plan.duration_s < best.plan.duration_s
         best = Polished(better.plan if is_better else best.plan, best.iterations + better.iterations)
@@ -110,6 +115,7 @@ def _polished_once(
     iterations: int,
     margin_m: float,
     until: float,
+    below: int,
 ) -> tuple[int, Polished, bool]:
     """As ``polish_quickest``; and whether pressing made it much quicker, so that more may come of it."""
     most = max(len(plan.controls) for plan in plans)
@@ -134,11 +140,14 @@ def _polished_once(
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         around = goal, vehicle, scene, barrier
         begun = [Plan(states, controls, vehicle.dt) for _, states, controls, _ in given]
-        number, moved, used = quickest(begun, model, interior, *around, iterations, until)
+        number, moved, used = quickest(begun, model, interior, *around, iterations, until, below)
         shortest = min(given, key=lambda each: each[3])
+        gains_little = isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order  # by pressing
+        if moved is None and gains_little and below < NEVER and below <= shortest[3]:
+            return 0, Polished(None, used), False
         if moved is not None and len(moved.controls) < shortest[3]:
-            if isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order:
-                return number, Polished(moved, used), False  # which pressing makes hardly any quicker
+            if gains_little:
+                return number, Polished(moved, used), False
             given = [(number, moved.states, moved.controls, len(moved.controls)), shortest]
     lower = _shortened if arriving else _descended
     left = iterations - used // len(plans)
@@ -182,7 +191,8 @@ def polish_guesses(
     interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
     around = goal, vehicle, scene, barrier
-    number, plan, used = quickest(guesses, model, interior, *around, GUESS_ITERATIONS, until, is_near=True)
+    most = GUESS_ITERATIONS, until, NEVER
+    number, plan, used = quickest(guesses, model, interior, *around, *most, is_near=True)
     return number, Polished(plan, used)
 
 

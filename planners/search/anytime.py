@@ -153,7 +153,7 @@ def improve(
 
 
 def search_and_polish(
-    planner: str, query: Query, seed: int, given: Plan | None = None
+    planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
 ) -> tuple[Outcome, bool]:
     """Search for several plans, polish them and keep the quickest.
 
@@ -165,6 +165,7 @@ def search_and_polish(
         query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
+        below_s: only a plan that takes less time is wanted: what seems to take longer is not polished on.
 
     Returns:
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
@@ -204,6 +205,7 @@ def search_and_polish(
     number, polished = polish_quickest(
         *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
         seconds=until - working_clock(),
+        below_s=below_s,
     )
     best, given_best = solved[number]
     plan = polished.plan or given_best

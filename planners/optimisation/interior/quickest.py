@@ -16,6 +16,7 @@ from planners.optimisation.guesses import resampled
 from planners.optimisation.interior.buffers import Interior
 from planners.optimisation.interior.costs import Hold
 from planners.optimisation.interior.descending import WEAKER, Drive, descend, fill
+from planners.optimisation.interior.drivable import share_blocked
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
@@ -57,10 +58,11 @@ class Effort(NamedTuple):
     first: int  # iterations while time counts, for each division into steps
     divisions: int  # into steps, as long as these are short
     longer: tuple[float, ...]  # times the time that was found are tried when ``MORE_STEPS`` do not help
+    most_blocked: float  # share of states while time counts: with more, closing gaps is mostly in vain
 
 
-WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6))
-NEAR: Final = Effort(ATTEMPTS[:1], 30, 1, ())  # of what is nearly optimal: more is mostly in vain
+WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
+NEAR: Final = Effort(ATTEMPTS[:1], 30, 1, (), 0.25)  # of what is nearly optimal: more is mostly in vain
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
@@ -78,6 +80,8 @@ def quickest(
     barrier: Barrier,
     iterations: int,
     until: float,
+    below: int,
+    *,
     is_near: bool = False,
 ) -> tuple[int, Plan | None, int]:
     """Find the quickest drive near the way of another one, or of several.
@@ -93,6 +97,7 @@ def quickest(
         barrier: its margin and hitch count.
         iterations: at most, for each way.
         until: when to end, by ``working_clock``.
+        below: only a drive of less steps is wanted.
         is_near: whether they are nearly optimal: then it begins with their speeds, and there is one attempt.
 
     Returns:
@@ -105,10 +110,10 @@ def quickest(
     drive = Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if is_near:
-        number, best, used = _found(given, drive, vehicle, NEAR, most, NEVER)
+        number, best, used = _found(given, drive, vehicle, NEAR, most, below)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
-        number, best, used = _found(guesses, drive, vehicle, WHOLE, most, NEVER)
+        number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below)
     drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
         again, below = [_guess(best.states, vehicle)], len(best.controls)
@@ -147,10 +152,12 @@ def _found(
         drive = around._replace(
             goal=_drawn_in(around.asked, attempt.tolerance), soft=around.soft._replace(barrier=barrier)
         )
-        for k in guesses:
+        for k in list(guesses):
             guess = given[k] if attempt.afresh else guesses[k]
             guesses[k], spent = _quickened(drive, guess, given[k].states[0], vehicle, effort, most - used)
             used += spent
+            if share_blocked(guesses[k].states, vehicle, drive.scene) > effort.most_blocked:
+                del guesses[k]
         left = {}
         for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
             below = shorter_than if best is None else len(best.controls)

@@ -172,7 +172,15 @@ def test_of_several_plans_the_one_that_gets_quickest_is_kept() -> None:
         assert polished.plan is not None
         assert faults(problem, polished.plan, CAR) == []
         assert 0 <= best < len(plans)
-        assert polished.plan.duration_s <= min(plan.duration_s for plan in plans)
+        shortest = min(plan.duration_s for plan in plans)
+        assert polished.plan.duration_s <= shortest
+        below_s = polished.plan.duration_s + 0.5
+        _, wanted = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE, below_s=below_s)
+        assert wanted.plan is not None
+        assert wanted.plan.duration_s < below_s
+        _, none = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE, below_s=2.0)
+        assert none.plan is None
+        assert none.iterations < polished.iterations
 
 
 @pytest.mark.parametrize(
