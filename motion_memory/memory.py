@@ -157,7 +157,8 @@ class Memory:
         """Look up what is stored for a problem, without any search.
 
         These are the plans that the encoder ranks best. From a library, and for a problem that is not
-        canonical, there is at most one: a free plan made of parts of stored plans.
+        canonical, there is at most one, a free plan: a stored drive that was moved to a pose at rest, or
+        parts of stored plans.
 
         Args:
             problem: as for ``plan``.

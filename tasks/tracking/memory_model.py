@@ -49,7 +49,7 @@ SIGNATURE: Final = ModelSignature(
         [
             ColSpec(DataType.string, "problem_id"),
             ColSpec(DataType.long, "rank"),  # from 1
-            ColSpec(DataType.long, "plan"),  # its number in the memory; -1: made of parts of stored plans
+            ColSpec(DataType.long, "plan"),  # its number in the memory; -1: made of parts of several
             ColSpec(DataType.boolean, "free"),  # it solves the problem: checked exactly
             ColSpec(DataType.double, "score"),  # the encoder's, higher is better
             ColSpec(DataType.double, "dt"),  # seconds
