@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +12,7 @@ from planners.world.authority.authority import faults
 from planners.world.problem import GOAL_RADIUS, Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.libraries import load_memory_or_library, vehicle_of
+from storage.errors import StorageError
 from storage.exchange.plans import PlanRecord, is_plan_file, read_plan
 from storage.exchange.problems import problems_or_faults
 from tasks.fan_out.progress import progress
@@ -52,9 +52,15 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
 
 def plan_files_in(path: Path) -> list[Path]:
     """The files of plans at ``path``, a file or a folder with such files at any depth; sorted."""
-    if path.is_dir():
-        return [file for file in sorted(path.rglob("*.json")) if is_plan_file(file)]
-    return [path] if path.suffix == ".json" and path.is_file() else []
+    if not path.is_dir():
+        return [path] if path.suffix == ".json" and path.is_file() else []
+    files = sorted(path.rglob("*.json"))
+    plans = [file for file in files if is_plan_file(file)]
+    if plans and len(plans) < len(files):
+        _LOG.warning(
+            "%d other .json files in %s hold no plan and are left alone", len(files) - len(plans), path
+        )
+    return plans
 
 
 def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[str]:
@@ -69,71 +75,78 @@ def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[s
         how many plans were judged, and how many files hold none.
 
     Raises:
-        RunError: a plan is faulty, or its problem is not there; the faults are logged.
-        StorageError: a file is malformed, or of another vehicle.
+        RunError: a plan is faulty, its problem is not there, or one of several files is malformed; the
+            faults are logged.
+        StorageError: the only file, or that of the problems, is missing or malformed.
     """
-    vehicle = read_plan(files[0]).vehicle
-    counts: Counter[str] = Counter()
     wrong: list[str] = []
-    with progress("verify", len(files), end_is_told=False) as show:
-        asked = _each_by_itself(files, vehicle) if problems is None else _each_in(files, problems, vehicle)
-        for done, (file, record, problem) in enumerate(asked, start=1):
-            plan = record.plan if isinstance(problem, str) else record.plan_in_frame_of(problem)
-            if plan is None:
-                counts[_NO_PLAN] += 1
-            elif isinstance(problem, str):
-                wrong.append(f"{file}: {problem}")
-            else:
-                wrong += [f"{file}: {fault}" for fault in faults(problem, plan, vehicle)]
-                counts[_BY_ITSELF if problems is None else _IN_PROBLEM] += 1
-            show(done)
+    by_id: defaultdict[str, list[Path]] = defaultdict(list)
+    vehicle = None
+    for file in files:
+        try:
+            record = read_plan(file, vehicle)
+        except StorageError as error:
+            if len(files) == 1:
+                raise
+            wrong.append(str(error))
+            continue
+        vehicle = record.vehicle
+        by_id[record.problem_id].append(file)
+    counts: Counter[str] = Counter()
+    if vehicle is not None:
+        asked = _with_problems(by_id, problems, vehicle)
+        with progress("verify", len(files), end_is_told=False) as show:
+            for done, (file, problem) in enumerate(asked, start=1):
+                record = read_plan(file, vehicle)
+                if record.plan is None:
+                    counts[_NO_PLAN] += 1
+                else:
+                    counts[_BY_ITSELF if problems is None else _IN_PROBLEM] += 1
+                    wrong += [f"{file}: {fault}" for fault in _faults(record, record.plan, problem)]
+                show(done)
     _refuse(wrong, "; see above")
     if problems is None:
         _LOG.info("Obstacles and goals were not looked at: name the file of the problems with --problems.")
     return counts
 
 
-_Asked = Iterator[tuple[Path, PlanRecord, Problem | str]]  # a plan's file, what it holds, and its problem,
-# or why its problem cannot be had
+def _with_problems(
+    by_id: dict[str, list[Path]], problems: Path | None, vehicle: Vehicle
+) -> Iterator[tuple[Path, Problem | str | None]]:
+    """Each plan's file with its problem, or why its problem cannot be had, or None if none is asked for.
 
-
-def _each_by_itself(files: Sequence[Path], vehicle: Vehicle) -> _Asked:
-    for file in files:
-        record = read_plan(file, vehicle)
-        here: Problem | str = "holds no plan"
-        if record.plan is not None:
-            here = replace(_by_itself(record.plan), scale=record.scale, offset=record.offset)
-        yield file, record, here
-
-
-def _each_in(files: Sequence[Path], problems: Path, vehicle: Vehicle) -> _Asked:
-    """The plans in the order of their problems, then those that have none."""
-    left = {read_plan(file, vehicle).problem_id: file for file in files}
-    read = malformed = 0
-    why, only = "", None
-    for where, problem in problems_or_faults(problems, vehicle):
-        read += 1
+    ``by_id`` has the files by the id of their problem. They come in the order of the problems.
+    """
+    left = dict(by_id)
+    read: list[str] = []  # where the problems stand, and what is wrong with them, if anything is
+    for where, problem in () if problems is None else problems_or_faults(problems, vehicle):
         if isinstance(problem, str):
-            malformed += 1
-            why = why or f"; {where}: {problem}"
+            read.append(f"; {where}: {problem}")
             continue
+        read.append("")
+        for file in left.pop(problem.id, ()):
+            yield file, problem
         only = problem
-        if problem.id in left:
-            yield _paired(left.pop(problem.id), problem, vehicle)
-    if read == 1 and only is not None and len(left) == len(files) == 1:
-        ((made_for, file),) = left.items()
+    if read == [""] and [len(files) for files in left.values()] == [1] == [len(by_id)]:
+        ((made_for, (file,)),) = left.items()
         _LOG.warning("%s was made for problem %s; it is judged in problem %s", file, made_for, only.id)
-        yield _paired(file, only, vehicle)
+        yield file, only
         return
-    for made_for, file in left.items():
-        yield file, read_plan(file, vehicle), f"{problems} holds no sound problem {made_for!r}{why}"
+    why = next(filter(None, read), "")
+    for made_for, files in left.items():
+        for file in files:
+            yield file, None if problems is None else f"{problems} holds no sound problem {made_for!r}{why}"
 
 
-def _paired(file: Path, problem: Problem, vehicle: Vehicle) -> tuple[Path, PlanRecord, Problem | str]:
-    record = read_plan(file, vehicle)
-    if record.plan is not None and record.scale != problem.scale:
-        return file, record, f"its scale is {record.scale:g}, that of its problem {problem.scale:g}"
-    return file, record, problem
+def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> list[str]:
+    """What is wrong with the ``plan`` of a ``record``; arguments as of ``_with_problems``."""
+    if problem is None:
+        return faults(_by_itself(plan), plan, record.vehicle)
+    if isinstance(problem, str):
+        return [problem]
+    if record.scale != problem.scale:
+        return [f"Scale: it is {record.scale:g}, that of the problem {problem.scale:g}."]
+    return faults(problem, record.plan_in_frame_of(problem) or plan, record.vehicle)
 
 
 def _by_itself(plan: Plan) -> Problem:

@@ -62,14 +62,21 @@ def test_plans_in_files_are_judged_in_their_problems_or_by_themselves(
         assert call(["verify", str(plans), *options, "--json"]) == 0
         assert sum(json.loads(capsys.readouterr().out)["answer"]["checked"].values()) == 3
 
-    one = plans / f"{near[0].id}.json"
+    one, broken = plans / f"{near[0].id}.json", plans / "broken.json"
+    broken.write_text((plans / f"{near[1].id}.json").read_text().replace('"dt": ', '"dt": 1'))
+    (plans / "twin.json").write_text(one.read_text())
+    assert call(["verify", str(plans), "--problems", str(problems)]) == 1
+    assert "broken.json" in capsys.readouterr().err
+    broken.unlink()
+
     fields = json.loads(one.read_text())
     fields["controls"][3][0] += 0.01  # no longer what leads from state to state
     one.write_text(json.dumps(fields))
     for options in ([], ["--problems", str(problems)]):
         assert call(["verify", str(plans), *options]) == 1
         told = capsys.readouterr().err
-        assert near[0].id in told
+        assert one.name in told
+        assert "twin" not in told
         assert near[1].id not in told
 
 
@@ -90,7 +97,7 @@ def test_a_plan_is_judged_in_the_world_as_it_is_now(
     assert "Collision" in told
     write_problems(changed, [replace(free, scale=0.5)])
     assert call(["verify", str(plan), "--problems", str(changed)]) == 1
-    assert "scale" in capsys.readouterr().err
+    assert "Scale" in capsys.readouterr().err
 
 
 def test_problems_are_refused_beside_what_holds_no_plan_files(
