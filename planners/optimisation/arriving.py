@@ -21,15 +21,17 @@ from planners.optimisation.descent import (
     drive_changed,
 )
 from planners.optimisation.gains import LastMotion, effort, sweep_back
-from planners.optimisation.gaps import Barrier
+from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.local_model import (
+    NEVER,
     Model,
     differentiate_nearness,
     differentiate_steps,
     nearness_cost,
 )
-from planners.optimisation.pressing import Way, press
+from planners.optimisation.pressing import WAYS, Way, press
 from planners.world.arrays import Floats
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import (
     LEAST_SPEED,
@@ -44,6 +46,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 RANGE_M: Final = 0.3  # from which on obstacles push
 MOST_TRIES: Final = 10  # iterations for one try
+LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 GENTLE_HOLD: Final = 1e-3  # of sweeps after the first
 HOPELESS: Final = 0.7  # an iteration that leaves more of the cost than this is in vain
 MOST_IN_VAIN: Final = 2
@@ -167,3 +170,55 @@ def shorten(
                 copy_drive(model.states, model.controls, after, model.best_states, model.best_controls)
                 return used, True
     return used, False
+
+
+def shortened(
+    model: Model,
+    steps: int,
+    best: int,
+    goal: Floats,
+    barrier: Barrier,
+    vehicle: Vehicle,
+    scene: Scene,
+    iterations: int,
+    until: float,
+) -> tuple[int, int]:
+    """Press the drive in ``model.best_states`` in all ways, until none helps.
+
+    Args:
+        model: the drive, and buffers.
+        steps: of the drive.
+        best: of the quickest free drive that is known, or ``NEVER``.
+        goal: that of ``goal_of``.
+        barrier: its margin and hitch count.
+        vehicle: what is driven.
+        scene: what must not be met.
+        iterations: at most.
+        until: when to end, by ``working_clock``.
+
+    Returns:
+        The steps of the quickest free drive, and the iterations used.
+    """
+    circles = circles_around(scene)
+    leaps = LEAPS if best < NEVER else (0,)
+    fewer, growing = leaps[0], True
+    used = in_vain = number = 0
+    while (
+        used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and working_clock() < until
+    ):
+        way = WAYS[number]
+        pushed = barrier._replace(strength=way.strength, range_m=RANGE_M, contact=way.strength)
+        most = min(MOST_TRIES, iterations - used)
+        more, done = shorten(model, steps, fewer, way, most, goal, pushed, vehicle, scene, circles)
+        used += more
+        if done:
+            steps -= fewer
+            fewer = max(2 * fewer if growing else fewer, 1)
+            best, leaps, in_vain, growing = steps, LEAPS, 0, True
+        elif fewer > leaps[in_vain // len(WAYS)]:
+            fewer, growing = fewer // 2, False
+        else:
+            in_vain += 1
+            number = (number + 1) % len(WAYS)
+            fewer, growing = leaps[min(in_vain // len(WAYS), len(leaps) - 1)], True
+    return best, used

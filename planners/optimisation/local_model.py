@@ -14,6 +14,7 @@ from planners.world.trigonometry import length
 from planners.world.vehicles.dynamics import load, step, swept_bodies
 from planners.world.vehicles.vehicle import Vehicle
 
+NEVER: Final = 1 << 30  # steps, of a drive that there is not
 NUDGE: Final = 1e-6  # of a state or control, for derivatives by differences
 HITCH: Final = Barrier(0.01, 0.2, 0.0, 0.0, 0.01)  # radians instead of metres
 

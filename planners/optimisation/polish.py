@@ -9,12 +9,12 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten
+from planners.optimisation.arriving import MOST_TRIES, RANGE_M, shorten, shortened
 from planners.optimisation.descent import Stage, descend, steps_to_goal
 from planners.optimisation.gaps import Barrier, circles_around
 from planners.optimisation.interior.buffers import allocate_interior
-from planners.optimisation.interior.quickest import NEVER, quickest
-from planners.optimisation.local_model import Model, allocate_model
+from planners.optimisation.interior.quickest import quickest
+from planners.optimisation.local_model import NEVER, Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
@@ -29,7 +29,6 @@ ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 1000  # where a drive must arrive as asked; some 60 suffice mostly
 GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
 SLICE: Final = 8  # iterations between two looks at the clock
-LEAPS: Final = (1, 3, 8, 20)  # steps at once that a drive is shortened by: where few fail, more may succeed
 MUCH: Final = 0.97  # of its steps: a drive that is pressed to so few may get quicker from there
 ROOM: Final = 256  # steps, in which buffers grow
 MORE_TIME: Final = (0.0, 0.1, 0.3)  # shares of its time, with which a guess is tried
@@ -149,7 +148,7 @@ def _polished_once(
             if gains_little:
                 return number, Polished(moved, used), False
             given = [(number, moved.states, moved.controls, len(moved.controls)), shortest]
-    lower = _shortened if arriving else _descended
+    lower = shortened if arriving else _descended
     left = iterations - used // len(plans)
     number, better = given[0][0], None
     enough = MUCH * min(length for *_, length in given)
@@ -273,41 +272,4 @@ def _descended(
                 *(model, steps, goal, stage, most, best, vehicle, scene, circles)
             )
             used += more
-    return best, used
-
-
-def _shortened(
-    model: Model,
-    steps: int,
-    best: int,
-    goal: Floats,
-    barrier: Barrier,
-    vehicle: Vehicle,
-    scene: Scene,
-    iterations: int,
-    until: float,
-) -> tuple[int, int]:
-    """Press the drive in all ways until none helps; as ``_descended``."""
-    circles = circles_around(scene)
-    leaps = LEAPS if best < NEVER else (0,)
-    fewer, growing = leaps[0], True
-    used = in_vain = number = 0
-    while (
-        used < iterations and in_vain < len(leaps) * len(WAYS) and fewer < steps and working_clock() < until
-    ):
-        way = WAYS[number]
-        pushed = barrier._replace(strength=way.strength, range_m=RANGE_M, contact=way.strength)
-        most = min(MOST_TRIES, iterations - used)
-        more, done = shorten(model, steps, fewer, way, most, goal, pushed, vehicle, scene, circles)
-        used += more
-        if done:
-            steps -= fewer
-            fewer = max(2 * fewer if growing else fewer, 1)
-            best, leaps, in_vain, growing = steps, LEAPS, 0, True
-        elif fewer > leaps[in_vain // len(WAYS)]:
-            fewer, growing = fewer // 2, False
-        else:
-            in_vain += 1
-            number = (number + 1) % len(WAYS)
-            fewer, growing = leaps[min(in_vain // len(WAYS), len(leaps) - 1)], True
     return best, used

@@ -30,7 +30,6 @@ RANGE_M: Final = 0.3  # of obstacles, as of ``Barrier``
 MOST_LAST: Final = 15  # iterations of each attempt to close gaps
 MORE_STEPS: Final = (0, 1, 2, 4)  # than the time that was found
 SHORT: Final = 0.9  # of a step of the vehicle: a drive whose steps are shorter is divided into fewer
-NEVER: Final = 1 << 30  # steps
 ROUNDING: Final = 1e-6  # of a step
 
 
