@@ -16,6 +16,7 @@ from planners.memory.library.drives import TRIED, moved_drive, rank_drives
 from planners.memory.library.plan_library import PlanLibrary
 from planners.optimisation.polish import polish_guesses
 from planners.search.connection.pose_table import seconds_from, seconds_to_pose
+from planners.search.manoeuvres.manoeuvring import is_tight
 from planners.search.manoeuvres.variants import without_trailers
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
@@ -25,6 +26,10 @@ from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
+# By how much drives may begin elsewhere, in lengths and radians together. Where the goal is not tight a
+# search is quick, and only a near drive is worth a try.
+FAR: Final = 1.5
+FAR_IF_TIGHT: Final = 3.0
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
 # A drive may not be the best if it takes longer than both of these allow.
 LONG: Final = 1.5  # times what it would take without obstacles
@@ -71,7 +76,8 @@ def drive_answer(
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
     order = np.zeros(TRIED, np.int32)
     if blindly is None:
-        count, quickest, checks = rank_drives(drives, start, goal, order, vehicle, view.scene)
+        most = FAR_IF_TIGHT if is_tight(goal, vehicle, view.scene) else FAR
+        count, quickest, checks = rank_drives(drives, start, goal, most, order, vehicle, view.scene)
     else:
         count, quickest, checks = min(TRIED, len(drives.plans)), 0, 0
         order[:count] = blindly.integers(-len(drives.plans), len(drives.plans), count)

@@ -26,7 +26,6 @@ from planners.world.vehicles.vehicle import Vehicle
 NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
 NEAREST: Final = 10  # of them: the quickest of these sets what is usual
-FAR: Final = 1.5  # lengths and radians together by which a drive may begin elsewhere
 LOOK: Final = 3  # every so many states a moved drive is looked at
 SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
 
@@ -104,7 +103,7 @@ def _move(drives: Drives, i: int, side: float, goal: Floats, off: Floats, moved:
 
 @jit
 def rank_drives(
-    drives: Drives, start: Floats, goal: Floats, order: Integers, vehicle: Vehicle, scene: Scene
+    drives: Drives, start: Floats, goal: Floats, most: float, order: Integers, vehicle: Vehicle, scene: Scene
 ) -> tuple[int, int, int]:
     """Find the drives that promise most: quick ones that begin much as asked, and are hardly blocked.
 
@@ -112,6 +111,7 @@ def rank_drives(
         drives: of the vehicle.
         start: the state ``[S]`` at which the question begins.
         goal: that of ``goal_of``, with a heading.
+        most: by how much a drive may begin elsewhere, in lengths of the body and radians together.
         order: ``[TRIED]`` is filled in with numbers of drives, the best first; if mirrored -1 - number.
         vehicle: what is driven.
         scene: what must not be met.
@@ -122,7 +122,7 @@ def rank_drives(
     """
     size = start.shape[0]
     near = np.empty(NEAR, np.int64)
-    far = np.full(NEAR, FAR)
+    far = np.full(NEAR, most)
     off = np.zeros(size)
     moved = np.zeros((1, size))
     body = vehicle.front + vehicle.rear

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.memory.library.drives import FAR, NEAREST, TRIED, drives_of, moved_drive, rank_drives
+from planners.drive_answers import FAR
+from planners.memory.library.drives import NEAREST, TRIED, drives_of, moved_drive, rank_drives
 from planners.memory.plans.plan_arrays import store_plans
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import scene_of
@@ -89,7 +90,7 @@ def test_only_drives_that_begin_near_are_ranked(seed: int, vehicle: Vehicle) -> 
     start = np.zeros(state_size(vehicle))
     start[:3] = 25.0, 25.0, rng.uniform(-3.0, 3.0)
     goal = goal_of_pose(*(start[:2] + rng.uniform(-3.0, 3.0, 2)), rng.uniform(-3.0, 3.0))
-    count, quickest, checks = rank_drives(drives, start, goal, order, vehicle, scene)
+    count, quickest, checks = rank_drives(drives, start, goal, FAR, order, vehicle, scene)
     body = vehicle.front + vehicle.rear
     assert (count == 0) == (checks == 0)
     near = []
