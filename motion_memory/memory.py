@@ -18,6 +18,7 @@ import numpy as np
 from planners.attempt import SUB_PLANS
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
+from planners.memory.memory import scale_fault
 from planners.memory.recall import RECALLS, default_recall
 from planners.optimisation.polish import driven_near
 from planners.ranked_plans import RankedPlan, ranked_plans
@@ -165,12 +166,17 @@ class Memory:
             k: how many plans to return at most.
 
         Raises:
-            ValueError: The problem is malformed or impossible, or ``k`` is below 1.
+            ValueError: The problem is malformed or impossible, the memory is not made for its scale, or ``k``
+                is below 1.
         """
         if k < 1:
             raise ValueError(f"k is {k}: give 1 or more")
+        read = self._read(problem)
+        fault = scale_fault(self.stored, read.scale)
+        if fault is not None:
+            raise ValueError(fault)
         with self._workspace() as workspace:
-            return ranked_plans(self.stored, self._read(problem), k, workspace)
+            return ranked_plans(self.stored, read, k, workspace)
 
     def check(self, problem: Problem | Mapping[str, Any] | str, plan: Plan) -> list[str]:
         """Judge a plan with code of its own, apart from the planners': simulate it again, check it with FCL.

@@ -13,8 +13,10 @@ from planners.world.problem import GOAL_RADIUS, Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.errors import StorageError
-from storage.exchange.plans import PlanRecord, is_plan_file, read_plan
+from storage.exchange.plans import PlanRecord, read_plan
 from storage.exchange.problems import problems_or_faults
+from storage.fields import short
+from storage.places.files import read_json
 from tasks.fan_out.progress import progress
 from tasks.settings.errors import RunError, tell_faults
 
@@ -51,23 +53,32 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
 
 
 def plan_files_in(path: Path) -> list[Path]:
-    """The files of plans at ``path``, a file or a folder with such files at any depth; sorted."""
+    """The files of plans at ``path``, a file or a folder with such files at any depth; sorted.
+
+    Damaged JSON files in a folder count: they may have been plans.
+    """
     if not path.is_dir():
         return [path] if path.suffix == ".json" and path.is_file() else []
     files = sorted(path.rglob("*.json"))
-    plans = [file for file in files if is_plan_file(file)]
-    if plans and len(plans) < len(files):
-        _LOG.warning(
-            "%d other .json files in %s hold no plan and are left alone", len(files) - len(plans), path
-        )
-    return plans
+    others = [file for file in files if _holds_something_else(file)]
+    if 0 < len(others) < len(files):
+        _LOG.warning("Left alone, since no plan is in them: %s", short([str(file) for file in others]))
+    return [file for file in files if file not in others]
+
+
+def _holds_something_else(file: Path) -> bool:
+    try:
+        fields = read_json(file)
+    except StorageError:
+        return False
+    return not (isinstance(fields, dict) and "states" in fields)
 
 
 def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[str]:
     """Judge each plan of files in its problem, or by itself.
 
     Args:
-        files: of plans, at least one, all for the same vehicle.
+        files: of plans, at least one.
         problems: a file with the problem of each plan, found by its id; a single problem may have any id, if
             there is a single plan. None judges each plan by itself: no obstacles, no goal.
 
@@ -80,31 +91,30 @@ def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[s
         StorageError: the only file, or that of the problems, is missing or malformed.
     """
     wrong: list[str] = []
-    by_id: defaultdict[str, list[Path]] = defaultdict(list)
-    vehicle = None
+    of_vehicles: defaultdict[Vehicle, dict[str, list[Path]]] = defaultdict(dict)
     for file in files:
         try:
-            record = read_plan(file, vehicle)
+            record = read_plan(file)
         except StorageError as error:
             if len(files) == 1:
                 raise
             wrong.append(str(error))
-            continue
-        vehicle = record.vehicle
-        by_id[record.problem_id].append(file)
+        else:
+            of_vehicles[record.vehicle].setdefault(record.problem_id, []).append(file)
     counts: Counter[str] = Counter()
-    if vehicle is not None:
-        asked = _with_problems(by_id, problems, vehicle)
-        with progress("verify", len(files), end_is_told=False) as show:
-            for done, (file, problem) in enumerate(asked, start=1):
-                record = read_plan(file, vehicle)
+    done = 0
+    with progress("verify", len(files), end_is_told=False) as show:
+        for vehicle, by_id in of_vehicles.items():
+            for file, problem in _with_problems(by_id, problems, vehicle):
+                record = read_plan(file)
                 if record.plan is None:
                     counts[_NO_PLAN] += 1
                 else:
                     counts[_BY_ITSELF if problems is None else _IN_PROBLEM] += 1
                     wrong += [f"{file}: {fault}" for fault in _faults(record, record.plan, problem)]
+                done += 1
                 show(done)
-    _refuse(wrong, "; see above")
+    _refuse(wrong, f" in {len(files)} files of plans")
     if problems is None:
         _LOG.info("Obstacles and goals were not looked at: name the file of the problems with --problems.")
     return counts
@@ -117,25 +127,29 @@ def _with_problems(
 
     ``by_id`` has the files by the id of their problem. They come in the order of the problems.
     """
+    if problems is None:
+        yield from ((file, None) for files in by_id.values() for file in files)
+        return
     left = dict(by_id)
-    read: list[str] = []  # where the problems stand, and what is wrong with them, if anything is
-    for where, problem in () if problems is None else problems_or_faults(problems, vehicle):
+    malformed: list[str] = []
+    sound = 0
+    for where, problem in problems_or_faults(problems, vehicle):
         if isinstance(problem, str):
-            read.append(f"; {where}: {problem}")
+            malformed.append(f"{where}: {problem}")
             continue
-        read.append("")
+        sound += 1
         for file in left.pop(problem.id, ()):
             yield file, problem
         only = problem
-    if read == [""] and [len(files) for files in left.values()] == [1] == [len(by_id)]:
+    if sound == 1 and not malformed and [len(files) for files in left.values()] == [1] == [len(by_id)]:
         ((made_for, (file,)),) = left.items()
         _LOG.warning("%s was made for problem %s; it is judged in problem %s", file, made_for, only.id)
         yield file, only
         return
-    why = next(filter(None, read), "")
     for made_for, files in left.items():
-        for file in files:
-            yield file, None if problems is None else f"{problems} holds no sound problem {made_for!r}{why}"
+        with_id = (told for told in malformed if f"(id {short(made_for)})" in told)
+        why = next(with_id, f"{problems} has no problem with the id {made_for}")
+        yield from ((file, why) for file in files)
 
 
 def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> list[str]:
@@ -160,7 +174,9 @@ def _by_itself(plan: Plan) -> Problem:
     )
 
 
-def _refuse(wrong: Sequence[str], what_now: str) -> None:
+def _refuse(wrong: Sequence[str], where: str) -> None:
+    if len(wrong) == 1:
+        raise RunError(wrong[0])
     if wrong:
         tell_faults(wrong)
-        raise RunError(f"{len(wrong)} fault{'s' * (len(wrong) > 1)}{what_now}.")
+        raise RunError(f"{len(wrong)} faults{where}.")

@@ -20,4 +20,5 @@ class RunError(RuntimeError):
 
 def tell_faults(faults: Sequence[str]) -> None:
     """Log the first of many ``faults``, a line each, before an error says how many there are."""
-    _LOG.error("\n".join(faults[:_MOST_FAULTS_TOLD]))
+    more = len(faults) - _MOST_FAULTS_TOLD
+    _LOG.error("\n".join([*faults[:_MOST_FAULTS_TOLD], *([f"... and {more:,} more"] if more > 0 else [])]))

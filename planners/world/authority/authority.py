@@ -20,7 +20,14 @@ from planners.world.authority.authority_equations import (
 )
 from planners.world.authority.authority_sweeps import sweep_faults
 from planners.world.problem import Arrival, Plan, Problem
-from planners.world.vehicles.vehicle import CAR, CarWithTrailers, DifferentialDrive, Vehicle, state_size
+from planners.world.vehicles.vehicle import (
+    CAR,
+    CarWithTrailers,
+    DifferentialDrive,
+    Vehicle,
+    state_names,
+    state_size,
+)
 
 TOLERANCE = 1e-6  # metres, radians, m/s: between the plan's states and its controls simulated again
 BETWEEN = 0.01  # radians: how far a hitch may pass its limit between two states within it
@@ -28,7 +35,10 @@ ROUNDING = 1e-9  # on limits, metres and so on
 
 
 def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
-    """What is wrong with ``plan`` as an answer to ``problem``: one line each, none when it is good."""
+    """What is wrong with ``plan`` as an answer to ``problem``: one line each, none when it is good.
+
+    The plan is in the frame and the lengths of the problem; lines tell real metres, where the problem lies.
+    """
     states, controls = plan.states, plan.controls
     size = state_size(vehicle)
     if states.ndim != 2 or states.shape[1] != size or controls.shape != (len(states) - 1, 2):
@@ -41,11 +51,10 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
         found.append(f"Time step: {plan.dt} s; the vehicle's is {vehicle.dt} s.")
     still = [max(vehicle.min_speed, 0.0), *[0.0] * (size - 4)]  # as slow as it can be, and straight
     motion = [*problem.start_motion, *still[len(problem.start_motion) :]]
-    offset = np.abs(states[0] - [*problem.start, *motion]).max()
-    if offset > TOLERANCE:
-        how = f"with motion {motion}" if any(motion) else "at rest, all straight"
-        found.append(f"Start: state 0 is {offset:.3g} off the problem's start {how}.")
-    beyond = _limit_faults(states, controls, vehicle)
+    off = np.abs(states[0] - [*problem.start, *motion])
+    if off.max() > TOLERANCE:
+        found.append(_start_fault(off, problem.scale, vehicle))
+    beyond = _limit_faults(states, controls, problem.scale, vehicle)
     if not beyond and isinstance(vehicle, CarWithTrailers):
         widest = zip(widest_hitches(states, controls, vehicle), vehicle.trailers, strict=True)
         beyond = [
@@ -58,23 +67,36 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
     found += _dynamics_faults(*(each.astype(np.float64).tobytes() for each in (states, controls)), vehicle)
     miss = math.dist(states[-1, :2], problem.goal)
     if miss > problem.goal_radius + ROUNDING:
-        found.append(f"Goal: the last state is {miss:.3f} m from it, the radius is {problem.goal_radius} m.")
+        radius = problem.scale * problem.goal_radius
+        found.append(
+            f"Goal: the last state is {problem.scale * miss:.3f} m from it; allowed are {radius:g} m."
+        )
     if problem.arrival is not None:
-        found += _arrival_faults(states[-1].tolist(), problem.arrival, vehicle)
+        found += _arrival_faults(states[-1].tolist(), problem.arrival, problem.scale, vehicle)
     return found + sweep_faults(problem, states, controls, vehicle)
 
 
-def _arrival_faults(last: list[float], arrival: Arrival, vehicle: Vehicle) -> list[str]:
+def _start_fault(off: Floats, scale: float, vehicle: Vehicle) -> str:
+    """By how much the first state is ``off [S]`` the start: the variable that is off by most."""
+    worst = int(np.argmax(off))
+    name = state_names(vehicle)[worst]
+    unit = {"x": "m", "y": "m", "speed": "m/s", "turn_rate": "rad/s"}.get(name, "rad")
+    value = off[worst] * (scale if unit.startswith("m") else 1.0)
+    return f"Start: {name} of state 0 is {value:.3g} {unit} off the problem's start."
+
+
+def _arrival_faults(last: list[float], arrival: Arrival, scale: float, vehicle: Vehicle) -> list[str]:
     """What is wrong with heading, speed, turn rate and hitch angles of the ``last [S]`` state."""
     found = []
     if arrival.heading is not None:
         off = abs(math.remainder(last[2] - arrival.heading, math.tau))
         if off > arrival.heading_tolerance + TOLERANCE:
             allowed = arrival.heading_tolerance
-            found.append(f"Heading: the last is {off:.3f} rad off the goal's; allowed are {allowed} rad.")
+            found.append(f"Heading: the last is {off:.3f} rad off the goal's; allowed are {allowed:.4g} rad.")
     low, high = arrival.least_speed, arrival.most_speed
     if not low - TOLERANCE <= last[3] <= high + TOLERANCE:
-        found.append(f"Arrival: the last speed is {last[3]:.3g} m/s; asked are {low:g} to {high:g} m/s.")
+        asked_speeds = f"{scale * low:g} to {scale * high:g}"
+        found.append(f"Arrival: the last speed is {scale * last[3]:.3g} m/s; asked are {asked_speeds} m/s.")
     has_turn_rate = isinstance(vehicle, DifferentialDrive) and not vehicle.first_order
     if has_turn_rate and (low, high) == (0.0, 0.0) and abs(last[4]) > TOLERANCE:
         found.append(f"Turn: the last turn rate is {last[4]:.3g} rad/s; at rest it is 0.")
@@ -83,17 +105,22 @@ def _arrival_faults(last: list[float], arrival: Arrival, vehicle: Vehicle) -> li
         off = abs(angle - wanted)
         if off > allowed + TOLERANCE:
             found.append(
-                f"Hitch {number}: the last is {off:.3f} rad off the goal's; allowed are {allowed} rad."
+                f"Hitch {number}: the last is {off:.3f} rad off the goal's; allowed are {allowed:.4g} rad."
             )
     return found
 
 
-def _limit_faults(states: Floats, controls: Floats, vehicle: Vehicle) -> list[str]:
-    return [
-        f"{name}: {values.min():.4g} to {values.max():.4g} {unit}; allowed are {low:.4g} to {high:.4g}."
-        for name, values, low, high, unit in limits_of(states, controls, vehicle)
-        if len(values) and (values.min() < low - ROUNDING or values.max() > high + ROUNDING)
-    ]
+def _limit_faults(states: Floats, controls: Floats, scale: float, vehicle: Vehicle) -> list[str]:
+    found = []
+    for name, values, low, high, unit in limits_of(states, controls, vehicle):
+        if len(values) and (values.min() < low - ROUNDING or values.max() > high + ROUNDING):
+            real = scale if unit.startswith("m") else 1.0
+            told, allowed = (
+                f"{real * least:.4g} to {real * most:.4g}"
+                for least, most in ((values.min(), values.max()), (low, high))
+            )
+            found.append(f"{name}: {told} {unit}; allowed are {allowed}.")
+    return found
 
 
 @functools.lru_cache(maxsize=1_000)  # a stored plan is judged in many problems

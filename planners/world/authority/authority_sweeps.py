@@ -71,7 +71,7 @@ def _body_faults(problem: Problem, body: Body, finer: Finer) -> list[str]:
                 middle = (first + last) // 2
                 runs += [(middle, last), (first, middle)]
         elif _step_meets(manager, body, first) and (steps == 0 or _any_step_meets(manager, finer(first))):
-            x, y = body.centres[first]
+            x, y = problem.scale * body.centres[first] + problem.offset
             return [
                 f"Collision: the {body.name}'s footprint meets an obstacle between states {first} and {last},"
                 f" near ({x:.2f}, {y:.2f})."

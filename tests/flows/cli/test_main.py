@@ -78,7 +78,7 @@ COMMANDS = (
         (["export", "nowhere", "--format", "csv", "--out", "a.db"], 2, "a.db does not end in .csv"),
         (["export", "nowhere", "--format", "ompl", "--out", "."], 2, ". already exists; give a new folder"),
         (["export", "nowhere", "--format", "csv", "--out", "a.csv"], 1, "nowhere is not a run"),
-        (["verify", "nowhere"], 1, "nowhere is not a data folder"),
+        (["verify", "nowhere"], 1, "nowhere does not exist"),
         (["verify", "nowhere", "--sample", "2"], 2, "--sample is 2.0"),
         (["run", "--data", "s3://bucket/data"], 2, "s3://bucket/data cannot hold an MLflow database"),
         (["run", "--scheduler", "tcp://10.0.0.5:8786"], 2, "set PREFECT_API_URL"),

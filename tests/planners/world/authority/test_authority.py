@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import fcl
@@ -262,3 +263,18 @@ def test_a_step_meets_a_long_thin_piece_only_where_shapely_says_so(seed: int) ->
         distances.append(shapely.Polygon(placed).distance(shapely.Polygon(piece)))
     assert met or min(distances) > 0.0
     assert not met or min(distances) < 0.02
+
+
+def test_lines_tell_real_metres_where_the_problem_lies() -> None:
+    plan = good_plan()
+    x, y = plan.states[len(plan.states) // 2, :2].tolist()
+    corners = [[x - 0.2, y - 0.2], [x + 0.2, y - 0.2], [x + 0.2, y + 0.2], [x - 0.2, y + 0.2]]
+    blocked = problem_with(obstacles_of([[np.array(corners)]]))
+    problem = replace(blocked, scale=8.0, offset=(1e6, 0.0), goal=(40.0, 40.0), start_motion=(1.0,))
+    told = " ".join(faults(problem, plan))
+    assert "speed of state 0 is 8 m/s off" in told
+    miss = 8.0 * float(np.hypot(*(plan.states[-1, :2] - 40.0)))
+    assert f"{miss:.3f} m" in told
+    near = re.search(r"near \(([-\d.]+), ([-\d.]+)\)", told)
+    assert near is not None
+    assert math.dist([float(each) for each in near.groups()], (1e6 + 8.0 * x, 8.0 * y)) < 8.0 * 2.0
