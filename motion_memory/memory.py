@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from planners.attempt import SUB_PLANS
+from planners.drive_answers import first_question
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
@@ -37,7 +38,6 @@ from planners.world.problem import (
     Arrival,
     Plan,
     Problem,
-    obstacles_of,
     start_state,
 )
 from planners.world.vehicles.vehicle import Vehicle
@@ -315,17 +315,9 @@ def _warmed(ready: Memory) -> Memory:
         ask(each)
         ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
         each.plan(narrow.draw(0, 0))
-    if len(library.drives.plans):  # the question that a stored drive answered, without obstacles
-        states = library.plans[int(library.drives.plans[0])].states
-        (x, y, heading), last = states[0, :3].tolist(), states[-1].tolist()
-        reach = np.abs(states[:, :2]).max() + 30.0
-        ready.plan(
-            Problem(
-                *("warm", "warm", (x, y, heading), (last[0], last[1]), 0.1, (-reach, -reach, reach, reach)),
-                *(obstacles_of([]), scale, tuple(states[0, 3:].tolist())),
-                arrival=Arrival(last[2], 0.05, 0.0, 0.0),
-            )
-        )
+    asked = first_question(library, scale)
+    if asked is not None:
+        ready.plan(asked)
     ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
     ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
     slot = to_canonical(narrow.draw(0, 0))[0]

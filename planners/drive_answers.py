@@ -14,6 +14,7 @@ import numpy as np
 
 from planners.memory.library.drives import TRIED, moved_drive, rank_drives
 from planners.memory.library.plan_library import PlanLibrary
+from planners.optimisation.descent import steps_to_goal
 from planners.optimisation.polish import polish_guesses
 from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.manoeuvres.manoeuvring import is_tight
@@ -22,7 +23,7 @@ from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.goal import HEADING, X, Y, goal_of
 from planners.world.jit import jit
-from planners.world.problem import Plan, start_state
+from planners.world.problem import Arrival, Plan, Problem, obstacles_of, start_state
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.view import View
 
@@ -44,6 +45,28 @@ class DriveAnswer(NamedTuple):
     entry: int = 0  # of its drive, as in the order of ``rank_drives``
     is_long: bool = False  # whether a search may well find a quicker one
     checks: int = 0  # collision checks that choosing took
+
+
+def first_question(library: PlanLibrary, scale: float) -> Problem | None:
+    """The question that the first stored drive answered, without obstacles: it compiles what drives need.
+
+    Args:
+        library: of drives.
+        scale: of the question.
+
+    Returns:
+        The question in the drive's own frame; None if there is no drive.
+    """
+    if not len(library.drives.plans):
+        return None
+    states = library.plans[int(library.drives.plans[0])].states
+    (x, y, heading, *motion), last = states[0].tolist(), states[-1].tolist()
+    reach = float(np.abs(states[:, :2]).max()) + 30.0
+    return Problem(
+        *("warm", "warm", (x, y, heading), (last[0], last[1]), 0.1, (-reach, -reach, reach, reach)),
+        *(obstacles_of([]), scale, tuple(motion)),
+        arrival=Arrival(last[2], 0.05, 0.0, 0.0),
+    )
 
 
 def _seconds_without_obstacles(start: Floats, goal: Floats, vehicle: Vehicle) -> float:
@@ -74,6 +97,8 @@ def drive_answer(
     """
     drives, problem = library.drives, view.problem
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
+    if steps_to_goal(start[np.newaxis], 0, goal, vehicle) == 0:
+        return DriveAnswer()  # nothing has to be driven
     order = np.zeros(TRIED, np.int32)
     if blindly is None:
         most = FAR_IF_TIGHT if is_tight(goal, vehicle, view.scene) else FAR

@@ -115,12 +115,14 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
     scale = scale_for_vehicle(fields.get("scale"), vehicle)
     states, controls = _rows(fields["states"], "states"), _rows(fields["controls"], "controls")
     plan, offset = None, (0.0, 0.0)
+    if not len(states) and fields["status"] == "solved":
+        raise ValueError("is of a solved problem, but has no states; write the plan again")
     if len(states):
         names = state_names(vehicle)
         if (states.shape, controls.shape) != ((len(states), len(names)), (len(states) - 1, 2)):
             raise ValueError(
                 f"has states {list(states.shape)} and controls {list(controls.shape)}; expected "
-                f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2]. was it recorded for another vehicle"
+                f"[T, {len(names)}] ({', '.join(names)}) and [T - 1, 2], as of another vehicle"
             )
         if number_of(fields["dt"], "dt") != vehicle.dt:
             raise ValueError(

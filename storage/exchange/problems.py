@@ -142,7 +142,7 @@ def _checked(
             yield with_id, str(error)
             continue
         if problem.id in seen:
-            yield where, f'id "{problem.id}" occurs twice; give every problem its own'
+            yield f"{where} (id {short(problem.id)})", "this id occurs twice; give every problem its own"
             continue
         seen.add(problem.id)
         for kind, hint in (hints_of(fields, problem, vehicle) if warns else {}).items():

@@ -146,10 +146,11 @@ def _with_problems(
         _LOG.warning("%s was made for problem %s; it is judged in problem %s", file, made_for, only.id)
         yield file, only
         return
-    for made_for, files in left.items():
-        with_id = (told for told in malformed if f"(id {short(made_for)})" in told)
-        why = next(with_id, f"{problems} has no problem with the id {made_for}")
-        yield from ((file, why) for file in files)
+    for made_for, files in by_id.items():
+        told = [each for each in malformed if f"(id {short(made_for)})" in each]
+        if told or made_for in left:
+            why = told[0] if told else f"{problems} has no problem with the id {made_for}"
+            yield from ((file, why) for file in files)
 
 
 def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> list[str]:

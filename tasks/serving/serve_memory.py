@@ -9,10 +9,12 @@ import math
 import os
 from pathlib import Path
 
+from planners.drive_answers import first_question
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.world.vehicles.vehicle import name_of
 from storage.archives.libraries import load_memory_or_library
+from storage.exchange.problems import fields_of
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.registry.memory_at import memory_at
 from tasks.servers.access import access, auth, auth_environment, check_address, hosts
@@ -74,7 +76,9 @@ def scoring_app(folder: str, vehicle: str) -> Guard:
 
 
 def sample_request(memory: Memory | PlanLibrary) -> bytes:
-    """A request that needs all kernels: it has the memory's scale, a rotated start and a notched obstacle."""
+    """A request that needs all kernels, in the memory's scale: a place, with a rotated start and a notched
+    obstacle, and the pose at rest of a stored drive.
+    """
     scale = memory.scales[0]
     notched = [[20.0, 40.0], [24.0, 40.0], [24.0, 44.0], [22.0, 41.0], [20.0, 44.0]]
     problem = {
@@ -85,4 +89,7 @@ def sample_request(memory: Memory | PlanLibrary) -> bytes:
         "obstacles": [[[scale * x, scale * y] for x, y in notched]],
         "scale": scale,
     }
-    return json.dumps({"dataframe_records": [{"problem": json.dumps(problem)}]}).encode()
+    library = memory if isinstance(memory, PlanLibrary) else memory.library
+    pose = first_question(library, scale)
+    asked = [problem] if pose is None else [problem, fields_of(pose, memory.vehicle)]
+    return json.dumps({"dataframe_records": [{"problem": json.dumps(each)} for each in asked]}).encode()

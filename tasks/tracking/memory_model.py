@@ -82,7 +82,8 @@ class MemoryModel(PythonModel):
         """The ``top_k`` best plans for each problem, best first.
 
         There are none if the encoder says that none fits. From a library, and for a problem that is not
-        canonical, there is at most one: a free plan made of parts of stored plans.
+        canonical, there is at most one, a free plan: a stored drive that was moved to a pose at rest, or
+        parts of stored plans.
 
         Raises MlflowException, with one line, if a problem is malformed or impossible.
         """

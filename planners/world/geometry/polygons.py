@@ -170,7 +170,7 @@ def _corners(polygon: Floats) -> Floats:
         raise PolygonError("has a coordinate that is not a finite number; correct it")
     if farthest > LARGEST_COORDINATE_M:
         raise PolygonError(
-            f"reaches farther than {LARGEST_COORDINATE_M:.0f} m from the origin; "
+            f"reaches farther from the origin than {LARGEST_COORDINATE_M:.0f} m times the scale; "
             "move the origin near the start"
         )
     rounded = polygon.astype(np.float32).astype(np.float64)

@@ -225,7 +225,7 @@ def test_what_is_no_object_is_no_problem(tmp_path: Path, value: str) -> None:
 
 def test_an_id_that_occurs_twice_is_refused(tmp_path: Path) -> None:
     (tmp_path / "p.jsonl").write_text(f"{json.dumps(GOOD)}\n{json.dumps(GOOD)}\n")
-    with pytest.raises(StorageError, match=r'line 2: id "w-17" occurs twice'):
+    with pytest.raises(StorageError, match=r"line 2 \(id 'w-17'\): this id occurs twice"):
         read_problems(tmp_path / "p.jsonl")
 
 
