@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from storage.errors import StorageError, sentence
 from storage.exchange.question_fields import QUESTION_FIELDS
@@ -26,6 +26,12 @@ FIELDS: Final = (
 BATCH_ROWS: Final = 256  # of a Parquet file, turned into Python objects at once
 SLICES_A_GROUP: Final = 16  # reading the last rows of a row group also decodes those before
 BUFFER_BYTES: Final = 1 << 20
+
+
+class Unreadable(NamedTuple):
+    """Stands for the object in a line that cannot be read; the other lines can."""
+
+    reason: str  # what is wrong with the line
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,8 @@ def check_problem_fields(fields: Sequence[object]) -> None:
 def raw_problems(path: Path) -> Iterator[tuple[int, Any]]:
     """The objects in the file at ``path`` and their numbers: the line, or counted from 1.
 
-    Raises StorageError if the file is missing or damaged; its message names the line.
+    A line of a text that cannot be read is an ``Unreadable``. Raises StorageError if the file is missing or
+    damaged.
     """
     match format_of(path):
         case ".json":
@@ -102,8 +109,13 @@ def raw_slice(piece: ProblemSlice) -> Iterator[tuple[int, Any]]:
 def _objects(path: Path, offset: int = 0, first: int = 1) -> Iterator[tuple[int, Any]]:
     """The objects in the lines of a text from a byte on, where line ``first`` begins."""
     for number, line in enumerate(_lines(path, offset), start=first):
-        if line.strip():
-            yield number, parse_json(line, f"{path} line {number}")
+        if not line.strip():
+            continue
+        try:
+            value = parse_json(line, "it")
+        except StorageError as error:
+            value = Unreadable(str(error).rstrip("."))
+        yield number, value
 
 
 def _lines(path: Path, offset: int = 0) -> Iterator[bytes]:

@@ -18,6 +18,7 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
 from storage.exchange.problem_files import (
     ProblemSlice,
+    Unreadable,
     check_problem_fields,
     format_of,
     raw_problems,
@@ -130,6 +131,9 @@ def _checked(
     first = None  # whether the first problem states its vehicle
     for number, fields in raw:
         where = f"{path} {'line' if path.suffix == '.jsonl' else 'problem'} {number}"
+        if isinstance(fields, Unreadable):
+            yield where, fields.reason
+            continue
         identity = fields.get("id") if isinstance(fields, Mapping) else None
         with_id = f"{where} (id {short(identity)})" if isinstance(identity, str) and identity else where
         try:

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from storage.errors import StorageError
-from storage.exchange.problem_files import SLICES_A_GROUP, raw_problems, raw_slice, slices_of
+from storage.exchange.problem_files import SLICES_A_GROUP, Unreadable, raw_problems, raw_slice, slices_of
 from tests.storage.samples import quick
 
 
@@ -69,13 +68,14 @@ def test_a_corrected_line_leaves_the_other_slices_as_they_were(tmp_path: Path) -
     assert [a.digest == b.digest for a, b in zip(before, after, strict=True)] == [True, False, True, True]
 
 
-def test_a_broken_line_is_named_by_its_number(tmp_path: Path) -> None:
+def test_of_a_broken_line_the_reason_is_told_and_the_others_are_read(tmp_path: Path) -> None:
     path = tmp_path / "p.jsonl"
     path.write_bytes(_with_blanks(_objects(7), {2}).encode() + b'{"id": \xff}\n{"id": \n')
-    slices = slices_of(path, 4)
-    assert len(list(raw_slice(slices[0]))) == 4
-    with pytest.raises(StorageError, match="line 10 is not text in UTF-8"):
-        list(raw_slice(slices[1]))
-    path.write_text(_with_blanks(_objects(7), {2}) + '{"id": \n')
-    with pytest.raises(StorageError, match="line 10 is not valid JSON"):
-        list(raw_slice(slices_of(path, 4)[1]))
+    *whole, (line, first), (last, second) = raw_problems(path)
+    assert [each for piece in slices_of(path, 4) for each in raw_slice(piece)] == list(raw_problems(path))
+    assert len(whole) == 7
+    assert (line, last) == (10, 11)
+    assert isinstance(first, Unreadable)
+    assert "UTF-8" in first.reason
+    assert isinstance(second, Unreadable)
+    assert "JSON" in second.reason

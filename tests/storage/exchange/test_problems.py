@@ -244,7 +244,7 @@ def test_a_file_that_is_missing_cut_off_or_of_another_kind_is_refused(tmp_path: 
         ("gone.parquet", "does not exist"),
         ("gone.csv", ".json, .jsonl, .parquet"),
         ("cut.json", "not valid JSON"),
-        ("cut.jsonl", "line 2 is not valid JSON"),
+        ("cut.jsonl", "line 2: it is not valid JSON"),
         ("deep.json", "not valid JSON"),
         ("picture.json", "not a text file"),
         ("cut.parquet", "not a complete Parquet file"),
