@@ -48,11 +48,11 @@ def test_the_command_line_comes_before_the_file(
 ) -> None:
     arguments = ["verify", "nowhere", "--sample", "0.5"]
     assert _called(tmp_path, "[verify]\nsample = 2.0", arguments, monkeypatch) == 1
-    assert "nowhere is not a data folder" in capsys.readouterr().err
+    assert "nowhere does not exist" in capsys.readouterr().err
 
 
 def test_a_command_without_a_table_is_as_ever(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert _called(tmp_path, "[run]\nseed = 3", ["verify", "nowhere"], monkeypatch) == 1
-    assert "nowhere is not a data folder" in capsys.readouterr().err
+    assert "nowhere does not exist" in capsys.readouterr().err

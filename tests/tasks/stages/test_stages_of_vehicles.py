@@ -10,7 +10,7 @@ import pytest
 
 from dashboards.verdicts.comparison import CONTROL, SAME, compare_runs
 from planners.world.classes.problem_classes import problem_class
-from planners.world.vehicles.vehicle import CAR_1_TRAILER
+from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.exchange.plans import read_plan
@@ -106,7 +106,7 @@ def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, 
         assert plan is not None
         assert plan.states.shape[1] == 6
         with pytest.raises(StorageError, match="for vehicle car-1-trailer, expected car"):
-            read_plan(path)
+            read_plan(path, CAR)
 
 
 def test_its_memory_is_refused_to_the_car(run: RunFolder, problems: Path, tmp_path: Path) -> None:
