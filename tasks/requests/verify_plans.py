@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -148,6 +149,8 @@ def _with_problems(
         return
     for made_for, files in by_id.items():
         told = [each for each in malformed if f"(id {short(made_for)})" in each]
+        if not sound and len(malformed) == 1:  # nothing else can be meant
+            told = malformed
         if told or made_for in left:
             why = told[0] if told else f"{problems} has no problem with the id {made_for}"
             yield from ((file, why) for file in files)
@@ -156,7 +159,8 @@ def _with_problems(
 def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> list[str]:
     """What is wrong with the ``plan`` of a ``record``; arguments as of ``_with_problems``."""
     if problem is None:
-        return faults(_by_itself(plan), plan, record.vehicle)
+        alone = replace(_by_itself(plan), scale=record.scale, offset=record.offset)
+        return faults(alone, plan, record.vehicle)
     if isinstance(problem, str):
         return [problem]
     if record.scale != problem.scale:
