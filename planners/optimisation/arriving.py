@@ -3,8 +3,7 @@
 A drive that arrives is pressed into fewer steps, as a guess whose steps do not quite lead from state to
 state: time is taken from where it is slow, such as at stops. One sweep closes the gaps (multiple shooting:
 Mastalli et al., Crocoddyl, 2020), further ones bring the end to the goal again. If that succeeds the drive is
-kept, and pressed again. Speed and turn rate at the end are exact:
-they bound those before.
+kept, and pressed again. Speed and turn rate at the end are exact: they bound those before.
 """
 
 from __future__ import annotations

@@ -5,17 +5,16 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from planners.world.arrays import Floats
 from planners.world.checked_problem import checked_problem
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from storage.errors import StorageError
+from storage.exchange.obstacle_fields import groups_of, points_of
 from storage.exchange.problem_files import (
     ProblemSlice,
     Unreadable,
@@ -31,7 +30,7 @@ from storage.exchange.question_fields import (
     question_fields,
     start_motion_of,
 )
-from storage.fields import number_of, short, text_of
+from storage.fields import short, text_of
 from storage.places.files import whole_file, write_json
 from storage.vehicles.recorded_vehicle import record_of
 from storage.vehicles.stated_vehicle import (
@@ -232,51 +231,16 @@ def problem_of(fields: object, default_id: str, vehicle: Vehicle = CAR) -> Probl
         goal.place,
         goal.radius,
         (bounds[0], bounds[1], bounds[2], bounds[3]),
-        _points(polygons),
+        points_of(polygons),
         np.cumsum([0] + [len(polygon) for polygon in polygons], dtype=np.int64),
         vehicle=vehicle,
         problem_id=_text(fields, "id", default_id),
         class_name=_text(fields, "class", UNKNOWN_CLASS),
         scale=scale,
-        groups=_groups(fields.get("groups"), len(polygons)),
+        groups=groups_of(fields.get("groups"), len(polygons)),
         start_motion=start_motion_of(fields, vehicle),
         arrival=goal.arrival,
     )
-
-
-def _groups(groups: object, polygons: int) -> list[int] | None:
-    if groups is None:
-        return None
-    if not isinstance(groups, list) or not all(type(size) is int and size > 0 for size in groups):
-        raise ValueError("groups must be numbers of polygons above 0; correct them or leave them out")
-    if sum(groups) != polygons:
-        raise ValueError(
-            f"groups add up to {sum(groups)} polygons, but obstacles has {polygons}; make them agree"
-        )
-    return groups
-
-
-def _points(polygons: list[Any]) -> Floats:
-    """The points ``[m, 2]`` of all polygons, one after another."""
-    if set(map(type, polygons)) <= {list}:
-        corners = list(chain.from_iterable(polygons))
-        if set(map(type, corners)) <= {list} and set(map(len, corners)) <= {2}:
-            numbers = list(chain.from_iterable(corners))
-            if set(map(type, numbers)) <= {float, int}:
-                try:
-                    return np.array(numbers, np.float64).reshape(-1, 2)
-                except OverflowError:  # an integer beyond all floats
-                    pass
-    return np.concatenate([_points_of(polygon, i) for i, polygon in enumerate(polygons, start=1)])
-
-
-def _points_of(points: object, number: int) -> Floats:
-    """The points ``[m, 2]`` of one polygon. Raises ValueError, which says what is wrong with them."""
-    if not isinstance(points, list) or not all(
-        isinstance(point, list) and len(point) == 2 for point in points
-    ):
-        raise ValueError(f"obstacle {number} must be a list of points [x, y] in metres; correct it")
-    return np.array([[number_of(x, "a point"), number_of(y, "a point")] for x, y in points]).reshape(-1, 2)
 
 
 def _text(fields: Mapping[str, Any], name: str, default: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from storage.archives.libraries import HEADERS
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, is_remote, local_place
-from tasks.requests.verify_plans import plan_files_in, verify_plan_files, verify_stored_plans
+from tasks.requests.verify_plans import verify_plan_files, verify_stored_plans
 from tasks.servers.prefect_server import set_environment
 from tasks.settings.errors import RunError, UsageError
 
@@ -45,10 +45,10 @@ def verify(path: Path, problems: Path | None, sample: float, workers: int) -> Co
         return verify_stored_plans(path)
     if not is_remote(path) and not path.exists():
         raise RunError(f"{path} does not exist; check the name.")
-    files = plan_files_in(path)
-    if not files:
+    checked = verify_plan_files(path, problems)
+    if not checked:
         raise RunError(
             f"{path} is not a data folder (it has no {MARK}), not a memory or library, and not a plan's file "
             "or a folder of such files."
         )
-    return verify_plan_files(files, problems)
+    return checked

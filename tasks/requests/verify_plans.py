@@ -53,58 +53,48 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
     return Counter({_BY_ITSELF: len(stored.plans)})
 
 
-def plan_files_in(path: Path) -> list[Path]:
-    """The files of plans at ``path``, a file or a folder with such files at any depth; sorted.
-
-    Damaged JSON files in a folder count: they may have been plans.
-    """
-    if not path.is_dir():
-        return [path] if path.suffix == ".json" and path.is_file() else []
-    files = sorted(path.rglob("*.json"))
-    others = [file for file in files if _holds_something_else(file)]
-    if 0 < len(others) < len(files):
-        _LOG.warning("Left alone, since no plan is in them: %s", short([str(file) for file in others]))
-    return [file for file in files if file not in others]
-
-
-def _holds_something_else(file: Path) -> bool:
-    try:
-        fields = read_json(file)
-    except StorageError:
-        return False
-    return not (isinstance(fields, dict) and "states" in fields)
-
-
-def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[str]:
-    """Judge each plan of files in its problem, or by itself.
+def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
+    """Judge each plan of a file, or of the files in a folder, in its problem or by itself.
 
     Args:
-        files: of plans, at least one.
+        path: a plan's file, or a folder with such files at any depth. Damaged JSON files in a folder are
+            faults, since they may have been plans; files that hold something else are left alone.
         problems: a file with the problem of each plan, found by its id; a single problem may have any id, if
             there is a single plan. None judges each plan by itself: no obstacles, no goal.
 
     Returns:
-        how many plans were judged, and how many files hold none.
+        how many plans were judged, and how many files hold none; nothing if there are no such files.
 
     Raises:
-        RunError: a plan is faulty, its problem is not there, or one of several files is malformed; the
-            faults are logged.
-        StorageError: the only file, or that of the problems, is missing or malformed.
+        RunError: a plan is faulty, its problem is not there, or a file in the folder is malformed; the faults
+            are logged.
+        StorageError: the file of the plan or of the problems is missing or malformed.
     """
+    is_folder = path.is_dir()
     wrong: list[str] = []
+    others: list[str] = []
     of_vehicles: defaultdict[Vehicle, dict[str, list[Path]]] = defaultdict(dict)
+    files = sorted(path.rglob("*.json")) if is_folder else [path] if path.suffix == ".json" else []
     for file in files:
         try:
             record = read_plan(file)
         except StorageError as error:
-            if len(files) == 1:
+            if not is_folder:
                 raise
-            wrong.append(str(error))
+            if _holds_something_else(file):
+                others.append(str(file))
+            else:
+                wrong.append(str(error))
         else:
             of_vehicles[record.vehicle].setdefault(record.problem_id, []).append(file)
+    count = len(files) - len(others)
+    if count == 0:
+        return Counter()
+    if others:
+        _LOG.warning("Left alone, since no plan is in them: %s", short(others))
     counts: Counter[str] = Counter()
     done = 0
-    with progress("verify", len(files), end_is_told=False) as show:
+    with progress("verify", count, end_is_told=False) as show:
         for vehicle, by_id in of_vehicles.items():
             for file, problem in _with_problems(by_id, problems, vehicle):
                 record = read_plan(file)
@@ -115,10 +105,18 @@ def verify_plan_files(files: Sequence[Path], problems: Path | None) -> Counter[s
                     wrong += [f"{file}: {fault}" for fault in _faults(record, record.plan, problem)]
                 done += 1
                 show(done)
-    _refuse(wrong, f" in {len(files)} files of plans")
+    _refuse(wrong, f" in {count} files of plans")
     if problems is None:
         _LOG.info("Obstacles and goals were not looked at: name the file of the problems with --problems.")
     return counts
+
+
+def _holds_something_else(file: Path) -> bool:
+    try:
+        fields = read_json(file)
+    except StorageError:
+        return False
+    return not (isinstance(fields, dict) and "states" in fields)
 
 
 def _with_problems(

@@ -14,7 +14,6 @@ from planners.explanation import drive_found
 from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory_answers import MemoryAnswer
-from planners.optimisation.interior.quickest import PROMISING
 from planners.ranked_plans import ranked_plans
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
@@ -75,7 +74,7 @@ def test_drives_are_recalled_without_a_search_in_any_frame(slots: PlanLibrary) -
     assert recalled >= 8
 
 
-def test_if_a_drive_is_long_the_answer_is_hardly_longer_than_without_a_memory(
+def test_if_a_drive_is_long_the_answer_is_never_longer_than_without_a_memory(
     slots: PlanLibrary, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(drive_answers, "LONG", 0.0)
@@ -87,7 +86,7 @@ def test_if_a_drive_is_long_the_answer_is_hardly_longer_than_without_a_memory(
         both = solve(problem, "lattice", "join", 1, slots, workspace=WORKSPACE)
         assert alone.duration_s is not None
         assert both.duration_s is not None
-        assert both.recall != DRIVES or both.duration_s <= alone.duration_s / PROMISING
+        assert both.recall != DRIVES or both.duration_s <= alone.duration_s
         moved += both.recall == DRIVES
     assert moved >= 6
 
