@@ -11,7 +11,8 @@ from __future__ import annotations
 from importlib.metadata import version
 
 from motion_memory.files import read_problems, read_worlds, solve_many
-from motion_memory.memory import Answer, Memory, load
+from motion_memory.loading import load
+from motion_memory.memory import Answer, Memory
 from planners.ranked_plans import RankedPlan
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle

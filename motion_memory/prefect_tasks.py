@@ -8,7 +8,8 @@ from typing import Any
 
 from prefect import task
 
-from motion_memory.memory import Answer, Memory, load
+from motion_memory.loading import load
+from motion_memory.memory import Answer, Memory
 from planners.world.problem import Problem
 
 

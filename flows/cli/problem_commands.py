@@ -74,7 +74,8 @@ def plan(
         learn: Data folder that remembers the plan if it is new, from rest, and to a place 50√2 m ahead.
         options: How the problem is solved.
     """
-    from tasks.requests.assistant import Assistant, plan_one
+    from tasks.requests.assistant import Assistant
+    from tasks.requests.plan_one import plan_one
     from tasks.settings.errors import RunError
 
     assistant = Assistant(options.settings(assist, improve_seconds, problem))

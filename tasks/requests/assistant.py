@@ -1,16 +1,15 @@
-"""Solve the user's own problems: ``Assistant`` plans, ``plan_one`` is the command ``plan``."""
+"""Solve the user's own problems with one vehicle, planner and assist."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
-from planners.attempt import TIMED_PARTS, Attempt
-from planners.explanation import MovedDrive, drive_found, parts_found, recollections
+from planners.attempt import Attempt
+from planners.explanation import MovedDrive, drive_found
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
@@ -24,16 +23,13 @@ from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
-from storage.exchange.problems import read_problem
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
-from tasks.attempts.timing import OtherWork, no_garbage_collection
-from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.requests.plan_answers import meaning_of, no_plan, plan_answer, write_answer_file
-from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
+from tasks.settings.checks import check_known, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -55,16 +51,6 @@ class AssistantSettings(NamedTuple):
     vehicle: str = DEFAULT_VEHICLE
     improve_seconds: float = 0.0  # how long to improve a plan after it is found
     recall: str | None = None  # None takes the strategy that suits the memory
-
-
-class PlannedOne(NamedTuple):
-    """The result of planning for one problem."""
-
-    attempt: Attempt
-    plan: Plan | None  # in the frame of the problem
-    answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
-    failure: str | None  # why there is no plan, in one line
-    written: Path | None  # the file of the plan
 
 
 class Assistant:
@@ -205,104 +191,20 @@ class Assistant:
         memory, canonical = self.memory_of(problem.class_name), to_canonical(problem)[0]
         return None if memory is None else drive_found(canonical, attempt, memory, self.vehicle)
 
-
-def plan_one(
-    assistant: Assistant,
-    file: Path,
-    out: Path | None,
-    drawing: Path | None,
-    explained: bool = False,
-    learn: Path | None = None,
-    pick: str | None = None,
-) -> PlannedOne:
-    """Plan for one problem of a file.
-
-    Args:
-        assistant: solves the problem.
-        file: the file of the problem.
-        out: where to write the plan, or None. Why there is none is written too, but over no older file.
-        drawing: where to draw it, or None.
-        explained: whether to log and draw the recalled plans, where they collide and how they were used.
-        learn: the data folder to which the problem and its plan are added as an experience, or None.
-        pick: the id or the number of the problem; None takes the only one.
-
-    Returns:
-        the result; finding no plan is a result too.
-
-    Raises:
-        UsageError: the name of an output has a wrong ending, or an output would be written over an input.
-        StorageError: the problem is malformed, or the file has no such problem.
-    """
-    check_plan_outputs([file, *assistant.files], out, drawing)
-    problem = read_problem(file, assistant.vehicle, pick)
-    with no_garbage_collection():
-        assistant.warm_up(problem)
-        attempt, plan = assistant(problem)
-    record = plan_record(assistant, problem, attempt, plan)
-    written = write_answer_file(out, record)
-    if learn is not None:
-        remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
-    recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
-    drive = assistant.moved_drive(problem, attempt) if explained else None
-    summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
-    if drawing is not None:
-        from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
-        from dashboards.figures.style import save_picture
-
-        driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
-        caption = f"{driven}{attempt.source or attempt.status}"
-        moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
-        figure = picture(
-            *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
+    def record(self, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
+        """The record of an attempt for a plan file; the plan is in the frame of the problem."""
+        return PlanRecord(
+            problem.id,
+            attempt.status,
+            attempt.source or None,
+            attempt.planner,
+            attempt.assist,
+            attempt.planning_seconds,
+            plan,
+            self.vehicle,
+            problem.scale,
+            problem.offset,
         )
-        save_picture(figure, drawing)
-    if explained:
-        _explain(assistant, problem, attempt, recalled, drive)
-    failure = None
-    if plan is None:
-        why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
-        failure = no_plan(problem.id or str(file), why, out, written)
-    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
-    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
-    return PlannedOne(attempt, plan, answer, failure, written)
-
-
-def _explain(
-    assistant: Assistant,
-    problem: Problem,
-    attempt: Attempt,
-    recalled: Sequence[Plan],
-    drive: MovedDrive | None,
-) -> None:
-    # late: tables cost a tenth of a second
-    from tasks.requests.explain import log_explanation, log_without_memory
-
-    canonical, _ = to_canonical(problem)
-    memory = assistant.memory_of(problem.class_name)
-    ranked = memory if isinstance(memory, Memory) and recalled else None
-    recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
-    parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
-    listed = list(zip(recollected, recalled, strict=True))
-    log_explanation(attempt, memory, listed, problem.scale, parts, drive and drive.answer)
-    if memory is not None:
-        with no_garbage_collection():
-            log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))
-
-
-def plan_record(assistant: Assistant, problem: Problem, attempt: Attempt, plan: Plan | None) -> PlanRecord:
-    """The record of an attempt for a plan file; the plan is in the frame of the problem."""
-    return PlanRecord(
-        problem.id,
-        attempt.status,
-        attempt.source or None,
-        attempt.planner,
-        attempt.assist,
-        attempt.planning_seconds,
-        plan,
-        assistant.vehicle,
-        problem.scale,
-        problem.offset,
-    )
 
 
 def _local_address(memory: str) -> str:

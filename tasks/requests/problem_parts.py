@@ -23,7 +23,7 @@ from tasks.attempts.timing import no_garbage_collection
 from tasks.fan_out.keys import key_of
 from tasks.fan_out.stage import Job
 from tasks.inputs.gained_on_the_job import Solved, remember
-from tasks.requests.assistant import Assistant, AssistantSettings, plan_record
+from tasks.requests.assistant import Assistant, AssistantSettings
 from tasks.requests.part_folder import parts_folder
 
 PART_PROBLEMS: Final = 500  # at most: a second of work, or minutes where problems are hard
@@ -167,7 +167,7 @@ def solve_part_reporting(chunk: FilePart, on_problem: Callable[[], object]) -> P
             if request.plans is not None:
                 write_plan(
                     _plan_path(chunk, request.plans, problem.id, chunk.problem_slice.first + number),
-                    plan_record(assistant, problem, attempt, plan),
+                    assistant.record(problem, attempt, plan),
                 )
             memory = assistant.memory_of(problem.class_name)
             rows.append(attempt_row(attempt, memory.class_name if memory else None, None, assistant.vehicle))

@@ -19,7 +19,8 @@ from storage.places.run_folder import RunFolder
 from storage.tables.attempts import read_attempts
 from tasks.fan_out.chunk import run_folder
 from tasks.reports.measure_in_turn import MeasuredRun, measure_in_turn
-from tasks.requests.assistant import Assistant, AssistantSettings, plan_one
+from tasks.requests.assistant import Assistant, AssistantSettings
+from tasks.requests.plan_one import plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.presets import for_preset

@@ -281,7 +281,8 @@ def test_a_bad_problem_gets_one_clear_line(at_home: dict[str, str], text: str, r
 
 def test_plan_takes_a_memory_from_mlflow(at_home: dict[str, str], tmp_path: Path) -> None:
     from storage.tables.attempts import read_attempts
-    from tasks.requests.assistant import Assistant, AssistantSettings, plan_one
+    from tasks.requests.assistant import Assistant, AssistantSettings
+    from tasks.requests.plan_one import plan_one
     from tasks.requests.solve_many import solve_many
 
     place = tmp_path / "p.json"

@@ -1,0 +1,119 @@
+"""Load a memory to plan with: by default all is read, checked and compiled before the first question."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from motion_memory.memory import Memory
+from planners.attempt import SUB_PLANS
+from planners.drive_answers import first_question
+from planners.memory.library.plan_library import PlanLibrary
+from planners.memory.recall import RECALLS, default_recall
+from planners.optimisation.polish import driven_near
+from planners.search.registry import PLANNERS
+from planners.solve import ASSISTS
+from planners.world.alignment import to_canonical
+from planners.world.arrays import Floats
+from planners.world.classes.families import families_of, family
+from planners.world.geometry.collision import scene_of
+from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival, start_state
+from planners.world.workspace import Workspace
+from storage.archives.libraries import load_memory_or_library, vehicle_of
+from storage.vehicles.vehicle_files import said_vehicle
+from tasks.attempts.compile_assists import compile_assists
+from tasks.registry.memory_at import memory_at
+from tasks.settings.checks import check_known, checked_vehicle
+from tasks.settings.errors import RunError, UsageError
+
+
+def load(
+    memory: str | Path,
+    *,
+    vehicle: str | None = None,
+    planner: str = "lattice",
+    assist: str = "repair",
+    top_k: int = 5,
+    recall: str | None = None,
+    seed: int = 1,
+    judged: bool = True,
+    warm: bool = True,
+) -> Memory:
+    """Read and check a memory, load the compiled kernels and plan once, so that the first call is quick.
+
+    Args:
+        memory: the folder of a memory or a library, the folder of a run with one memory, or the address of a
+            model in MLflow, such as ``models:/motion-memory-trap@champion``.
+        vehicle: its name, or the path of its .yaml file; by default the one that the memory is for.
+        planner: the planner that searches if no recalled plan can be used: rrt, gust, follow or lattice.
+        assist: how the memory helps: closed, open or repair.
+        top_k: how many plans to recall, at least 1.
+        recall: how they are recalled; the default depends on the size of the memory.
+        seed: everything random follows from it.
+        judged: whether each plan is judged before it is returned, which takes a few milliseconds.
+        warm: False skips planning once. Each call then compiles only what it needs and what no call needed
+            before, which is quicker if only a few problems follow after an installation.
+
+    Raises:
+        UsageError: A name is unknown, or ``top_k`` is below 1.
+        StorageError: The memory is missing, damaged, or made for another vehicle.
+        RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
+            missing.
+    """
+    named = None if vehicle is None else said_vehicle(checked_vehicle(vehicle))
+    check_known("planner", [planner], PLANNERS)
+    check_known("assist", [assist], ASSISTS)
+    check_known("recall", [] if recall is None else [recall], RECALLS)
+    if top_k < 1:
+        raise UsageError(f"top_k is {top_k}: give 1 or more.")
+    with memory_at(str(memory)) as folder:
+        # mapped files stay readable after they are deleted
+        archive = load_memory_or_library(folder, named or vehicle_of(folder))
+    if isinstance(archive, PlanLibrary):
+        ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
+        return _warmed(ready) if warm else ready
+    strategy = recall or default_recall(archive)
+    if warm:
+        compile_assists(archive.vehicle, planner, [strategy])
+    try:
+        archive.forward  # noqa: B018  made when it is first used
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
+            "pip install 'motion-memory[pipeline]'."
+        ) from None
+    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged)
+    return _warmed(ready) if warm else ready
+
+
+def _warmed(ready: Memory) -> Memory:
+    """Plan to places and poses to compile and index everything; return ``ready``."""
+    scale = ready.stored.scales[0]
+    start, goal = (0.0, 0.0, 0.5 * math.pi), (0.0, scale * CANONICAL_DISTANCE)
+    bounds = (-30.0 * scale, -10.0 * scale, 30.0 * scale, 90.0 * scale)
+    aside = scale * np.array([[9.0, 40.0], [10.0, 40.0], [10.0, 41.0]])
+
+    def ask(planner: Memory, obstacle: Floats = aside, arrival: Arrival | None = None) -> None:
+        around = start, goal, obstacle, np.array([0, 3]), scale * GOAL_RADIUS, bounds, scale
+        planner.plan_arrays(*around, arrival=arrival)
+
+    library = ready.stored if isinstance(ready.stored, PlanLibrary) else ready.stored.library
+
+    alone = replace(ready, assist="none")
+    narrow = family(families_of(ready.vehicle)[0], "easy", ready.vehicle)
+    for each in (ready, alone):  # recall, then search
+        ask(each)
+        ask(each, arrival=Arrival(0.5 * math.pi, 0.1))
+        each.plan(narrow.draw(0, 0))
+    asked = first_question(library, scale)
+    if asked is not None:
+        ready.plan(asked)
+    ask(alone, scale * np.array([[-31.0, 60.0], [31.0, 60.0], [31.0, 61.0]]))  # no way leads past it
+    ask(replace(alone, planner="rrt"))  # which goes on where others find nothing
+    slot = to_canonical(narrow.draw(0, 0))[0]
+    stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
+    driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # pressing, which few plans need
+    return ready

@@ -1,0 +1,113 @@
+"""Plan for one problem of a file: the command ``plan``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from planners.attempt import TIMED_PARTS, Attempt
+from planners.explanation import MovedDrive, parts_found, recollections
+from planners.memory.memory import Memory
+from planners.world.alignment import from_canonical, to_canonical
+from planners.world.problem import Plan, Problem
+from storage.exchange.problems import read_problem
+from tasks.attempts.timing import no_garbage_collection
+from tasks.inputs.gained_on_the_job import Solved, remember
+from tasks.requests.assistant import Assistant
+from tasks.requests.plan_answers import meaning_of, no_plan, plan_answer, write_answer_file
+from tasks.settings.checks import check_plan_outputs
+from tasks.settings.run_settings import UNASSISTED
+
+
+class PlannedOne(NamedTuple):
+    """The result of planning for one problem."""
+
+    attempt: Attempt
+    plan: Plan | None  # in the frame of the problem
+    answer: dict[str, Any]  # for programs: of ``plan_answer``, and the parts of the planning time
+    failure: str | None  # why there is no plan, in one line
+    written: Path | None  # the file of the plan
+
+
+def plan_one(
+    assistant: Assistant,
+    file: Path,
+    out: Path | None,
+    drawing: Path | None,
+    explained: bool = False,
+    learn: Path | None = None,
+    pick: str | None = None,
+) -> PlannedOne:
+    """Plan for one problem of a file.
+
+    Args:
+        assistant: solves the problem.
+        file: the file of the problem.
+        out: where to write the plan, or None. Why there is none is written too, but over no older file.
+        drawing: where to draw it, or None.
+        explained: whether to log and draw the recalled plans, where they collide and how they were used.
+        learn: the data folder to which the problem and its plan are added as an experience, or None.
+        pick: the id or the number of the problem; None takes the only one.
+
+    Returns:
+        the result; finding no plan is a result too.
+
+    Raises:
+        UsageError: the name of an output has a wrong ending, or an output would be written over an input.
+        StorageError: the problem is malformed, or the file has no such problem.
+    """
+    check_plan_outputs([file, *assistant.files], out, drawing)
+    problem = read_problem(file, assistant.vehicle, pick)
+    with no_garbage_collection():
+        assistant.warm_up(problem)
+        attempt, plan = assistant(problem)
+    record = assistant.record(problem, attempt, plan)
+    written = write_answer_file(out, record)
+    if learn is not None:
+        remember(learn, [Solved(to_canonical(problem)[0], attempt)], assistant.vehicle)
+    recalled = assistant.recalled(problem, attempt) if drawing is not None or explained else []
+    drive = assistant.moved_drive(problem, attempt) if explained else None
+    summary = f"{attempt.source or attempt.status}, {1000 * attempt.planning_seconds:.2f} ms"
+    if drawing is not None:
+        from dashboards.figures.pictures import picture  # late: Matplotlib costs a third of a second
+        from dashboards.figures.style import save_picture
+
+        driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
+        caption = f"{driven}{attempt.source or attempt.status}"
+        moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
+        figure = picture(
+            *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved
+        )
+        save_picture(figure, drawing)
+    if explained:
+        _explain(assistant, problem, attempt, recalled, drive)
+    failure = None
+    if plan is None:
+        why = f"{summary}: {meaning_of(problem, attempt.status, assistant.vehicle)}"
+        failure = no_plan(problem.id or str(file), why, out, written)
+    parts = {"parts_seconds": {part: getattr(attempt, f"{part}_seconds") for part in TIMED_PARTS}}
+    answer = plan_answer(record, None if plan is None else out, attempt.verified) | parts
+    return PlannedOne(attempt, plan, answer, failure, written)
+
+
+def _explain(
+    assistant: Assistant,
+    problem: Problem,
+    attempt: Attempt,
+    recalled: Sequence[Plan],
+    drive: MovedDrive | None,
+) -> None:
+    # late: tables cost a tenth of a second
+    from tasks.requests.explain import log_explanation, log_without_memory
+
+    canonical, _ = to_canonical(problem)
+    memory = assistant.memory_of(problem.class_name)
+    ranked = memory if isinstance(memory, Memory) and recalled else None
+    recollected = recollections(canonical, attempt, ranked, assistant.vehicle) if ranked else []
+    parts = None if memory is None else parts_found(canonical, attempt, memory, assistant.vehicle)
+    listed = list(zip(recollected, recalled, strict=True))
+    log_explanation(attempt, memory, listed, problem.scale, parts, drive and drive.answer)
+    if memory is not None:
+        with no_garbage_collection():
+            log_without_memory(attempt, assistant.improved_attempt(canonical, UNASSISTED.name))
