@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from planners.optimisation.polish import most_iterations, polish, polish_quickest
 from planners.search.guides.guidance import guidance
-from planners.search.manoeuvres.manoeuvring import is_tight, meets, suits
+from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND, is_tight, meets, suits
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS
@@ -165,7 +165,8 @@ def search_and_polish(
         query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
-        below_s: only a plan that takes less time is wanted: what seems to take longer is not polished on.
+        below_s: only a plan that takes less time is wanted: the search goes on for as long as that is worth,
+            and what seems to take longer is not polished on.
 
     Returns:
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
@@ -179,6 +180,9 @@ def search_and_polish(
         query.is_tight or meets(start_state(query.problem, vehicle), vehicle)
     )
     query = replace(query, others=varies)
+    if math.isfinite(below_s):
+        worth = int(PER_SQUARE_SECOND * below_s * below_s)
+        query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))
     found = [] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
     if given is None:
         found.append(PLANNERS[planner](query))

@@ -44,7 +44,7 @@ MEETING: Final = 3  # times as many with trailers: trees meet where they are wid
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
 TIGHT: Final = 0.6  # a goal with less room around it is tight
-PER_SQUARE_SECOND: Final = 10  # of the quickest drive found: expansions that looking for others is worth
+PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 

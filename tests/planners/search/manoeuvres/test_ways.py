@@ -210,3 +210,16 @@ def test_one_way_of_each_kind_is_kept_and_the_slowest_gives_way() -> None:
         best[kind] = min(seconds, best.get(kind, seconds))
     assert len(set(ways.kinds)) == KEPT
     assert sorted(ways.seconds) == sorted(best.values())[:KEPT]
+
+
+def test_beside_a_drive_a_search_goes_on_for_as_long_as_a_quicker_one_is_worth() -> None:
+    least = 0
+    for number in range(4):
+        query = asked(to_canonical(family("lot", "hard").draw(6, number))[0])
+        alone, _ = search_and_polish("lattice", query, 0)
+        assert alone.plan is not None
+        for below_s in (2.0, 6.0, alone.plan.duration_s):
+            found, _ = search_and_polish("lattice", query, 0, below_s=below_s)
+            assert found.expansions <= manoeuvring.PER_SQUARE_SECOND * below_s**2 + manoeuvring.SLICE
+            least += found.expansions < alone.expansions
+    assert least > 6
