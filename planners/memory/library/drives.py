@@ -37,6 +37,7 @@ class Drives(NamedTuple):
     controls: Floats  # [T, 2] from each state to the next; that of a drive's last state counts for nothing
     bent: Floats  # [T] how much a state moves with the start: 1 at the start, 0 at the end
     starts: Indices  # [K + 1] drive k owns states[starts[k] : starts[k + 1]]
+    firsts: Floats  # [K, S] the first state of each, side by side: all of them are looked at
     plans: Indices  # [K] which plan of the library it is
 
 
@@ -55,32 +56,42 @@ def drives_of(plans: StoredPlans) -> Drives:
         bent.append(1.0 - driven * driven * (3.0 - 2.0 * driven))
         starts.append(starts[-1] + len(plan.states))
         numbers.append(number)
-    size = plans.states.shape[1]
+    together = np.concatenate([np.empty((0, plans.states.shape[1])), *states])
     return Drives(
-        np.concatenate([np.empty((0, size)), *states]),
+        together,
         np.concatenate([np.empty((0, 2)), *controls]),
         np.concatenate([np.empty(0), *bent]),
         np.array(starts, np.int64),
+        np.ascontiguousarray(together[starts[:-1]]),
         np.array(numbers, np.int64),
     )
 
 
 @inlined
-def _begin_off(drives: Drives, drive: int, side: float, start: Floats, goal: Floats, off: Floats) -> float:
-    """Fill in by how much ``start [S]`` is ``off [S]`` where a drive begins, and return that in all.
-
-    ``side`` is -1 if the drive is mirrored. Places are in the frame of the goal.
-    """
-    first = drives.states[drives.starts[drive]]
+def _see(start: Floats, goal: Floats, seen: Floats) -> None:
+    """Fill in a start ``[S]`` as ``seen [S]`` from the goal."""
     sin, cos = sincos(goal[HEADING])
     dx = start[0] - goal[X]
     dy = start[1] - goal[Y]
-    off[0] = cos * dx + sin * dy - first[0]
-    off[1] = cos * dy - sin * dx - side * first[1]
-    off[2] = wrapped(start[2] - goal[HEADING] - side * first[2])
+    seen[0] = cos * dx + sin * dy
+    seen[1] = cos * dy - sin * dx
+    seen[2] = start[2] - goal[HEADING]
+    for k in range(3, start.shape[0]):
+        seen[k] = start[k]
+
+
+@inlined
+def _begin_off(first: Floats, side: float, seen: Floats, off: Floats) -> float:
+    """Fill in by how much a start, as it is ``seen [S]``, is ``off [S]`` from a drive's first state.
+
+    ``side`` is -1 if the drive is mirrored. Returns how much heading and hitches are off in all, in radians.
+    """
+    off[0] = seen[0] - first[0]
+    off[1] = seen[1] - side * first[1]
+    off[2] = wrapped(seen[2] - side * first[2])
     far = float(abs(off[2]))
     for k in range(5, first.shape[0]):
-        off[k] = start[k] - side * first[k]
+        off[k] = seen[k] - side * first[k]
         far += abs(off[k])
     return far
 
@@ -123,14 +134,20 @@ def rank_drives(
     size = start.shape[0]
     near = np.empty(NEAR, np.int64)
     far = np.full(NEAR, most)
+    seen = np.zeros(size)
+    _see(start, goal, seen)
     off = np.zeros(size)
     moved = np.zeros((1, size))
     body = vehicle.front + vehicle.rear
     count = checks = quickest = 0
     for drive in range(drives.plans.shape[0]):
+        first = drives.firsts[drive]
         for mirrored in range(2):
             side = -1.0 if mirrored else 1.0
-            away = _begin_off(drives, drive, side, start, goal, off) + length(off[0], off[1]) / body
+            apart = length(seen[0] - first[0], seen[1] - side * first[1]) / body
+            if apart >= far[NEAR - 1]:
+                continue
+            away = _begin_off(first, side, seen, off) + apart
             if away >= far[NEAR - 1]:
                 continue
             at = min(count, NEAR - 1)
@@ -145,16 +162,16 @@ def rank_drives(
     for n in range(count):
         drive = max(near[n], -1 - near[n])
         side = 1.0 if near[n] >= 0 else -1.0
-        _begin_off(drives, drive, side, start, goal, off)
+        _begin_off(drives.firsts[drive], side, seen, off)
         blocked = 0
-        first = drives.starts[drive]
+        begin = drives.starts[drive]
         last = drives.starts[drive + 1]
-        for i in range(first, last, LOOK):
+        for i in range(begin, last, LOOK):
             _move(drives, i, side, goal, off, moved, 0)
             checks += 1
             if not state_is_free(load(moved, 0, vehicle), vehicle, scene):
                 blocked += LOOK
-        steps = last - 1 - first
+        steps = last - 1 - begin
         if n == 0 or (n < NEAREST and steps < quickest):
             quickest = steps
         promises[n] = (steps + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
@@ -170,8 +187,10 @@ def rank_drives(
 @jit
 def _moved(drives: Drives, drive: int, side: float, start: Floats, goal: Floats, states: Floats) -> None:
     """Fill in the ``states [T, S]`` of a drive that is moved to a start and a goal."""
+    seen = np.zeros(start.shape[0])
+    _see(start, goal, seen)
     off = np.zeros(start.shape[0])
-    _begin_off(drives, drive, side, start, goal, off)
+    _begin_off(drives.firsts[drive], side, seen, off)
     for i in range(states.shape[0]):
         _move(drives, drives.starts[drive] + i, side, goal, off, states, i)
     turns = start[2] - states[0, 2]  # whole ones
