@@ -41,11 +41,13 @@ class Drives(NamedTuple):
     plans: Indices  # [K] which plan of the library it is
 
 
-def drives_of(plans: StoredPlans) -> Drives:
-    """Take the drives of a library's plans that end at rest, and lead anywhere."""
-    states, controls, bent, starts, numbers = [], [], [], [0], []
+def drives_of(plans: StoredPlans, numbers: Indices | None = None) -> Drives:
+    """Take the plans of a library that end at rest, and lead anywhere: all, or those of some ``numbers``."""
+    states, controls, bent, starts, taken = [], [], [], [0], []
+    if numbers is None:
+        numbers = np.arange(len(plans))
     stand = np.abs(plans.states[plans.starts[1:] - 1, 3]) <= STANDS
-    for number in np.flatnonzero(stand).tolist():
+    for number in numbers[stand[numbers]].tolist():
         plan = plans[number]
         metres = np.hypot(*np.diff(plan.states[:, :2], axis=0).T)
         if metres.sum() == 0.0:
@@ -55,7 +57,7 @@ def drives_of(plans: StoredPlans) -> Drives:
         controls.append(np.vstack((plan.controls, np.zeros((1, 2)))))
         bent.append(1.0 - driven * driven * (3.0 - 2.0 * driven))
         starts.append(starts[-1] + len(plan.states))
-        numbers.append(number)
+        taken.append(number)
     together = np.concatenate([np.empty((0, plans.states.shape[1])), *states])
     return Drives(
         together,
@@ -63,7 +65,7 @@ def drives_of(plans: StoredPlans) -> Drives:
         np.concatenate([np.empty(0), *bent]),
         np.array(starts, np.int64),
         np.ascontiguousarray(together[starts[:-1]]),
-        np.array(numbers, np.int64),
+        np.array(taken, np.int64),
     )
 
 

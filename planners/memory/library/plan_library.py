@@ -6,12 +6,15 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from planners.memory.library.drives import Drives, drives_of
 from planners.memory.library.stretches import Stretches, stretches_of
 from planners.memory.library.sub_plans import SubPlans, index_of
 from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.search.manoeuvres.endings import endings_of
 from planners.search.query import Endings
+from planners.world.arrays import Indices
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
@@ -53,8 +56,20 @@ class PlanLibrary:
 
     @functools.cached_property
     def drives(self) -> Drives:
-        """The plans that end at rest, whole, and ready to be moved to other questions."""
-        return drives_of(self.plans)
+        """The quickest plans of their questions that end at rest, whole, and ready to be moved to others.
+
+        A slower one begins where the quickest does, and would only keep other ways out of the choice.
+        """
+        return drives_of(self.plans, self._quickest())
+
+    def _quickest(self) -> Indices:
+        """The numbers of the plans that are the quickest of their questions."""
+        steps = np.diff(self.plans.starts)
+        best: dict[str, int] = {}
+        for number, question in enumerate(self.questions):
+            if question not in best or steps[number] < steps[best[question]]:
+                best[question] = number
+        return np.array(sorted(best.values()))
 
     def __len__(self) -> int:
         """Count the plans."""

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from planners.drive_answers import FAR
 from planners.memory.library.drives import NEAREST, TRIED, drives_of, moved_drive, rank_drives
+from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.plan_arrays import store_plans
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import scene_of
@@ -116,3 +117,11 @@ def test_drives_that_do_not_end_at_rest_are_left_out() -> None:
     drives = drives_of(store_plans([moving, whole, standing], state_size(CAR)))
     assert drives.plans.tolist() == [1]
     assert len(drives_of(store_plans([moving], state_size(CAR))).plans) == 0
+
+
+def test_of_the_plans_of_a_question_only_the_quickest_is_a_drive() -> None:
+    quick, other = drive(1, CAR), drive(2, CAR)
+    waits = np.vstack([quick.states[:1], quick.states]), np.vstack([np.zeros((1, 2)), quick.controls])
+    slow = Plan(*waits, CAR.dt)
+    library = gathered_library("test", CAR, [("a", slow), ("b", other), ("a", quick), ("c", slow)])
+    assert library.drives.plans.tolist() == [1, 2, 3]
