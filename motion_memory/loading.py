@@ -49,16 +49,16 @@ def load(
             model in MLflow, such as ``models:/motion-memory-trap@champion``.
         vehicle: its name, or the path of its .yaml file; by default the one that the memory is for.
         planner: the planner that searches if no recalled plan can be used: rrt, gust, follow or lattice.
-        assist: how the memory helps: closed, open or repair.
+        assist: how the memory helps: closed, open, repair or join.
         top_k: how many plans to recall, at least 1.
-        recall: how they are recalled; the default depends on the size of the memory.
+        recall: how they are recalled; the default depends on the size of the memory. Not for a library.
         seed: everything random follows from it.
         judged: whether each plan is judged before it is returned, which takes a few milliseconds.
         warm: False skips planning once. Each call then compiles only what it needs and what no call needed
             before, which is quicker if only a few problems follow after an installation.
 
     Raises:
-        UsageError: A name is unknown, or ``top_k`` is below 1.
+        UsageError: A name is unknown, ``top_k`` is below 1, or a library is to be recalled from in some way.
         StorageError: The memory is missing, damaged, or made for another vehicle.
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
@@ -73,6 +73,11 @@ def load(
         # mapped files stay readable after they are deleted
         archive = load_memory_or_library(folder, named or vehicle_of(folder))
     if isinstance(archive, PlanLibrary):
+        if recall is not None:
+            raise UsageError(
+                f"recall {recall!r} is for memories of runs; {memory} is a library, which recalls in one way. "
+                "Leave it out."
+            )
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready
     strategy = recall or default_recall(archive)
