@@ -75,8 +75,8 @@ def load(
     if isinstance(archive, PlanLibrary):
         if recall is not None:
             raise UsageError(
-                f"recall {recall!r} is for memories of runs; {memory} is a library, which recalls in one way. "
-                "Leave it out."
+                f"recall {recall!r} is for memories of runs; {memory} is a library, which recalls in one "
+                "way. Leave it out."
             )
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready

@@ -67,7 +67,7 @@ def test_a_library_and_a_memory_recall_an_answer_to_any_question(
     plans = [(str(number), plan) for number, plan in enumerate(memory.stored.plans)]
     save_library(tmp_path / "library", gathered_library("random", CAR, plans))
     library = motion_memory.load(tmp_path / "library")
-    with pytest.raises(motion_memory.UsageError, match="one way"):
+    with pytest.raises(motion_memory.UsageError, match="is a library"):
         motion_memory.load(tmp_path / "library", recall="encoder")
     asked = replace(strewn(3, 10), goal=(22.0, 20.0), start_motion=(1.0,))
     for stored in (memory, library):
