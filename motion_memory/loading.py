@@ -26,7 +26,7 @@ from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.registry.memory_at import memory_at
-from tasks.settings.checks import check_known, checked_vehicle
+from tasks.settings.checks import check_known, check_no_recall, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
 
@@ -73,11 +73,7 @@ def load(
         # mapped files stay readable after they are deleted
         archive = load_memory_or_library(folder, named or vehicle_of(folder))
     if isinstance(archive, PlanLibrary):
-        if recall is not None:
-            raise UsageError(
-                f"recall {recall!r} is for memories of runs; {memory} is a library, which recalls in one "
-                "way. Leave it out."
-            )
+        check_no_recall(recall, str(memory), "recall")
         ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
         return _warmed(ready) if warm else ready
     strategy = recall or default_recall(archive)

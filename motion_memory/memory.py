@@ -19,13 +19,7 @@ from planners.world.alignment import from_canonical, scaled, shifted, to_canonic
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
 from planners.world.checked_problem import checked_problem
-from planners.world.problem import (
-    BOUNDS,
-    GOAL_RADIUS,
-    Arrival,
-    Plan,
-    Problem,
-)
+from planners.world.problem import BOUNDS, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.errors import StorageError

@@ -29,7 +29,7 @@ from tasks.attempts.compile_assists import compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import check_known, check_seed, checked_vehicle
+from tasks.settings.checks import check_known, check_no_recall, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -95,12 +95,9 @@ class Assistant:
             address = _folder_of(class_name, Path(address))
         if address not in self._memories:
             self._memories[address] = load_from(address, self.vehicle)
-        memory, recall = self._memories[address], self.settings.recall
-        if isinstance(memory, PlanLibrary) and recall is not None:
-            raise UsageError(
-                f"--recall {recall} is for memories of runs; {address} is a library, which recalls in one "
-                "way. Leave out --recall."
-            )
+        memory = self._memories[address]
+        if isinstance(memory, PlanLibrary):
+            check_no_recall(self.settings.recall, address, "--recall")
         return memory
 
     def warm_up(self, problem: Problem) -> None:

@@ -55,6 +55,15 @@ def check_count(what: str, count: int) -> None:
         raise UsageError(f"{count} {what}: give 1 or more.")
 
 
+def check_no_recall(recall: str | None, library: str, option: str) -> None:
+    """Refuse a strategy of recall for a library, which recalls in one way; ``option`` is how it was given."""
+    if recall is not None:
+        raise UsageError(
+            f"{option} {recall} is for memories of runs; {library} is a library, which recalls in one way. "
+            f"Leave out {option}."
+        )
+
+
 def check_seed(seed: int) -> None:
     """Refuse a negative seed."""
     if seed < 0:

@@ -64,7 +64,7 @@ def drives_of(plans: StoredPlans, numbers: Indices | None = None) -> Drives:
         np.concatenate([np.empty((0, 2)), *controls]),
         np.concatenate([np.empty(0), *bent]),
         np.array(starts, np.int64),
-        np.ascontiguousarray(together[starts[:-1]]),
+        together[starts[:-1]],
         np.array(taken, np.int64),
     )
 
