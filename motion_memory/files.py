@@ -80,6 +80,7 @@ def solve_many(
     vehicle: str | None = None,
     seed: int = 1,
     plans: str | Path | None = None,
+    polished: bool = True,
 ) -> None:
     """Solve each problem of a file in this process, and write one row each (docs/problem-files.md).
 
@@ -97,6 +98,7 @@ def solve_many(
             else that of the memory, else the car.
         seed: everything random follows from it.
         plans: a folder for the plans, one file each; by default none are written.
+        polished: as of ``load``.
 
     Raises:
         UsageError: A name is unknown, or a file would be written over another one.
@@ -114,5 +116,6 @@ def solve_many(
         memory=stored,
         seed=seed,
         vehicle=settled_vehicle(vehicle, Path(problems), stored),
+        polished=polished,
     )
     solve_file(settings, Path(problems), Path(out), None if plans is None else Path(plans))

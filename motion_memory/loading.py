@@ -40,6 +40,7 @@ def load(
     recall: str | None = None,
     seed: int = 1,
     judged: bool = True,
+    polished: bool = True,
     warm: bool = True,
 ) -> Memory:
     """Read and check a memory, load the compiled kernels and plan once, so that the first call is quick.
@@ -54,6 +55,8 @@ def load(
         recall: how they are recalled; the default depends on the size of the memory. Not for a library.
         seed: everything random follows from it.
         judged: whether each plan is judged before it is returned, which takes a few milliseconds.
+        polished: whether each plan is polished; False returns the first one as it is found, which takes a
+            fraction of a millisecond instead of some, and is driven longer.
         warm: False skips planning once. Each call then compiles only what it needs and what no call needed
             before, which is quicker if only a few problems follow after an installation.
 
@@ -74,7 +77,7 @@ def load(
         archive = load_memory_or_library(folder, named or vehicle_of(folder))
     if isinstance(archive, PlanLibrary):
         check_no_recall(recall, str(memory), "recall")
-        ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged)
+        ready = Memory(archive, planner, assist, top_k, SUB_PLANS, seed, judged, polished)
         return _warmed(ready) if warm else ready
     strategy = recall or default_recall(archive)
     if warm:
@@ -86,7 +89,7 @@ def load(
             f"The encoder of {memory} does not have the default shape, so it needs {error.name}: "
             "pip install 'motion-memory[pipeline]'."
         ) from None
-    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged)
+    ready = Memory(archive, planner, assist, top_k, strategy, seed, judged, polished)
     return _warmed(ready) if warm else ready
 
 

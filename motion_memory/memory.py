@@ -54,6 +54,7 @@ class Memory:
     strategy: str  # of recall
     seed: int
     judged: bool
+    polished: bool = True
     _idle: list[Workspace] = field(default_factory=list)  # not lent to a thread
 
     def __len__(self) -> int:
@@ -184,6 +185,7 @@ class Memory:
                 vehicle=self.vehicle,
                 strategy=self.strategy,
                 workspace=workspace,
+                polished=self.polished,
             )
         plan = attempt.plan and scaled(from_canonical(attempt.plan, alignment), problem.scale)
         plan = plan and shifted(plan, problem.offset)

@@ -33,6 +33,8 @@ class Attempt:
     repair_seconds: float  # repairing a recalled plan, successfully or not
     roadmap_seconds: float
     search_seconds: float
+    hit: bool | None  # whether recalled plans answer it as they are, without any search; None: no memory
+    helped: bool  # whether a blocked one of the recalled plans guided the search, or was repaired
     recalled: tuple[int, ...]  # whole plans of the memory, best first; or the drive of it that was moved
     collision_checks: int
     expansions: int

@@ -16,8 +16,6 @@ from planners.memory.plans.cell_masks import MOST_CELLS, rank_by_cells
 from planners.memory.plans.free import turned
 from planners.memory_answers import least_blocked
 from planners.search.free_goal import aimed_view
-from planners.search.help import PATIENCE
-from planners.search.outcome import work_of
 from planners.search.repair import blocked_states
 from planners.sub_plan_answers import SubPlanAnswer, sub_plan_answer
 from planners.world.arrays import Flags
@@ -37,7 +35,7 @@ class Recollection(NamedTuple):
     blocked_cells: int | None  # cells that it shares with obstacles; None if cells say nothing about it
     blocked: Flags  # [T] which of its states are in collision
     goal_missed_m: float  # distance by which it ends outside the goal disc
-    use: str  # "answer", "repaired", "guide", or "" for none
+    use: str  # "answer", "polished" to the answer, "repaired", "guide", or "" for none
 
     @property
     def first_blocked(self) -> int | None:
@@ -66,10 +64,10 @@ def recollections(
     scores = memory.scores(embedding, view.bits, view.workspace)[1:]
     blocked_cells = rank_by_cells(memory.masks, view.bits, view.workspace).cells
     as_stored = memory.begins_with(problem.start[2])
-    uses = _uses(problem, attempt, memory, view)
+    plans = {number: turned(memory.plans[number], problem.start[2]) for number in attempt.recalled}
+    helper = least_blocked(memory, attempt.recalled, view)[0] if attempt.helped else -1
     looked_at: list[Recollection] = []
-    for number in attempt.recalled:
-        plan = turned(memory.plans[number], problem.start[2])
+    for number, plan in plans.items():
         blocked, _ = blocked_states(plan, view.scene, vehicle)
         cells = int(blocked_cells[number])
         missed = max(math.dist(plan.states[-1, :2], problem.goal) - problem.goal_radius, 0.0)
@@ -80,10 +78,18 @@ def recollections(
                 cells if as_stored and cells < MOST_CELLS else None,
                 blocked,
                 missed,
-                uses.get(number, ""),
+                _use_of_blocked(attempt) if number == helper else "",
             )
         )
-    return looked_at
+    if attempt.source != "recalled" or attempt.plan is None:
+        return looked_at
+    # the free plan that drives shortest
+    quickest = min(filter(_is_free, looked_at), key=lambda each: len(plans[each.plan].controls), default=None)
+    as_it_is = quickest is not None and len(plans[quickest.plan].controls) == len(attempt.plan.controls)
+    return [
+        each._replace(use="answer" if as_it_is else "polished") if each is quickest else each
+        for each in looked_at
+    ]
 
 
 class MovedDrive(NamedTuple):
@@ -123,16 +129,10 @@ def parts_found(
     return sub_plan_answer(library, aimed_view(problem, vehicle), vehicle, blindly)
 
 
-def _uses(problem: Problem, attempt: Attempt, memory: Memory, view: View) -> dict[int, str]:
-    """The plan that is the answer, or that the repair or the search went on from, and which of these."""
-    if attempt.source == "recalled" and attempt.plan is not None:
-        heading, answer = problem.start[2], attempt.plan.states
-        recalled = {i: turned(memory.plans[i], heading).states for i in attempt.recalled}
-        return {i: "answer" for i, states in recalled.items() if np.array_equal(states, answer)}
-    use = attempt.assist.removeprefix("random-")
-    if attempt.source == "recalled" or use not in ("open", "repair") or not attempt.recalled:
-        return {}
-    if attempt.source != "repaired" and work_of(attempt.collision_checks, attempt.expansions) < PATIENCE:
-        return {}
-    best, _ = least_blocked(memory, attempt.recalled, view)
-    return {best: "repaired" if attempt.source == "repaired" else "guide"} if best >= 0 else {}
+def _is_free(recollection: Recollection) -> bool:
+    return not recollection.blocked.any() and recollection.goal_missed_m <= 1e-9
+
+
+def _use_of_blocked(attempt: Attempt) -> str:
+    """What the least blocked of the recalled plans was to an attempt that it helped."""
+    return "repaired" if attempt.source == "repaired" else "guide"

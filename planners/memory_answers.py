@@ -54,7 +54,7 @@ def answer_from(
     vehicle: Vehicle,
     assist: str,
     *,
-    improves: bool,
+    polished: bool,
     until: float = math.inf,
 ) -> MemoryAnswer:
     """Look for a whole plan that fits a problem or can be made to, or put one together from parts of plans.
@@ -68,7 +68,7 @@ def answer_from(
         strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
         vehicle: what is driven.
         assist: one with a memory, as ``solve`` takes it.
-        improves: whether the plan is improved anyway, and need not be a detour for that.
+        polished: whether the plan is polished anyway, and need not be a detour for that.
         until: when to end moving whole drives to the problem, by ``working_clock``.
     """
     problem = view.problem
@@ -82,11 +82,11 @@ def answer_from(
         if recalled.free < 0:
             return answer
         plan = turned(memory.plans[recalled.free], problem.start[2])
-        is_long = strategy != "centroid" and is_detour(plan, planner, view, vehicle)
+        is_long = not polished and strategy != "centroid" and is_detour(plan, planner, view, vehicle)
         return answer._replace(plan=plan, source="recalled", is_long=is_long)
     library = memory if isinstance(memory, PlanLibrary) else memory.library
     drive = DriveAnswer()
-    if improves and use in JOINS and suits(goal_of(problem, vehicle), vehicle):
+    if polished and use in JOINS and suits(goal_of(problem, vehicle), vehicle):
         drive = drive_answer(library, view, vehicle, until, blindly)
         if drive.plan is not None:
             return MemoryAnswer(
@@ -105,7 +105,7 @@ def answer_from(
     )
     if parts.plan is None:
         return answer
-    is_long = not improves and is_detour_from_motion(parts.plan, parts.seconds, planner, problem)
+    is_long = not polished and is_detour_from_motion(parts.plan, parts.seconds, planner, problem)
     return answer._replace(source="recalled" if parts.recalled else "searched", is_long=is_long)
 
 
@@ -152,6 +152,11 @@ class LateHelp:
             return None
         plan = turned(self._memory.plans[stored], self._query.problem.start[2])
         return Help(self._query, plan, cells, self._view.bits, self._rng, repairs=self._repairs)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the search became so long that help began."""
+        return self._help is not None
 
     def is_repair(self, plan: Plan) -> bool:
         """Whether a plan is what the repair made."""

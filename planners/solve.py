@@ -69,9 +69,9 @@ def solve(
     ``fresh``: search guided by a path over the grid.
     ``random-`` before an assist picks the plans blindly.
 
-    A plan to more than a place, a pose for example, is polished, and a search for one goes on while shorter
-    ones are found soon: in some milliseconds the drive gets seconds shorter, because what parts and arcs are
-    put together to stops and creeps where it need not.
+    The plan is polished, and the search goes on while shorter ones are found soon: in some milliseconds the
+    drive gets tenths of a second to seconds shorter, because what a search or parts put together stops,
+    creeps and winds where it need not.
 
     Args:
         problem: its start at (0, 0), its goal on the diagonal (``to_canonical``).
@@ -84,7 +84,7 @@ def solve(
         vehicle: what is to be driven.
         strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
         workspace: the caller's buffers; by default new ones.
-        polished: whether plans to more than a place are polished; else the first is as it was found.
+        polished: whether the plan is polished; else it is the first that was found, as it was found.
 
     Raises:
         ValueError: Planner, assist or strategy is unknown, the memory is missing or of another vehicle or
@@ -96,19 +96,18 @@ def solve(
     limits = limits or usual_limits(problem)
     view = aimed_view(problem, vehicle, workspace)
     problem = view.problem
-    improves = polished and problem.arrival is not None
     if assist in WITHOUT_MEMORY or memory is None:
         memory, found = None, MemoryAnswer()
     else:
         found = answer_from(
             *(memory, view, planner, top_k, seed, strategy, vehicle, assist),
-            improves=improves,
+            polished=polished,
             until=view.began + limits.seconds,
         )
     answer = _Answer(found.plan, found.source, Status.SOLVED, np.array([found.checks, 0, 0]))
-    if found.plan is None or found.is_long or (improves and not found.is_polished):
+    if found.plan is None or found.is_long or (polished and not found.is_polished):
         limits = replace(limits, seconds=max(view.began + limits.seconds - working_clock(), 0.0))
-        answer = _searched(view, planner, assist, memory, found, seed, limits, vehicle, improves)
+        answer = _searched(view, planner, assist, memory, found, seed, limits, vehicle, polished)
     planning_seconds = working_clock() - view.began
     plan = answer.plan
 
@@ -124,6 +123,8 @@ def solve(
         source=None if plan is None else answer.source,
         planning_seconds=planning_seconds,
         **{f"{part}_seconds": view.seconds.get(part, 0.0) for part in TIMED_PARTS},
+        hit=None if memory is None else found.source == "recalled",
+        helped=answer.helped,
         recalled=found.recalled,
         collision_checks=int(answer.work[0]),
         expansions=int(answer.work[1]),
@@ -169,6 +170,7 @@ class _Answer(NamedTuple):
     source: str
     status: Status  # why there is no plan, if there is none
     work: Integers  # [3] collision checks, expansions, nodes
+    helped: bool = False  # by a recalled plan that is blocked
 
 
 def _searched(
@@ -180,7 +182,7 @@ def _searched(
     seed: int,
     limits: Limits,
     vehicle: Vehicle,
-    improves: bool,
+    polished: bool,
 ) -> _Answer:
     """Search for a plan, or for a better one than the memory has; the better one is the answer."""
     problem = view.problem
@@ -208,14 +210,14 @@ def _searched(
     if use == "fresh":
         query = replace(query, guide=fresh_guide(query, view.bits))
         view.lap("guide")
-    is_given = False  # whether the plan that comes of the search is that of the memory, polished
-    if improves:
-        rough, below_s = found.plan, math.inf
+    if polished:
+        given, below_s = found.plan, math.inf
         if found.plan is not None and found.is_polished:
-            rough, below_s = None, found.plan.duration_s
-        searched, is_given = search_and_polish(planner, query, seed, rough, below_s)
+            given, below_s = None, found.plan.duration_s
+        searched, rough = search_and_polish(planner, query, seed, given, below_s)
     else:
         searched = PLANNERS[planner](query)
+        rough = searched.plan
     work = np.array([searched.collision_checks + found.checks, searched.expansions, searched.nodes])
     view.seconds["roadmap"] = searched.roadmap_seconds
     view.lap("search")
@@ -224,14 +226,14 @@ def _searched(
         work += helper.cost()
         view.seconds["repair"] = helper.repair_seconds
         view.seconds["search"] -= helper.repair_seconds
-    plan = searched.plan
-    if is_given:
+    plan, helped = searched.plan, helper is not None and helper.has_begun
+    if rough is not None and rough is found.plan:
         return _Answer(plan, found.source, Status.SOLVED, work)
     if plan is not None and (found.plan is None or plan.duration_s < found.plan.duration_s):
-        is_repair = searched.joined or (helper is not None and helper.is_repair(plan))
-        return _Answer(plan, "repaired" if is_repair else "searched", Status.SOLVED, work)
+        is_repair = searched.joined or (helper is not None and rough is not None and helper.is_repair(rough))
+        return _Answer(plan, "repaired" if is_repair else "searched", Status.SOLVED, work, helped)
     status = searched.status if found.plan is None else Status.SOLVED
-    return _Answer(found.plan, found.source, status, work)
+    return _Answer(found.plan, found.source, status, work, helped)
 
 
 def improved(

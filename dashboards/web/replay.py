@@ -53,9 +53,8 @@ def replay(
     used = None if configuration.assist in WITHOUT_MEMORY else memory
     assist, recall, top_k = configuration
     workspace = Workspace()
-    attempt = solve(
-        problem, planner, assist, max(top_k, 1), used, seed, limits, vehicle, recall or None, workspace
-    )
+    asked = problem, planner, assist, max(top_k, 1), used, seed, limits, vehicle, recall or None
+    attempt = solve(*asked, workspace, polished=False)
     searched = attempt.source == "searched" or not attempt.solved
     tree = last_tree(workspace, limits, vehicle) if searched else None
     roadmap = last_roadmap(workspace, planner) if searched and attempt.roadmap_seconds > 0.0 else None

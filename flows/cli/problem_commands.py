@@ -67,7 +67,7 @@ def plan(
             is only one.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
+        improve_seconds: Seconds to go on looking for a quicker plan after the first is found and polished.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
@@ -154,7 +154,7 @@ def solve(
         problems: A .json, .jsonl or .parquet file.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to look for a quicker plan; 0 keeps what the planner found.
+        improve_seconds: Seconds to go on looking for a quicker plan after the first is found and polished.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
         learn: Data folder that remembers new plans, those from rest to a place 50√2 m ahead.
@@ -190,8 +190,8 @@ def _solve_parts(request: SolveRequest) -> list[PartResult]:
 
 
 def _write_summary(solved: SolvedMany) -> None:
-    outcomes, seconds, _ = solved.tally
-    count, with_plan = len(seconds), sum(n for name, n in outcomes.items() if not name.startswith("("))
+    outcomes, count = solved.tally.outcomes, len(solved.tally.seconds)
+    with_plan = sum(n for name, n in outcomes.items() if not name.startswith("("))
     named = ", ".join(f"{outcome} {number:,}" for outcome, number in outcomes.most_common())
     now = solved.solved_now
     rate = now / solved.seconds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -28,6 +28,7 @@ class SolveOptions:
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
             Default: that of the problems, else that of the memory, else car.
         seed: Everything random follows from it.
+        unpolished: Take each plan as it is found: that saves milliseconds, and the drive takes longer.
     """
 
     planner: PlannerName = "lattice"
@@ -36,6 +37,7 @@ class SolveOptions:
     memory: str | None = None
     vehicle: str | None = None
     seed: int = 1
+    unpolished: Annotated[bool, Parameter(negative=())] = False
 
     def settings(
         self,
@@ -64,6 +66,7 @@ class SolveOptions:
             settled_vehicle(self.vehicle, problems, memory),
             improve_seconds,
             self.recall,
+            not self.unpolished,
         )
 
 

@@ -1,10 +1,11 @@
 """Improves a plan: polishes it, then searches again and again for one that is better once it is polished.
 
-Plans to more than a place are always improved a little, since the first is rarely a good drive: in narrow
-places drives of several kinds are found at once, elsewhere one after another, each shorter. Otherwise each
-search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with any
-of the planners as x). A plan within the bound is polished. The bound is a little above the best driving time
-at first, because a plan as a search finds it takes longer, and falls with each search in vain.
+Answers are improved a little, since the first plan is rarely a good drive (``search_and_polish``): in narrow
+places drives of several kinds are found at once, elsewhere one after another, each shorter. Where there is
+more time (``improve``), each search has a bound on driving time and random numbers of its own (AO-x, Hauser
+and Zhou, T-RO 2016, with any of the planners as x). A plan within the bound is polished. The bound is a
+little above the best driving time at first, because a plan as a search finds it takes longer, and falls with
+each search in vain.
 """
 
 from __future__ import annotations
@@ -34,9 +35,10 @@ LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when a
 FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer before it is polished
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
-SHORTER = 0.9  # of the driving time of the plan before: so long may the next one to a pose take ...
+SHORTER = 0.9  # of the driving time of the quickest so far: so long may the next one take ...
 AGAIN = 1000  # ... and so many expansions its search
-BESIDE = 4000  # expansions of the search beside a plan that is given
+ROUGH = 1.1  # of the driving time of a given plan: so long may one take that is quicker once it is polished
+BESIDE = 4000  # expansions of the search beside a plan that is given, where it is narrow
 POLISHED = 2  # of the last plans: which of them is quickest when polished cannot be told before
 
 
@@ -154,11 +156,12 @@ def improve(
 
 def search_and_polish(
     planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
-) -> tuple[Outcome, bool]:
+) -> tuple[Outcome, Plan | None]:
     """Search for several plans, polish them and keep the quickest.
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
-    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon.
+    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon. A given plan may
+    be of a worse kind than what the planner finds, so that searches at least once.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -170,7 +173,7 @@ def search_and_polish(
 
     Returns:
         The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
-        with the work and the time of all; and whether it is the given plan.
+        with the work and the time of all; and what that plan was before it was polished.
     """
     until = working_clock() + query.limits.seconds
     goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
@@ -190,29 +193,32 @@ def search_and_polish(
         limits = replace(query.limits, expansions=min(BESIDE, query.limits.expansions))
         found.append(PLANNERS[planner](replace(query, limits=limits)))
     plan = None if varies else found[0].plan
-    while plan is not None and plan.duration_s > 0.0:  # it may be at the goal already
+    shortest_s = math.inf if plan is None else plan.duration_s
+    share = SHORTER if given is None else ROUGH
+    while plan is not None and shortest_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
             expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
             seconds=until - working_clock(),
-            bound_s=min(SHORTER * plan.duration_s, query.limits.bound_s),
+            bound_s=min(share * shortest_s, query.limits.bound_s),
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
             break
         rng = generator(seed, "again", query.problem.id, planner, len(found))
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
-        plan = found[-1].plan
+        plan, share = found[-1].plan, SHORTER
+        shortest_s = min(shortest_s, math.inf if plan is None else plan.duration_s)
     solved = [(each, each.plan) for each in found if each.plan is not None][-POLISHED:]
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
-        return found[0], False
+        return found[0], None
     number, polished = polish_quickest(
         *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
         seconds=until - working_clock(),
         below_s=below_s,
     )
-    best, given_best = solved[number]
-    plan = polished.plan or given_best
+    best, rough = solved[number]
+    plan = polished.plan or rough
     whole = replace(
         best,
         plan=plan,
@@ -222,4 +228,4 @@ def search_and_polish(
         roadmap_seconds=sum(each.roadmap_seconds for each in found),
         search_seconds=sum(each.search_seconds for each in found),
     )
-    return whole, given is not None and best is found[0]
+    return whole, rough

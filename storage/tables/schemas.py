@@ -135,8 +135,9 @@ ATTEMPTS: Final = _schema(
         ("verified", pa.bool_()),  # what the authority said of the plan; null if there is none
         ("vehicle", pa.string()),  # its name
         ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
+        ("hit", pa.bool_()),  # whether recalled plans answer it as they are; null without memory
     ],
-    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall"),
+    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall", "hit"),
 )
 
 

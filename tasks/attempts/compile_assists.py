@@ -59,7 +59,7 @@ def compile_assists(
         strategies: strategies of recall.
     """
     workspace = Workspace()
-    plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace).plan
+    plan = solve(EMPTY, planner, vehicle=vehicle, workspace=workspace, polished=False).plan
     if plan is None:
         return
     plans = [plan] * 2
@@ -82,6 +82,7 @@ def compile_assists(
                 vehicle=vehicle,
                 strategy=strategy,
                 workspace=workspace,
+                polished=False,
             )
 
         for problem, assist in ((blocked, "open"), (blocked, "repair"), (turned, "closed")):

@@ -97,6 +97,7 @@ def side_by_side(
             vehicle=vehicle,
             strategy=recall,
             workspace=workspace,
+            polished=False,
         )
 
     compile_assists(vehicle)

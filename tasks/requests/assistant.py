@@ -51,6 +51,7 @@ class AssistantSettings(NamedTuple):
     vehicle: str = DEFAULT_VEHICLE
     improve_seconds: float = 0.0  # how long to improve a plan after it is found
     recall: str | None = None  # None takes the strategy that suits the memory
+    polished: bool = True  # False takes the first plan as it is found: sooner there, longer to drive
 
 
 class Assistant:
@@ -63,7 +64,7 @@ class Assistant:
             UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
             StorageError: the memory lies in object storage and cannot be fetched.
         """
-        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall = settings
+        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall, _ = settings
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
         vehicle = checked_vehicle(vehicle)
@@ -156,6 +157,7 @@ class Assistant:
             vehicle=self.vehicle,
             strategy=self.settings.recall,
             workspace=self._workspace,
+            polished=self.settings.polished,
         )
 
     def improved_attempt(self, canonical: Problem, assist: str | None = None) -> Attempt:

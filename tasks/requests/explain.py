@@ -18,6 +18,7 @@ from planners.world.problem import Plan
 
 USES: Final = {
     "answer": "the answer",
+    "polished": "the answer, polished",
     "repaired": "repaired",
     "guide": "guided the search",
     "": "",

@@ -44,7 +44,7 @@ _LOG = logging.getLogger(__name__)
 SolveFlow = Callable[[SolveRequest], list[PartResult]]
 
 FEW_PROBLEMS: Final = 1_000  # more are left to workers at once
-TALLIED: Final = ("status", "source", "planning_seconds", "duration_s")
+TALLIED: Final = ("status", "source", "planning_seconds", "duration_s", "hit")
 START_SECONDS: Final = 20.0  # about what a server and workers take to start
 
 
@@ -54,6 +54,7 @@ class Tally(NamedTuple):
     outcomes: Counter[str]  # problems by the source of their plan, or by the status of a failure, in brackets
     seconds: Floats  # [n] planning times
     driving: Floats  # [n] driving times, NaN where no plan was found
+    hits: int  # problems that recalled plans answer as they are
 
 
 class SolvedMany(NamedTuple):
@@ -192,13 +193,15 @@ def _tally(tables: Iterable[dict[str, list[Any]]]) -> Tally:
     """Count over tables with the columns ``TALLIED``."""
     outcomes: Counter[str] = Counter()
     seconds, driving = [], []
+    hits = 0
     for rows in tables:
         outcomes.update(
             source or f"({status})" for source, status in zip(rows["source"], rows["status"], strict=True)
         )
         seconds.append(np.array(rows["planning_seconds"]))
         driving.append(np.array(rows["duration_s"], float))
-    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving))
+        hits += sum(map(bool, rows["hit"]))
+    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving), hits)
 
 
 def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
@@ -219,7 +222,7 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally
 
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
-    now = usefulness_of(tally.outcomes["recalled"], tally.seconds, tally.driving)
+    now = usefulness_of(tally.hits, tally.seconds, tally.driving)
     return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)
 
 

@@ -233,6 +233,7 @@ def _attempts(
                 vehicle=vehicle,
                 strategy=row["recall"],
                 workspace=workspace,
+                polished=False,
             )
             attempt = check_attempt(problem, attempt, set(), vehicle)
             attempts_repeated += 1

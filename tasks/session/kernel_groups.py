@@ -28,7 +28,7 @@ from tasks.settings.run_settings import COLLECTOR, DEFAULT_MIXTURE
 
 def _compile_collecting(vehicle: Vehicle) -> None:
     """Compile the planner that collects experiences, and what polishes its plans."""
-    found = solve(EMPTY, COLLECTOR, vehicle=vehicle).plan
+    found = solve(EMPTY, COLLECTOR, vehicle=vehicle, polished=False).plan
     if found is not None:
         polish(EMPTY, found, vehicle, scene_of(EMPTY), Workspace())
 
@@ -51,7 +51,7 @@ def _compile_rest(vehicle: Vehicle) -> None:
     compile_assists(vehicle)
     for planner in PLANNERS:
         for assist in ("none", "fresh"):
-            solve(EMPTY, planner, assist, vehicle=vehicle)
+            solve(EMPTY, planner, assist, vehicle=vehicle, polished=False)
 
 
 # With two workers, each compiles one of the first two groups, and the

@@ -89,7 +89,9 @@ def candidates_of(
     for variant in variants:
         name = variant.planner or settings.collector
         if name not in searched:
-            attempt = solve(problem, name, seed=settings.seed, vehicle=vehicle, workspace=workspace)
+            attempt = solve(
+                problem, name, seed=settings.seed, vehicle=vehicle, workspace=workspace, polished=False
+            )
             searched[name] = None
             if attempt.plan is not None:
                 searched[name] = SearchedExperience(

@@ -46,7 +46,8 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
         shown = rows[(rows["source"] == kind) & (rows["assist"] == assist)].head(SHOWN_EACH)
         for identity, seconds in zip(shown["problem_id"], shown["planning_seconds"], strict=True):
             problem = source.problem("test", numbers[identity])
-            attempt = solve(problem, planner, assist, SHOWN_TOP_K, memory, settings.seed, vehicle=vehicle)
+            asked = problem, planner, assist, SHOWN_TOP_K, memory, settings.seed
+            attempt = solve(*asked, vehicle=vehicle, polished=False)
             caption = f"{identity}: {kind}, {1000.0 * seconds:.2f} ms"
             recalled = [memory.plans[i] for i in attempt.recalled]
             yield Example(problem, recalled, attempt.plan, caption, vehicle)

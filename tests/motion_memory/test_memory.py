@@ -43,6 +43,7 @@ def planner(memory: Path) -> Memory:
 
 def test_it_answers_as_the_command_does(planner: Memory, memory: Path) -> None:
     assistant = Assistant(AssistantSettings("lattice", "repair", 5, str(memory), 1))
+    unpolished = replace(planner, polished=False)
     for i in range(COUNT):
         attempt, plan = assistant(problem(i))
         answer = planner.plan(problem(i))
@@ -55,7 +56,9 @@ def test_it_answers_as_the_command_does(planner: Memory, memory: Path) -> None:
         arrays = planner.plan_arrays(given.start, given.goal, vertices, polygon_starts)
         assert arrays.plan is not None
         assert 0.0 < arrays.planning_seconds < arrays.call_seconds
-        assert same(replace(answer, problem_id=arrays.problem_id), arrays) or answer.source != "recalled"
+        named = unpolished.plan(problem(i))  # a search's random numbers depend on the name
+        nameless = unpolished.plan_arrays(given.start, given.goal, vertices, polygon_starts)
+        assert same(replace(named, problem_id=nameless.problem_id), nameless) or named.source != "recalled"
         assert answer.plan is not None
         assert np.array_equal(answer.plan.states, plan.states)
         assert faults(problem(i), answer.plan, CAR) == []

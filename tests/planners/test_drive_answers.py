@@ -171,9 +171,9 @@ def test_what_the_memory_takes_is_taken_off_the_search(
             pass
         return MemoryAnswer()
 
-    def searched(planner: str, query: Query, *_: object) -> tuple[Outcome, bool]:
+    def searched(planner: str, query: Query, *_: object) -> tuple[Outcome, None]:
         left.append(query.limits.seconds)
-        return Outcome(Status.BUDGET_SPENT, None, 0, 0, 0, 0.0, 0.0), False
+        return Outcome(Status.BUDGET_SPENT, None, 0, 0, 0, 0.0, 0.0), None
 
     monkeypatch.setattr(solving, "answer_from", slow)
     monkeypatch.setattr(solving, "search_and_polish", searched)

@@ -12,7 +12,7 @@ from planners.optimisation import polish
 from planners.search import anytime
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import ASSISTS, improved, solve
+from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
@@ -24,6 +24,7 @@ from tests.planners.early_help import early_help
 from tests.planners.memories import memory_of_plans
 from tests.worlds import box, problem_of, strewn, walled_goal
 
+first = functools.partial(solve, polished=False)  # the plan as it is found
 PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
 
 
@@ -56,7 +57,7 @@ def blocked_everywhere():
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_without_assistance_the_answer_is_the_planners_own(planner):
     problem = strewn(3, 30)
-    attempt = solve(problem, planner, seed=4)
+    attempt = first(problem, planner, seed=4)
     own = plan(planner, problem, generator(4, "search", problem.id, planner))
     np.testing.assert_array_equal(attempt.plan.states, own.plan.states)
     assert (attempt.source, attempt.recalled, attempt.top_k) == ("searched", (), 0)
@@ -65,7 +66,7 @@ def test_without_assistance_the_answer_is_the_planners_own(planner):
 
 @pytest.mark.parametrize("assist", ["closed", "open", "repair"])
 def test_the_recalled_plan_that_is_free_and_drives_shortest_is_the_answer(memory, assist):
-    attempt = solve(problem_of([]), "gust", assist, 5, memory, strategy="encoder")
+    attempt = first(problem_of([]), "gust", assist, 5, memory, strategy="encoder")
     assert attempt.recalled == (4, 3, 2, 1, 0)
     assert attempt.plan is min((memory.plans[i] for i in attempt.recalled), key=lambda plan: plan.duration_s)
     assert (attempt.source, attempt.expansions, attempt.search_seconds) == ("recalled", 0, 0.0)
@@ -110,23 +111,23 @@ def test_the_papers_open_box_finds_the_same_plan_for_the_same_seed(memory, plann
 def test_a_free_plan_that_is_a_long_detour_is_the_answer_only_if_no_quicker_one_is_found(assist):
     around = plan("follow", blocked_everywhere(), generator(0)).plan
     memory, nothing_there = memory_of_plans([around], np.zeros(2)), problem_of([])
-    alone = solve(nothing_there, "lattice")
+    alone = first(nothing_there, "lattice")
     assert alone.duration_s < around.duration_s
-    quicker = solve(nothing_there, "lattice", assist, 5, memory)
+    quicker = first(nothing_there, "lattice", assist, 5, memory)
     assert quicker.source == "searched"
     np.testing.assert_array_equal(quicker.plan.states, alone.plan.states)
-    in_vain = solve(nothing_there, "lattice", assist, 5, memory, limits=Limits(expansions=2))
+    in_vain = first(nothing_there, "lattice", assist, 5, memory, limits=Limits(expansions=2))
     assert (in_vain.status, in_vain.source, in_vain.duration_s) == ("solved", "recalled", around.duration_s)
     assert in_vain.expansions == 2
-    assert solve(nothing_there, "gust", assist, 5, memory).source == "recalled"
-    assert solve(nothing_there, "lattice", assist, 5, memory, strategy="centroid").source == "recalled"
+    assert first(nothing_there, "gust", assist, 5, memory).source == "recalled"
+    assert first(nothing_there, "lattice", assist, 5, memory, strategy="centroid").source == "recalled"
 
 
 def test_a_free_plan_that_is_no_detour_is_the_answer():
     problem = problem_of([box(20, 24, 0.0, 1.0, 1.0)])
-    found = solve(problem, "lattice").plan
+    found = first(problem, "lattice").plan
     quick = polish.polish(problem, found, CAR, scene_of(problem), Workspace()).plan
-    again = solve(problem, "lattice", "closed", 5, memory_of_plans([quick], np.zeros(2)))
+    again = first(problem, "lattice", "closed", 5, memory_of_plans([quick], np.zeros(2)))
     assert (again.source, again.expansions) == ("recalled", 0)
 
 
@@ -202,8 +203,8 @@ def test_a_vehicle_whose_boxes_reach_farther_than_they_are_checked_is_refused(ch
 def test_exhaustive_recall_finds_a_free_plan_if_and_only_if_there_is_one(seed, count):
     memory, problem = shared_memory(), strewn(seed, count)
     free = free_plans(memory.sweeps, scene_of(problem))
-    attempt = solve(problem, "follow", "closed", 1, memory)
-    assert (attempt.source == "recalled") == free.any()
+    attempt = first(problem, "follow", "closed", 1, memory)
+    assert (attempt.source == "recalled") == free.any() == attempt.hit
     assert not free.any() or attempt.plan is memory.plans[attempt.recalled[0]]
     assert (attempt.recall, attempt.top_k) == ("exhaustive", 1)
 
@@ -242,8 +243,10 @@ def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(assis
     blocking = [box(*stored.states[120, :2], 0.0, 1.2, 1.2) for stored in memory.plans]
     problem = problem_of(blocking, "each plan blocked")
     with early_help():
-        attempt = solve(problem, "rrt", assist, 5, memory)
-    assert attempt.source == "repaired"
+        attempt = first(problem, "rrt", assist, 5, memory)
+        polished = solve(problem, "rrt", assist, 5, memory)
+    assert attempt.source == polished.source == "repaired"
+    assert polished.duration_s <= attempt.duration_s
     assert faults(problem, attempt.plan) == []
     assert any((attempt.plan.states[:5] == memory.plans[i].states[:5]).all() for i in attempt.recalled)
     assert attempt.repair_seconds > 0.0
@@ -254,13 +257,36 @@ def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory, 
     monkeypatch.setattr(anytime, "working_clock", ticks())
     monkeypatch.setattr(polish, "working_clock", ticks())
     problem = strewn(4, 20)
-    first = solve(problem, "gust", assist, 5, memory)
-    better = improved(first, problem, 0.1)
-    assert better.duration_s < first.duration_s
-    assert better.planning_seconds >= first.planning_seconds + 0.1
-    assert better.expansions > first.expansions
-    assert better.source in (first.source, "searched")
+    found = first(problem, "gust", assist, 5, memory)
+    better = improved(found, problem, 0.1)
+    assert better.duration_s < found.duration_s
+    assert better.planning_seconds >= found.planning_seconds + 0.1
+    assert better.expansions > found.expansions
+    assert better.source in (found.source, "searched")
     assert faults(problem, better.plan) == []
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("assist", ["none", "fresh", "closed", "repair"])
+def test_an_answer_is_polished_and_takes_no_longer_than_the_first_plan_or_a_recalled_one(
+    memory, planner, assist
+):
+    for problem in (strewn(4, 20), strewn(5, 30), blocked_everywhere()):
+        attempt, found = (each(problem, planner, assist, 5, memory) for each in (solve, first))
+        assert attempt.duration_s <= found.duration_s
+        assert (attempt.hit, attempt.recalled, attempt.recall) == (found.hit, found.recalled, found.recall)
+        assert (attempt.hit is None) == (assist in WITHOUT_MEMORY)
+        assert found.hit or found.source != "recalled"
+        assert faults(problem, attempt.plan) == []
+
+
+def test_a_recalled_plan_of_a_worse_kind_is_not_what_is_polished():
+    """The free plan leads around a wall that is not there."""
+    around = plan("follow", blocked_everywhere(), generator(0)).plan
+    memory, nothing_there = memory_of_plans([around], np.zeros(2)), problem_of([])
+    recalled, alone = solve(nothing_there, "lattice", "closed", 5, memory), solve(nothing_there, "lattice")
+    assert recalled.hit
+    assert recalled.duration_s <= 1.01 * alone.duration_s
 
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):

@@ -20,7 +20,7 @@ from tasks.session.kernel_groups import GROUPS
 
 def compile_library(vehicle: Vehicle) -> None:
     """Compile what gathers a library of plans and answers from it."""
-    found = solve(EMPTY, "lattice", vehicle=vehicle).plan
+    found = solve(EMPTY, "lattice", vehicle=vehicle, polished=False).plan
     assert found is not None
     library = gathered_library("one", vehicle, [("one", found)])
     for assist in ("closed", "random-closed"):

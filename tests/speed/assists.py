@@ -94,7 +94,7 @@ def _made(source: ProblemClass, count: int, hallucinated: int) -> Memory:
     while len(experiences) < count:
         problem = source.draw(COLLECTING, index)
         index += 1
-        plan = solve(problem, "follow", seed=COLLECTING).plan
+        plan = solve(problem, "follow", seed=COLLECTING, polished=False).plan
         if plan is not None:
             experiences.append(Experience(problem, plan))
     plans = [experience.plan for experience in experiences]
@@ -142,6 +142,7 @@ def measure(
                 *(problem, planner, assist, max(k, 1), memory, MEASURING),
                 strategy=strategy,
                 workspace=workspace,
+                polished=False,
             )
     gc.collect()
     gc.disable()
@@ -153,6 +154,7 @@ def measure(
                 *(problem, planner, assist, max(k, 1), memory, MEASURING),
                 strategy=strategy,
                 workspace=workspace,
+                polished=False,
             )
             rows[each].append(made)
     gc.enable()

@@ -94,7 +94,12 @@ def report_solve(table: Table, name: str, memory: Memory, problems: Sequence[Pro
     def calls(some: Sequence[Problem]) -> list[list[Callable[[], Any]]]:
         return [
             [
-                partial(solve, *(each, "gust", "closed", 5, memory), strategy=strategy, workspace=workspace)
+                partial(
+                    *(solve, each, "gust", "closed", 5, memory),
+                    strategy=strategy,
+                    workspace=workspace,
+                    polished=False,
+                )
                 for each in some
             ]
             for strategy in STRATEGIES

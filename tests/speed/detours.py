@@ -10,6 +10,7 @@ are searched anew. Intervals are of 95 %. Planning time is not counted.
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from typing import Final
 from unittest import mock
 
@@ -57,7 +58,8 @@ def report(console: Console, name: str, candidates: int, problems: list[Problem]
 
     def driving(planner: str, memory: Memory | None = None) -> tuple[Floats, Floats]:
         assist = "none" if memory is None else "closed"
-        made = [solve(problem, planner, assist, 5, memory, workspace=workspace) for problem in problems]
+        first = partial(solve, workspace=workspace, polished=False)
+        made = [first(problem, planner, assist, 5, memory) for problem in problems]
         return (
             np.array([np.nan if each.duration_s is None else each.duration_s for each in made]),
             np.array([each.source == "recalled" for each in made], float),

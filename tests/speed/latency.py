@@ -99,7 +99,8 @@ def _plan(table: Table, name: str, memory: Memory, problems: list[Problem]) -> N
     for number, problem in enumerate(problems):
         first = number % len(ASSISTS)
         for assist in ASSISTS[first:] + ASSISTS[:first]:
-            made = solve(problem, PLANNER, assist, TOP_K, memory, MEASURING, workspace=WORKSPACE)
+            asked = problem, PLANNER, assist, TOP_K, memory, MEASURING
+            made = solve(*asked, workspace=WORKSPACE, polished=False)
             seconds[assist].append(made.planning_seconds)
     alone = np.mean(seconds["none"])
     for assist, each in seconds.items():

@@ -46,7 +46,8 @@ def collected_plans(source: ProblemClass, count: int, folder: Path) -> StoredPla
     for _ in track(range(count), description=f"{count:,} plans", transient=True):
         plan = None
         while plan is None:
-            plan = solve(source.draw(COLLECTING, index), "follow", seed=COLLECTING).plan
+            asked = source.draw(COLLECTING, index)
+            plan = solve(asked, "follow", seed=COLLECTING, polished=False).plan
             index += 1
         plans.append(plan)
     stored = store_plans(plans, state_size(CAR))

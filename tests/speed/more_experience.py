@@ -120,6 +120,7 @@ def side_by_side(
             *(problem, planner, assist, TOP_K if known else 0, known, SEED),
             strategy=recall,
             workspace=workspace,
+            polished=False,
         )
 
     compile_assists(next(iter(memories.values())).vehicle)

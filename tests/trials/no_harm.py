@@ -81,7 +81,7 @@ def memory_of(world: str, folder: Path) -> Memory:
     """A memory of the lattice's polished plans, curated; it ranks by chance where an encoder is asked."""
     workspace, solved = Workspace(), []
     for problem in problems_of(world, "train", COLLECTED, folder):
-        found = solve(problem, "lattice", seed=SEED, workspace=workspace).plan
+        found = solve(problem, "lattice", seed=SEED, workspace=workspace, polished=False).plan
         if found is not None:
             scene = scene_of(problem)
             plan = polish(problem, found, CAR, scene, workspace, margin_m=VARIANTS[0].margin_m).plan
@@ -100,7 +100,7 @@ def attempts_of(
     def attempt(problem: Problem, way: Way) -> Attempt:
         strategy = RANKED.get(way.memory)
         asked = (problem, planner, way.assist, TOP_K, memories.get(way.memory), SEED)
-        return solve(*asked, strategy=strategy, workspace=workspace)
+        return solve(*asked, strategy=strategy, workspace=workspace, polished=False)
 
     for context in (early_help(), nullcontext()):  # so that what is rarely needed is compiled and loaded, too
         with context:

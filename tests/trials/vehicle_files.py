@@ -46,7 +46,9 @@ def from_scratch(vehicle: Vehicle) -> list[str]:
             drawn = problem_class(name, vehicle=vehicle)
             for index in range(COUNT):
                 problem = drawn.draw(7, index)
-                attempt = solve(problem, planner, vehicle=vehicle, seed=1, workspace=workspace)
+                attempt = solve(
+                    problem, planner, vehicle=vehicle, seed=1, workspace=workspace, polished=False
+                )
                 if attempt.plan is not None:
                     solved += 1
                     refused += bool(faults(problem, attempt.plan, vehicle))

@@ -99,8 +99,11 @@ def attempt_rows(memory: Memory, problems: Sequence[Problem]) -> list[dict[str, 
         for planner in ("rrt", "gust"):
             for assist, top_k, recall in WAYS:
                 known = None if assist == "none" else memory
-                attempt = solve(problem, planner, assist, max(top_k, 1), known, seed=1, strategy=recall)
-                fields = {name: value for name, value in vars(attempt).items() if name != "plan"}
+                attempt = solve(
+                    problem, planner, assist, max(top_k, 1), known, 1, strategy=recall, polished=False
+                )
+                left_out = ("plan", "helped")
+                fields = {name: value for name, value in vars(attempt).items() if name not in left_out}
                 where = {
                     "memory": known and CLASS,
                     "run_id": None,

@@ -71,7 +71,10 @@ def methods(memory: Memory | None, vehicle: Vehicle, seed: int) -> Iterator[Meth
     def one_shot(planner: str, assist: str, top_k: int = 0) -> Callable[[Problem, float], Found]:
         def attempt(problem: Problem, _: float) -> Found:
             made = solve(
-                *(problem, planner, assist, top_k, memory, seed), vehicle=vehicle, workspace=workspace
+                *(problem, planner, assist, top_k, memory, seed),
+                vehicle=vehicle,
+                workspace=workspace,
+                polished=False,
             )
             spent = made.planning_seconds
             if made.plan is None:

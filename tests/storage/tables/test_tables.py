@@ -209,7 +209,7 @@ def test_attempts_of_a_folder_come_back_in_the_order_of_their_files(tmp_path: Pa
     write_attempts(tmp_path / "curves" / "0000.parquet", [ATTEMPT, {**ATTEMPT, "verified": True}])
     (tmp_path / "curves" / ".0002.parquet.abc.partial").write_text("half")
     frame = read_attempts(tmp_path)
-    added = ["scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall"]
+    added = ["scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall", "hit"]
     assert list(frame.columns) == [*ATTEMPT, *added]
     assert frame["solved"].tolist() == [True, True, False]
     assert frame["recalled"][0].tolist() == [3, 1, 2]

@@ -44,8 +44,9 @@ def memory() -> Memory:
 @pytest.mark.parametrize("problem", [problem_of([]), WALL, strewn(40, 30)], ids=["empty", "wall", "strewn"])
 @pytest.mark.parametrize("assist", ["open", "repair"])
 def test_it_says_what_collides_where_and_what_was_used(memory: Memory, problem: Problem, assist: str) -> None:
-    attempt = solve(problem, "gust", assist, 4, memory)
+    attempt = solve(problem, "gust", assist, 4, memory, polished=False)
     helped = work_of(attempt.collision_checks, attempt.expansions) >= PATIENCE
+    assert attempt.helped == helped
     looked_at = recollections(problem, attempt, memory)
     assert [each.plan for each in looked_at] == list(attempt.recalled)
     scene, bits = scene_of(problem), drawing_of(problem).occupied.copy()
@@ -62,6 +63,11 @@ def test_it_says_what_collides_where_and_what_was_used(memory: Memory, problem: 
     if attempt.source == "recalled":
         answer = next(each for each in looked_at if each.use == "answer")
         np.testing.assert_array_equal(attempt.plan.states, memory.plans[answer.plan].states)
+        polished = solve(problem, "gust", assist, 4, memory)
+        uses = {each.use: each.plan for each in recollections(problem, polished, memory) if each.use}
+        if polished.source == "recalled":
+            as_it_is = polished.duration_s == attempt.duration_s
+            assert uses == {"answer" if as_it_is else "polished": answer.plan}
 
 
 def test_the_command_tells_and_draws_it(

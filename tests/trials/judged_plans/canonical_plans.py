@@ -22,7 +22,7 @@ from planners.world.vehicles.vehicle import VEHICLES
 from planners.world.workspace import Workspace
 from tests.planners.early_help import early_help
 from tests.planners.memories import memory_of
-from tests.trials.judged_plans.made import Made
+from tests.trials.judged_plans.made import POLISHED, Made
 
 EXPERIENCES: Final = 100  # problems that a memory is made of
 LIMITS: Final = Limits(expansions=2_000)  # what takes longer to solve gives too few plans
@@ -62,7 +62,8 @@ def attempts(seed: int, index: int) -> Iterator[Made]:
     for planner, assist, each in product(PLANNERS, ASSISTS, range(SEEDS)):
         given = None if assist in WITHOUT_MEMORY else known
         with early_help() if each else nullcontext():
-            attempt = solve(problem, planner, assist, TOP_K, given, each, LIMITS, vehicle)
+            asked = problem, planner, assist, TOP_K, given, each, LIMITS, vehicle
+            attempt = solve(*asked, polished=(index + each) % POLISHED == 0)
         yield Made(problem, vehicle, asked, attempt.source or "", attempt)
         if each == 0 and (planner, assist) == IMPROVED[index // len(KINDS) % len(IMPROVED)]:
             better = improved(attempt, problem, IMPROVE_SECONDS, vehicle)
@@ -74,7 +75,8 @@ def polished(seed: int, index: int) -> Iterator[Made]:
     problem, name = drawn(seed, index)
     vehicle, margin, workspace = VEHICLES[name], MARGINS_M[index % len(MARGINS_M)], Workspace()
     for planner in PLANNERS:
-        attempt = solve(problem, planner, "none", 0, None, 0, LIMITS, vehicle, workspace=workspace)
+        asked = problem, planner, "none", 0, None, 0, LIMITS, vehicle
+        attempt = solve(*asked, workspace=workspace, polished=False)
         if attempt.plan is not None:
             scene = scene_of(problem)
             better = polish(problem, attempt.plan, vehicle, scene, workspace, margin_m=margin).plan

@@ -20,7 +20,7 @@ from planners.world.vehicles.vehicle import Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from tests.trials.judged_plans.fleet import FLEET
 from tests.trials.judged_plans.hard_questions import kind_of, question_of
-from tests.trials.judged_plans.made import Made
+from tests.trials.judged_plans.made import POLISHED, Made
 
 LIMITS: Final = Limits(expansions=500)  # what takes longer to solve gives too few plans
 STORED: Final = 60  # plans of a library
@@ -82,7 +82,7 @@ def attempts(seed: int, index: int) -> Iterator[Made]:
             attempt = solve(
                 *(canonical, planner, assist, 1, given, each, LIMITS, vehicle),
                 workspace=WORKSPACE,
-                polished=False,
+                polished=(question + number + each) % POLISHED == 0,
             )
             yield made(asked, vehicle, kind, attempt.source or "", attempt, alignment)
             if attempt.plan is None:

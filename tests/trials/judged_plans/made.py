@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from planners.attempt import Attempt
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
+
+POLISHED: Final = 3  # one attempt in so many is polished, as users get it
 
 
 class Made(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from dataclasses import replace
@@ -40,6 +41,7 @@ from planners.world.vehicles.vehicle import CAR, state_size
 from planners.world.view import View
 from tests.worlds import problem_of
 
+first = functools.partial(solve, polished=False)  # the plan as it is found
 ORIGIN = np.array([20.0, 25.0])
 
 
@@ -151,7 +153,7 @@ def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time()
     asked = to_canonical(asked)[0]
     durations: list[float] = []
     for each in (asked, mirrored(asked)):
-        answer = solve(each, "gust", "closed", memory=library)  # for GUST no free plan is a detour
+        answer = first(each, "gust", "closed", memory=library)  # for GUST no free plan is a detour
         assert answer.source == "recalled"
         assert answer.duration_s is not None
         assert 5.0 < answer.duration_s < 6.01  # a later part of the plan may begin better
@@ -172,9 +174,9 @@ def test_a_full_turn_to_a_place_beside_the_vehicle_is_not_too_long(ahead: float)
         goal_radius=0.3,
     )
     asked = to_canonical(asked)[0]
-    found = solve(asked, "lattice").plan
+    found = first(asked, "lattice").plan
     assert found is not None
-    answer = solve(asked, "gust", "closed", memory=gathered_library("one", CAR, [("one", found)]))
+    answer = first(asked, "gust", "closed", memory=gathered_library("one", CAR, [("one", found)]))
     assert answer.source == "recalled"
     assert answer.plan is not None
     assert answer.plan.duration_s == pytest.approx(found.duration_s, abs=0.3)
@@ -224,7 +226,7 @@ def test_around_a_wall_sub_plans_are_joined(library: PlanLibrary) -> None:
     wall = np.array([[20.0, 14.0], [22.0, 14.0], [22.0, 36.0], [20.0, 36.0]])
     world = problem_of([wall])
     asked = replace(world, start=(12.0, 25.0, math.pi), goal=(32.0, 25.0), start_motion=(2.0, 0.0))
-    answer = solve(asked, "lattice", "closed", memory=library)
+    answer = first(asked, "lattice", "closed", memory=library)
     assert answer.plan is not None
     assert faults(asked, answer.plan, CAR) == []
     assert answer.source == "recalled"
