@@ -1,11 +1,12 @@
 """How fast the planners answer general questions, from scratch or with a library of plans, cold, on one core.
 
 ``python -m tests.speed.general_questions [--questions 200] [--poses] [--vehicle car] [--planners lattice …]
-[--memory LIBRARY] [--keep FILE] [--unpolished]``
+[--memory LIBRARY] [--keep FILE] [--unpolished | --both]``
 draws questions in the classes and, where they lie beside the repository, in windows of four city maps: start
 and goal over the free space, speeds from 0 to the largest, 2 to 70 m apart. It prints for each world and
 planner the solved share, of all and of what any planner solves, planning times and driving times. With a
 library (``motion-memory gather``) the lattice also recalls from it, and blindly; GUST has a fresh guide.
+Plans are polished; ``--unpolished`` takes them as they are found, ``--both`` both ways.
 With ``--keep`` each question is written down as soon as it is answered, and the same command goes on there.
 """
 
@@ -63,6 +64,14 @@ def questions_of(name: str, count: int, vehicle: Vehicle, pose: bool) -> Iterato
             yield to_canonical(asked)[0]
 
 
+class Way(NamedTuple):
+    """A way to answer a question."""
+
+    planner: str
+    assist: str
+    polished: bool
+
+
 class Answer(NamedTuple):
     """What came of one attempt."""
 
@@ -92,19 +101,21 @@ def read_kept(kept: Path | None, settings: str) -> Rows:
 
 def measured(
     questions: list[Problem],
-    ways: list[tuple[str, str]],
+    ways: list[Way],
     vehicle: Vehicle,
     library: PlanLibrary | None,
     done: Rows,
     kept: Path | None,
-    polished: bool = True,
 ) -> list[list[Answer]]:
-    """Answers by question, then planner and assist, cold: other data fill the caches before each attempt."""
+    """Answers by question, then way, cold: other data fill the caches before each attempt."""
     workspace, other_work = Workspace(), OtherWork()
 
-    def attempt(way: tuple[str, str], question: Problem, seed: int) -> Attempt:
+    def attempt(way: Way, question: Problem, seed: int) -> Attempt:
         return solve(
-            *(question, *way, 1, library, seed), vehicle=vehicle, workspace=workspace, polished=polished
+            *(question, way.planner, way.assist, 1, library, seed),
+            vehicle=vehicle,
+            workspace=workspace,
+            polished=way.polished,
         )
 
     for way in ways:
@@ -115,7 +126,7 @@ def measured(
             if question.id in done:
                 continue
             at = number % len(ways)
-            attempts: dict[tuple[str, str], Attempt] = {}
+            attempts: dict[Way, Attempt] = {}
             for way in ways[at:] + ways[:at]:
                 other_work()
                 attempts[way] = attempt(way, question, SEED)
@@ -137,18 +148,20 @@ def report(console: Console, asked: argparse.Namespace) -> None:
     vehicle = VEHICLES[asked.vehicle]
     kind = "poses" if asked.poses else "discs"
     table = Table(title=f"General questions, {asked.vehicle}, {kind}", title_justify="left")
-    ways = [(planner, "none") for planner in asked.planners]
-    ways += [] if asked.memory is None else WITH_MEMORY
+    pairs = [(planner, "none") for planner in asked.planners]
+    pairs += [] if asked.memory is None else WITH_MEMORY
+    both = [False, True] if asked.both else [not asked.unpolished]
+    ways = [Way(*pair, polished) for pair in pairs for polished in both]
     library = None if asked.memory is None else load_library(asked.memory, vehicle)
-    for column in ("world", "questions", "planner", "assist"):
+    for column in ("world", "questions", "planner", "assist", "plan"):
         table.add_column(column)
     for column in ("solved", "of any", "recalled", "median ms", "mean", "99 %", "driving s", "faulty"):
         table.add_column(column, justify="right")
-    settings = json.dumps([asked.vehicle, kind, ways, str(asked.memory), SEED, asked.unpolished])
+    settings = json.dumps([asked.vehicle, kind, ways, str(asked.memory), SEED])
     done = read_kept(asked.keep, settings)
     for name in asked.worlds:
         questions = list(questions_of(name, asked.questions, vehicle, asked.poses))
-        rows = measured(questions, ways, vehicle, library, done, asked.keep, not asked.unpolished)
+        rows = measured(questions, ways, vehicle, library, done, asked.keep)
         solved = np.array([[answer.solved for answer in row] for row in rows])
         anyone, everyone = solved.any(axis=1), solved.all(axis=1)
         for k, way in enumerate(ways):
@@ -156,7 +169,8 @@ def report(console: Console, asked: argparse.Namespace) -> None:
             ms = 1e3 * np.array([answer.seconds for answer in answers])[anyone]
             driving = np.array([answer.driving_s for answer in answers])[everyone]
             table.add_row(
-                *(name, str(len(questions)), *way),
+                *(name, str(len(questions)), way.planner, way.assist),
+                "polished" if way.polished else "as found",
                 *(f"{solved[:, k].mean():.1%}", f"{solved[anyone, k].mean():.1%}"),
                 f"{np.mean([answer.recalled for answer in answers]):.1%}",
                 *(f"{np.median(ms):.2f}", f"{ms.mean():.2f}", f"{np.quantile(ms, 0.99):.1f}"),
@@ -167,7 +181,7 @@ def report(console: Console, asked: argparse.Namespace) -> None:
                 failed = [
                     q.id for q, any_, own in zip(questions, anyone, solved[:, k], strict=True) if any_ > own
                 ]
-                console.print(name, *way, failed[:20])
+                console.print(name, way, failed[:20])
         table.add_section()
     console.print(table)
 
@@ -180,7 +194,9 @@ def main() -> None:
     parser.add_argument("--vehicle", choices=VEHICLES, default="car")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=list(PLANNERS))
     parser.add_argument("--memory", type=Path, help="a library")
-    parser.add_argument("--unpolished", action="store_true", help="plans to poses as they were found first")
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--unpolished", action="store_true", help="plans as they are found")
+    how.add_argument("--both", action="store_true", help="plans as they are found, and polished ones")
     parser.add_argument("--keep", type=Path, help="a file of the answers so far, from which to go on")
     parser.add_argument("--worlds", nargs="+", choices=WORLDS, default=list(WORLDS))
     parser.add_argument("--failures", action="store_true", help="name questions that only others solve")

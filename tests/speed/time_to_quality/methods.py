@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from time import perf_counter
 from typing import Final, NamedTuple
 
 from dashboards.cells import planner_title
 from planners.memory.memory import Memory
-from planners.optimisation.polish import polish
 from planners.search.anytime import improve
 from planners.search.registry import PLANNERS
 from planners.solve import solve
-from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
@@ -21,13 +18,13 @@ ALONE: Final = "alone"
 FRESH: Final = "fresh guide"
 ANYTIME: Final = "anytime"
 FRESH_ANYTIME: Final = "fresh guide, anytime"
-OPTIMISED: Final = "optimised"
+POLISHED: Final = "polished"
 PEER: Final = "OMPL"
 MEMORY: Final = "memory"
 MEMORY_ANYTIME: Final = "memory, anytime"
 MEMORY_POLISHED: Final = "memory, polished"
 KINDS: Final = (
-    ALONE, FRESH, ANYTIME, FRESH_ANYTIME, OPTIMISED, PEER, MEMORY, MEMORY_ANYTIME, MEMORY_POLISHED,
+    ALONE, FRESH, ANYTIME, FRESH_ANYTIME, POLISHED, PEER, MEMORY, MEMORY_ANYTIME, MEMORY_POLISHED,
 )  # fmt: skip
 WITH_MEMORY: Final = (MEMORY, MEMORY_ANYTIME, MEMORY_POLISHED)
 GUIDED: Final = "gust"  # goes on from a fresh guide, at which the lattice does not look
@@ -68,13 +65,15 @@ def methods(memory: Memory | None, vehicle: Vehicle, seed: int) -> Iterator[Meth
     """
     workspace = Workspace()
 
-    def one_shot(planner: str, assist: str, top_k: int = 0) -> Callable[[Problem, float], Found]:
+    def one_shot(
+        planner: str, assist: str, top_k: int = 0, polished: bool = False
+    ) -> Callable[[Problem, float], Found]:
         def attempt(problem: Problem, _: float) -> Found:
             made = solve(
                 *(problem, planner, assist, top_k, memory, seed),
                 vehicle=vehicle,
                 workspace=workspace,
-                polished=False,
+                polished=polished,
             )
             spent = made.planning_seconds
             if made.plan is None:
@@ -107,29 +106,16 @@ def methods(memory: Memory | None, vehicle: Vehicle, seed: int) -> Iterator[Meth
 
         return attempt
 
-    def polished(first: Callable[[Problem, float], Found]) -> Callable[[Problem, float], Found]:
-        def attempt(problem: Problem, seconds: float) -> Found:
-            begun = first(problem, seconds)
-            if begun.plan is None:
-                return begun
-            began = perf_counter()
-            better = polish(problem, begun.plan, vehicle, scene_of(problem), workspace).plan
-            spent = begun.spent + perf_counter() - began
-            if better is None or better.duration_s >= begun.plan.duration_s:
-                return begun._replace(spent=spent)
-            return Found((*begun.seconds, spent), (*begun.durations, better.duration_s), spent, better)
-
-        return attempt
-
     for planner in PLANNERS:
         yield Method(ALONE, planner, one_shot(planner, "none"))
         yield Method(FRESH, planner, one_shot(planner, "fresh"))
         yield Method(ANYTIME, planner, going_on(planner))
     yield Method(FRESH_ANYTIME, GUIDED, going_on(GUIDED, one_shot(GUIDED, "fresh")))
     for planner in PLANNERS:
-        yield Method(OPTIMISED, planner, polished(one_shot(planner, "fresh")))
+        yield Method(POLISHED, planner, one_shot(planner, "fresh", polished=True))
     for planner in RECALLING if memory is not None else ():
         recalling = one_shot(planner, "repair", TOP_K)
+        answering = one_shot(planner, "repair", TOP_K, polished=True)
         yield Method(MEMORY, planner, recalling)
         yield Method(MEMORY_ANYTIME, planner, going_on(planner, recalling))
-        yield Method(MEMORY_POLISHED, planner, polished(recalling))
+        yield Method(MEMORY_POLISHED, planner, answering)
