@@ -8,6 +8,7 @@ kind, and a search looks for others.
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ from planners.world.view import View
 FAR: Final = 1.5
 FAR_IF_TIGHT: Final = 3.0
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
+# The longer it takes, the more others may gain: of so many square seconds it takes, as many pairs are tried.
+SQUARE_SECONDS: Final = 100.0
 # A drive may not be the best if it takes longer than both of these allow.
 LONG: Final = 1.5  # times what it would take without obstacles
 UNUSUAL: Final = 1.3  # times what the quickest of the stored drives takes that begin nearest
@@ -88,6 +91,8 @@ def drive_answer(
 ) -> DriveAnswer:
     """Move stored drives to a question for a pose at rest, two at a time, until one becomes a plan.
 
+    Where that takes long to drive, some more are tried for a quicker one.
+
     Args:
         library: of the vehicle's plans.
         view: the question.
@@ -113,13 +118,17 @@ def drive_answer(
             break
         entries = [int(entry) for entry in order[k : min(k + AT_ONCE, count)]]
         guesses = [moved_drive(drives, entry, start, goal, vehicle.dt) for entry in entries]
-        chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, until)
+        ends = until, math.inf if found.plan is None else found.plan.duration_s
+        chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, *ends)
         if polished.plan is not None:
             entry = entries[chosen]
             number = int(drives.plans[max(entry, -1 - entry)])
-            without = _seconds_without_obstacles(start, goal, vehicle)
-            is_long = polished.plan.duration_s > max(LONG * without, UNUSUAL * quickest * vehicle.dt)
-            found = found._replace(plan=polished.plan, number=number, entry=entry, is_long=is_long)
+            found = found._replace(plan=polished.plan, number=number, entry=entry)
+        if found.plan is not None and found.plan.duration_s**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
             break
+    if found.plan is not None:
+        without = _seconds_without_obstacles(start, goal, vehicle)
+        usual = max(LONG * without, UNUSUAL * quickest * vehicle.dt)
+        found = found._replace(is_long=found.plan.duration_s > usual)
     view.lap("repair")
     return found

@@ -94,7 +94,7 @@ def polish_quickest(
     most = most_iterations(problem) if iterations is None else iterations
     around = vehicle, scene, workspace
     until = working_clock() + seconds
-    below = NEVER if math.isinf(below_s) else round(below_s / vehicle.dt)
+    below = _steps_below(below_s, vehicle)
     number, best, was_pressed = _polished_once(problem, plans, *around, most, margin_m, until, below)
     left = most
     while was_pressed and best.plan is not None and left > 0 and working_clock() < until:
@@ -172,6 +172,7 @@ def polish_guesses(
     scene: Scene,
     workspace: Workspace,
     until: float,
+    below_s: float = math.inf,
 ) -> tuple[int, Polished]:
     """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
 
@@ -182,6 +183,7 @@ def polish_guesses(
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
         until: when to end, by ``working_clock``.
+        below_s: only a drive that takes less time is wanted.
 
     Returns:
         The number of the guess, and the free drive near it that arrives as asked; or no plan.
@@ -190,7 +192,7 @@ def polish_guesses(
     interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
     around = goal, vehicle, scene, barrier
-    most = GUESS_ITERATIONS, until, NEVER
+    most = GUESS_ITERATIONS, until, _steps_below(below_s, vehicle)
     number, plan, used = quickest(guesses, model, interior, *around, *most, is_near=True)
     return number, Polished(plan, used)
 
@@ -235,6 +237,10 @@ def driven_near(
 def most_iterations(problem: Problem) -> int:
     """As many iterations as are of use for a problem."""
     return ITERATIONS if problem.arrival is None else ARRIVING_ITERATIONS
+
+
+def _steps_below(seconds: float, vehicle: Vehicle) -> int:
+    return NEVER if math.isinf(seconds) else round(seconds / vehicle.dt)
 
 
 def _ready(problem: Problem, steps: int, vehicle: Vehicle, workspace: Workspace) -> tuple[Model, Floats]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +17,9 @@ from planners.explanation import drive_found
 from planners.memory.library.drives import placed_drive
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory_answers import MemoryAnswer
+from planners.optimisation.polish import Polished, polish_guesses
 from planners.ranked_plans import ranked_plans
+from planners.search.free_goal import aimed_view
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.solve import solve
@@ -23,7 +28,7 @@ from planners.world.authority.authority import faults
 from planners.world.classes.families import family
 from planners.world.compiling import working_clock
 from planners.world.goal import HEADING, X, Y, goal_of
-from planners.world.problem import Problem
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, Vehicle
 from planners.world.workspace import Workspace
@@ -89,6 +94,31 @@ def test_if_a_drive_is_long_the_answer_is_never_longer_than_without_a_memory(
         assert both.recall != DRIVES or both.duration_s <= alone.duration_s
         moved += both.recall == DRIVES
     assert moved >= 6
+
+
+def test_the_longer_a_drive_takes_the_more_others_are_tried_and_the_quickest_is_kept(
+    slots: PlanLibrary, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pairs: list[int] = []
+
+    def counted(problem: Problem, guesses: Sequence[Plan], *around: Any) -> tuple[int, Polished]:
+        pairs[-1] += 1
+        return polish_guesses(problem, guesses, *around)
+
+    monkeypatch.setattr(drive_answers, "polish_guesses", counted)
+    for number in range(6):
+        view = aimed_view(drawn("parallel", "hard", 10, number), CAR, WORKSPACE)
+        seconds: list[float] = []
+        for square_seconds in (math.inf, 20.0, 0.0):
+            pairs.append(0)
+            monkeypatch.setattr(drive_answers, "SQUARE_SECONDS", square_seconds)
+            found = drive_answers.drive_answer(slots, view, CAR, math.inf)
+            seconds.append(math.inf if found.plan is None else found.plan.duration_s)
+            assert found.plan is None or faults(view.problem, found.plan) == []
+            worth = seconds[-1] ** 2 / square_seconds if square_seconds else math.inf
+            assert pairs[-1] >= min(worth, 4)
+        assert seconds == sorted(seconds, reverse=True)
+        assert pairs[-1] == 4
 
 
 @pytest.mark.parametrize("motion", [(0.8, 0.1), (-0.5, -0.2)])
