@@ -54,7 +54,7 @@ class Tally(NamedTuple):
     outcomes: Counter[str]  # problems by the source of their plan, or by the status of a failure, in brackets
     seconds: Floats  # [n] planning times
     driving: Floats  # [n] driving times, NaN where no plan was found
-    hits: int  # problems that recalled plans answer as they are
+    hits: int | None  # problems that recalled plans answer as they are; None: no memory
 
 
 class SolvedMany(NamedTuple):
@@ -193,15 +193,17 @@ def _tally(tables: Iterable[dict[str, list[Any]]]) -> Tally:
     """Count over tables with the columns ``TALLIED``."""
     outcomes: Counter[str] = Counter()
     seconds, driving = [], []
-    hits = 0
+    hits, asked = 0, 0  # of a memory
     for rows in tables:
         outcomes.update(
             source or f"({status})" for source, status in zip(rows["source"], rows["status"], strict=True)
         )
         seconds.append(np.array(rows["planning_seconds"]))
         driving.append(np.array(rows["duration_s"], float))
-        hits += sum(map(bool, rows["hit"]))
-    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving), hits)
+        answers = [hit for hit in rows["hit"] if hit is not None]
+        hits += sum(answers)
+        asked += len(answers)
+    return Tally(outcomes, np.concatenate(seconds), np.concatenate(driving), hits if asked else None)
 
 
 def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
@@ -222,7 +224,7 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally
 
     columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
-    now = usefulness_of(tally.hits, tally.seconds, tally.driving)
+    now = usefulness_of(tally.hits or 0, tally.seconds, tally.driving)
     return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)
 
 

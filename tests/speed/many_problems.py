@@ -60,7 +60,7 @@ def main() -> None:
     out.unlink(missing_ok=True)
     remove_folder(out.with_name(f"{out.name}.parts"))
     command = [sys.executable, "-m", "flows.cli.main", "solve", str(problems), "--planner", "gust"]
-    command += ["--assist", "open", "--memory", str(memory), "--out", str(out)]
+    command += ["--assist", "open", "--memory", str(memory), "--unpolished", "--out", str(out)]
     command += ["--workers", str(asked.workers)]
     finished: dict[Path, int] = {}
     twice: set[Path] = set()

@@ -100,8 +100,16 @@ def test_its_memories_measured_in_turn_do_not_differ_from_themselves(run: RunFol
 
 def test_its_memory_solves_problems_of_ones_own(run: RunFolder, problems: Path, tmp_path: Path) -> None:
     settings = AssistantSettings(PLANNER, "open", 3, str(run.path), 1, "car-1-trailer")
-    solve_many(settings, problems, tmp_path / "rows.parquet", tmp_path / "plans")
-    assert read_attempts(tmp_path / "rows.parquet")["solved"].all()
+    solved = solve_many(settings, problems, tmp_path / "rows.parquet", tmp_path / "plans")
+    rows = read_attempts(tmp_path / "rows.parquet")
+    assert rows["solved"].all()
+    assert solved.tally.hits == rows["hit"].sum()
+    found = solve_many(settings._replace(polished=False), problems, tmp_path / "first.parquet")
+    first = read_attempts(tmp_path / "first.parquet")
+    assert found.tally.hits == first["hit"].sum() == solved.tally.hits
+    assert (rows["duration_s"] <= first["duration_s"]).all()
+    alone = solve_many(settings._replace(memory=None, assist="none"), problems, tmp_path / "alone.parquet")
+    assert alone.tally.hits is None
     for path in (tmp_path / "plans").iterdir():
         plan = read_plan(path, CAR_1_TRAILER).plan
         assert plan is not None
