@@ -54,7 +54,7 @@ class Memory:
     strategy: str  # of recall
     seed: int
     judged: bool
-    polished: bool = True
+    polished: bool = True  # False: plans as they are found
     _idle: list[Workspace] = field(default_factory=list)  # not lent to a thread
 
     def __len__(self) -> int:

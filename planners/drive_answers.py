@@ -33,7 +33,7 @@ from planners.world.view import View
 FAR: Final = 1.5
 FAR_IF_TIGHT: Final = 3.0
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
-# The longer it takes, the more others may gain: of so many square seconds it takes, as many pairs are tried.
+# The longer a drive takes, the more others may gain: a pair is tried for each so many square seconds of it.
 SQUARE_SECONDS: Final = 100.0
 # A drive may not be the best if it takes longer than both of these allow.
 LONG: Final = 1.5  # times what it would take without obstacles

@@ -123,7 +123,8 @@ def report_solve(table: Table, name: str, memory: Memory, problems: Sequence[Pro
 
 def report_robot(table: Table, name: str, memory: Memory, problems: Sequence[Problem]) -> None:
     """Add a row for each way to hand in a problem."""
-    planner = motion_memory.Memory(memory, "gust", "repair", 5, default_recall(memory), 1, judged=False)
+    settings = "gust", "repair", 5, default_recall(memory), 1
+    planner = motion_memory.Memory(memory, *settings, judged=False, polished=False)
 
     def calls(some: Sequence[Problem]) -> dict[str, list[Callable[[], Any]]]:
         texts = [json.dumps(fields_of(each)) for each in some]

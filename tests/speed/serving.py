@@ -158,7 +158,7 @@ def _nonsense(address: str, process: psutil.Popen, requests: int) -> tuple[list[
 
 
 def _robot(memory: Path, problems: list[dict[str, object]], judged: bool) -> list[float]:
-    planner = load(memory, judged=judged)
+    planner = load(memory, judged=judged, polished=False)
     texts = [json.dumps(problem) for problem in problems]
     gc.collect()
     gc.disable()
