@@ -31,9 +31,10 @@ from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.problem import Problem
-from planners.world.vehicles.vehicle import VEHICLES, Vehicle
+from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.archives.libraries import load_library
+from storage.vehicles.vehicle_files import said_vehicle
 from storage.worlds.importing import ImportSettings, import_part
 from storage.worlds.sources import source_at
 from tasks.attempts.timing import OtherWork, no_garbage_collection
@@ -145,7 +146,7 @@ def measured(
 
 def report(console: Console, asked: argparse.Namespace) -> None:
     """Measure and print."""
-    vehicle = VEHICLES[asked.vehicle]
+    vehicle = said_vehicle(asked.vehicle)
     kind = "poses" if asked.poses else "discs"
     table = Table(title=f"General questions, {asked.vehicle}, {kind}", title_justify="left")
     pairs = [(planner, "none") for planner in asked.planners]
@@ -191,7 +192,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--questions", type=int, default=200, help="a world")
     parser.add_argument("--poses", action="store_true", help="goal poses at rest instead of discs")
-    parser.add_argument("--vehicle", choices=VEHICLES, default="car")
+    parser.add_argument("--vehicle", default="car", help="its name, or its .yaml file")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=list(PLANNERS))
     parser.add_argument("--memory", type=Path, help="a library")
     how = parser.add_mutually_exclusive_group()
