@@ -9,7 +9,7 @@ import numpy as np
 
 from dashboards.cells import NOTHING, Rows, markdown_table
 from planners.world.arrays import Floats
-from tests.speed.time_to_quality.methods import MEMORY
+from tests.speed.time_to_quality.methods import MEMORY_ANYTIME
 from tests.speed.time_to_quality.quality import (
     BUDGETS,
     GOOD,
@@ -25,7 +25,7 @@ from tests.speed.time_to_quality.quality import (
 TOTAL_HEADINGS: Final = (
     "class", "memory", "budget", "total s", "best without", "its total s", "later by s [95 %]", "later",
 )  # fmt: skip
-POLISHED_FOR: Final = (1e-3, 3e-3, 1e-2, 3e-2)  # seconds: the budgets of a memory that goes on
+GOES_ON_FOR: Final = (1e-3, 3e-3, 1e-2, 3e-2)  # seconds: the budgets of a memory that goes on
 
 
 def milliseconds(seconds: float) -> str:
@@ -106,8 +106,8 @@ def total_rows(class_name: str, quality: Quality) -> Iterator[list[str]]:
     means = without.mean(axis=0)
     best = int(means.argmin())
     for way in np.flatnonzero(quality.with_memory):
-        one_shot = quality.kinds[way] == MEMORY
-        for budget in BUDGETS[-1:] if one_shot else POLISHED_FOR:
+        one_shot = quality.kinds[way] != MEMORY_ANYTIME
+        for budget in BUDGETS[-1:] if one_shot else GOES_ON_FOR:
             mine = totals[:, way, BUDGETS.index(budget)]
             later, low, high = means_of(without - mine[:, None])
             yield [
