@@ -68,7 +68,7 @@ def answer_from(
         strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
         vehicle: what is driven.
         assist: one with a memory, as ``solve`` takes it.
-        polished: whether the plan is polished anyway, and need not be a detour for that.
+        polished: whether the planner searches beside the plan anyway, whether or not it seems a detour.
         until: when to end moving whole drives to the problem, by ``working_clock``.
     """
     problem = view.problem

@@ -22,6 +22,7 @@ from planners.memory.library.recalling import (
     allocate_recalling,
     recall_one,
 )
+from planners.optimisation.descent import steps_to_goal
 from planners.search.connection.candidates import list_connections, next_word
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
@@ -57,6 +58,9 @@ class SubPlanAnswer(NamedTuple):
     recalled: bool  # whether most of the plan was stored, and not driven by primitives or a connection
     checks: int  # collision checks that this took
     knows_way: bool  # whether the workspace holds the distances to the goal now
+
+
+NOTHING: Final = SubPlanAnswer(None, 0.0, False, 0, False)
 
 
 @lean
@@ -140,6 +144,8 @@ def sub_plan_answer(
     r.states[0] = start
     r.work.fill(0)
     goal = goal_of(problem, vehicle)
+    if steps_to_goal(start[np.newaxis], 0, goal, vehicle) == 0:
+        return NOTHING  # nothing has to be driven
     exact = asks_for_more(goal)
     near = place(*problem.goal, max(NEAR_M, problem.goal_radius)) if exact else goal
     offset = 0 if blindly is None else int(blindly.integers(1, len(subs.begins)))

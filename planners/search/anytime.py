@@ -36,10 +36,9 @@ FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer b
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
 SHORTER = 0.9  # of the driving time of the quickest so far: so long may the next one take ...
-AGAIN = 1000  # ... and so many expansions its search
-ROUGH = 1.1  # of the driving time of a given plan: so long may one take that is quicker once it is polished
-BESIDE = 4000  # expansions of the search beside a plan that is given, where it is narrow
-POLISHED = 2  # of the last plans: which of them is quickest when polished cannot be told before
+AGAIN = 1000  # ... and so many expansions its search, and the first one beside a plan that is given, ...
+BESIDE = 4000  # ... or so many where it is narrow
+POLISHED = 2  # of the shortest plans: which of them is quickest when polished cannot be told before
 
 
 class Improvement(NamedTuple):
@@ -161,7 +160,7 @@ def search_and_polish(
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon. A given plan may
-    be of a worse kind than what the planner finds, so that searches at least once.
+    be of a worse kind than what the planner finds, so it searches as if there were none, but not for long.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -186,29 +185,30 @@ def search_and_polish(
     if math.isfinite(below_s):
         worth = int(PER_SQUARE_SECOND * below_s * below_s)
         query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))
-    found = [] if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0)]
-    if given is None:
-        found.append(PLANNERS[planner](query))
-    elif varies:
-        limits = replace(query.limits, expansions=min(BESIDE, query.limits.expansions))
-        found.append(PLANNERS[planner](replace(query, limits=limits)))
-    plan = None if varies else found[0].plan
-    shortest_s = math.inf if plan is None else plan.duration_s
-    share = SHORTER if given is None else ROUGH
+    most = query.limits.expansions
+    if given is not None:
+        most = min(BESIDE if varies else AGAIN, most)
+    found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
+    if given is not None:
+        found.insert(0, Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0))
+    plan = None if varies else found[-1].plan
+    shortest_s = min((each.plan.duration_s for each in found if each.plan is not None), default=0.0)
+    searches = 1
     while plan is not None and shortest_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
             expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
             seconds=until - working_clock(),
-            bound_s=min(share * shortest_s, query.limits.bound_s),
+            bound_s=min(SHORTER * shortest_s, query.limits.bound_s),
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
             break
-        rng = generator(seed, "again", query.problem.id, planner, len(found))
+        rng = generator(seed, "again", query.problem.id, planner, searches)
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
-        plan, share = found[-1].plan, SHORTER
-        shortest_s = min(shortest_s, math.inf if plan is None else plan.duration_s)
-    solved = [(each, each.plan) for each in found if each.plan is not None][-POLISHED:]
+        plan, searches = found[-1].plan, searches + 1
+        shortest_s = shortest_s if plan is None else plan.duration_s
+    solved = [(each, each.plan) for each in found if each.plan is not None]
+    solved = sorted(solved, key=lambda each: each[1].duration_s)[:POLISHED]
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
         return found[0], None

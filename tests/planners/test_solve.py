@@ -280,6 +280,19 @@ def test_an_answer_is_polished_and_takes_no_longer_than_the_first_plan_or_a_reca
         assert faults(problem, attempt.plan) == []
 
 
+@given(st.sampled_from(["gust", "lattice"]), st.integers(0, 10**6), st.integers(0, 30))
+@settings(max_examples=25, deadline=None)
+def test_with_a_memory_an_answer_takes_no_longer_than_the_plan_that_is_soon_found_without(
+    planner, seed, boxes
+):
+    """The plans of the memory are Follow's, as they were found."""
+    problem = strewn(seed, boxes)
+    alone = first(problem, planner)
+    attempt = solve(problem, planner, "closed", 5, shared_memory())
+    if alone.solved and alone.expansions <= anytime.AGAIN:
+        assert attempt.duration_s <= alone.duration_s
+
+
 def test_a_recalled_plan_of_a_worse_kind_is_not_what_is_polished():
     """The free plan leads around a wall that is not there."""
     around = plan("follow", blocked_everywhere(), generator(0)).plan

@@ -62,8 +62,8 @@ def attempts(seed: int, index: int) -> Iterator[Made]:
     for planner, assist, each in product(PLANNERS, ASSISTS, range(SEEDS)):
         given = None if assist in WITHOUT_MEMORY else known
         with early_help() if each else nullcontext():
-            asked = problem, planner, assist, TOP_K, given, each, LIMITS, vehicle
-            attempt = solve(*asked, polished=(index + each) % POLISHED == 0)
+            query = problem, planner, assist, TOP_K, given, each, LIMITS, vehicle
+            attempt = solve(*query, polished=(index + each) % POLISHED == 0)
         yield Made(problem, vehicle, asked, attempt.source or "", attempt)
         if each == 0 and (planner, assist) == IMPROVED[index // len(KINDS) % len(IMPROVED)]:
             better = improved(attempt, problem, IMPROVE_SECONDS, vehicle)
@@ -75,8 +75,8 @@ def polished(seed: int, index: int) -> Iterator[Made]:
     problem, name = drawn(seed, index)
     vehicle, margin, workspace = VEHICLES[name], MARGINS_M[index % len(MARGINS_M)], Workspace()
     for planner in PLANNERS:
-        asked = problem, planner, "none", 0, None, 0, LIMITS, vehicle
-        attempt = solve(*asked, workspace=workspace, polished=False)
+        query = problem, planner, "none", 0, None, 0, LIMITS, vehicle
+        attempt = solve(*query, workspace=workspace, polished=False)
         if attempt.plan is not None:
             scene = scene_of(problem)
             better = polish(problem, attempt.plan, vehicle, scene, workspace, margin_m=margin).plan

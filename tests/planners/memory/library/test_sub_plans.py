@@ -35,7 +35,7 @@ from planners.world.authority.authority import faults
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.goal import place
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, state_size
 from planners.world.view import View
@@ -219,6 +219,16 @@ def test_stretches_are_sub_plans_seen_from_where_they_begin(library: PlanLibrary
         assert stretches.ends[k, 3] == states[-1, 3]
         middles = stretches.middles[k] @ [1.0, 1.0j]
         assert np.abs(middles[:, None] - way[None, :]).min(axis=1).max() < 1e-9
+
+
+@pytest.mark.parametrize("assist", ["closed", "repair", "random-open"])
+def test_who_is_there_already_does_not_drive(library: PlanLibrary, assist: str) -> None:
+    asked = replace(problem_of([]), start=(20.0, 20.0, 0.3), goal=(20.1, 20.0), start_motion=(3.0, 0.1))
+    for problem in (asked, replace(asked, start_motion=(), arrival=Arrival(0.3, 0.2, 0.0, 0.0))):
+        canonical = to_canonical(replace(problem, goal_radius=0.2))[0]
+        for polished in (False, True):
+            answer = solve(canonical, "lattice", assist, memory=library, polished=polished)
+            assert answer.duration_s == 0.0
 
 
 def test_around_a_wall_sub_plans_are_joined(library: PlanLibrary) -> None:
