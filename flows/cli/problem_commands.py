@@ -201,7 +201,11 @@ def _write_summary(solved: SolvedMany) -> None:
     driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
-        *([] if hits is None else [f"memory   recalled plans fit {hits:,} problems ({hits / count:.2%})"]),
+        *(
+            []
+            if hits is None
+            else [f"memory   recalled plans fit {hits:,} of {count:,} problems ({hits / count:.2%})"]
+        ),
         f"planning mean {1e3 * mean_s:.2f} ms, median {1e3 * median_s:.2f} ms, 90 % {1e3 * ninth_s:.2f} ms",
         *([] if driving_s is None else [f"driving  mean {driving_s:.2f} s"]),
         *([f"speed    {speed}: {now:,} in {solved.seconds:,.1f} s"] if now else []),

@@ -28,7 +28,8 @@ class SolveOptions:
         vehicle: car, differential-drive, car-1-trailer, car-2-trailers, or the .yaml file of another.
             Default: that of the problems, else that of the memory, else car.
         seed: Everything random follows from it.
-        unpolished: Take each plan as it is found: that saves milliseconds, and the drive takes longer.
+        unpolished: Take each plan as it is found, some milliseconds sooner. It is driven longer, to a pose by
+            seconds.
     """
 
     planner: PlannerName = "lattice"

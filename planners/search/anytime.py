@@ -208,7 +208,8 @@ def search_and_polish(
         plan, searches = found[-1].plan, searches + 1
         shortest_s = shortest_s if plan is None else plan.duration_s
     solved = [(each, each.plan) for each in found if each.plan is not None]
-    solved = sorted(solved, key=lambda each: each[1].duration_s)[:POLISHED]
+    shortest = sorted(range(len(solved)), key=lambda k: solved[k][1].duration_s)[:POLISHED]
+    solved = [solved[k] for k in sorted(shortest)]  # a given plan first: it stays unless another is quicker
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
         return found[0], None

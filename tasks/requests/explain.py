@@ -101,7 +101,8 @@ def _recall_line(
 def _told_of(parts: SubPlanAnswer, attempt: Attempt, plans: str) -> str:
     """How parts of stored ``plans`` were used for an attempt, or why none was."""
     if attempt.source == "recalled":
-        return f"parts of {plans}, driven again"
+        polished = parts.plan is not None and (attempt.duration_s or 0.0) < parts.plan.duration_s
+        return f"parts of {plans}, driven again{' and polished' * polished}"
     if attempt.source == "repaired":
         return f"the search joined the end of one of {plans}"
     if parts.plan is None:
