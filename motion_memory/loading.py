@@ -61,7 +61,8 @@ def load(
             before, which is quicker if only a few problems follow after an installation.
 
     Raises:
-        UsageError: A name is unknown, ``top_k`` is below 1, or a library is to be recalled from in some way.
+        UsageError: A name is unknown, ``top_k`` is below 1, a flag is no truth value, or a library is to be
+            recalled from in some way.
         StorageError: The memory is missing, damaged, or made for another vehicle.
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
@@ -72,6 +73,9 @@ def load(
     check_known("recall", [] if recall is None else [recall], RECALLS)
     if top_k < 1:
         raise UsageError(f"top_k is {top_k}: give 1 or more.")
+    for name, value in (("judged", judged), ("polished", polished), ("warm", warm)):
+        if not isinstance(value, bool):
+            raise UsageError(f"{name} is {value!r}: give True or False.")
     with memory_at(str(memory)) as folder:
         # mapped files stay readable after they are deleted
         archive = load_memory_or_library(folder, named or vehicle_of(folder))

@@ -94,6 +94,8 @@ def test_what_goes_wrong_is_caught_by_its_public_name(
         motion_memory.load(folder, vehicle="car-1-trailer")
     with pytest.raises(motion_memory.UsageError):
         motion_memory.load(folder, planner="luck")
+    with pytest.raises(motion_memory.UsageError, match="'no'"):
+        motion_memory.load(folder, polished="no")
     with pytest.raises(ValueError, match="goal"):
         memory.plan(fields_of(problem(0)) | {"goal": [1]})
 
