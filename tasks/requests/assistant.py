@@ -25,7 +25,7 @@ from planners.world.workspace import Workspace
 from storage.exchange.plans import PlanRecord
 from storage.places.mirror import folders_here
 from storage.vehicles.vehicle_files import said_vehicle
-from tasks.attempts.compile_assists import compile_free_answer
+from tasks.attempts.compile_assists import EMPTY, compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
@@ -122,6 +122,8 @@ class Assistant:
         plan = next((attempt.plan for attempt in attempts if attempt.plan is not None), None)
         if plan is not None:
             from_canonical(plan, alignment)
+        if plan is None or not len(plan.controls):  # other problems need more
+            self.attempt(EMPTY, UNASSISTED.name, seed, limits)
         if isinstance(self.memory_of(problem.class_name), Memory) and is_canonical(other):
             compile_free_answer(other, self.attempt, self._workspace)
         if self.settings.improve_seconds > 0.0:

@@ -48,6 +48,38 @@ print(sorted(name for name, _ in loaded() - before))
 """
 
 
+NOT_DRIVEN = """
+import gc
+from dataclasses import replace
+from numba.core.dispatcher import Dispatcher
+from tasks.requests.assistant import Assistant, AssistantSettings
+from tests.tasks.served import problem
+
+def loaded():
+    kernels = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+    return {(each.py_func.__qualname__, str(kind)) for each in kernels for kind in each.signatures}
+
+assistant = Assistant(AssistantSettings("lattice", "none", 1, None, 1))
+there = problem(0)
+assistant.warm_up(replace(there, start=(*there.goal, 0.0)))  # the vehicle is at its goal
+before = loaded()
+for index in range(3):
+    assistant(problem(index))
+print(sorted(name for name, _ in loaded() - before))
+"""
+
+
+def test_all_that_a_plan_needs_is_warm_even_if_the_first_question_needed_none() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", NOT_DRIVEN],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert done.stdout.strip() == "[]"
+
+
 def test_all_that_a_stored_plan_needs_is_warm_even_if_none_was_free_before(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", WITH_MEMORY, str(tmp_path / "memory")],
