@@ -15,7 +15,7 @@ import numpy as np
 
 from planners.memory.library.drives import TRIED, moved_drive, rank_drives
 from planners.memory.library.plan_library import PlanLibrary
-from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.descent import arrives
 from planners.optimisation.polish import polish_guesses
 from planners.search.connection.pose_table import seconds_from, seconds_to_pose
 from planners.search.manoeuvres.manoeuvring import is_tight
@@ -102,7 +102,7 @@ def drive_answer(
     """
     drives, problem = library.drives, view.problem
     start, goal = start_state(problem, vehicle), goal_of(problem, vehicle)
-    if steps_to_goal(start[np.newaxis], 0, goal, vehicle) == 0:
+    if arrives(start, goal, vehicle):
         return DriveAnswer()  # nothing has to be driven
     order = np.zeros(TRIED, np.int32)
     if blindly is None:

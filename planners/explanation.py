@@ -42,6 +42,11 @@ class Recollection(NamedTuple):
         """The first state in collision."""
         return int(self.blocked.argmax()) if self.blocked.any() else None
 
+    @property
+    def is_free(self) -> bool:
+        """Whether it answers the problem as it is."""
+        return not self.blocked.any() and self.goal_missed_m <= 1e-9
+
 
 def recollections(
     problem: Problem,
@@ -66,6 +71,7 @@ def recollections(
     as_stored = memory.begins_with(problem.start[2])
     plans = {number: turned(memory.plans[number], problem.start[2]) for number in attempt.recalled}
     helper = least_blocked(memory, attempt.recalled, view)[0] if attempt.helped else -1
+    helped_by = "repaired" if attempt.source == "repaired" else "guide"
     looked_at: list[Recollection] = []
     for number, plan in plans.items():
         blocked, _ = blocked_states(plan, view.scene, vehicle)
@@ -78,13 +84,14 @@ def recollections(
                 cells if as_stored and cells < MOST_CELLS else None,
                 blocked,
                 missed,
-                _use_of_blocked(attempt) if number == helper else "",
+                helped_by if number == helper else "",
             )
         )
     if attempt.source != "recalled" or attempt.plan is None:
         return looked_at
     # the free plan that drives shortest
-    quickest = min(filter(_is_free, looked_at), key=lambda each: len(plans[each.plan].controls), default=None)
+    free = [each for each in looked_at if each.is_free]
+    quickest = min(free, key=lambda each: len(plans[each.plan].controls), default=None)
     as_it_is = quickest is not None and len(plans[quickest.plan].controls) == len(attempt.plan.controls)
     return [
         each._replace(use="answer" if as_it_is else "polished") if each is quickest else each
@@ -127,12 +134,3 @@ def parts_found(
     is_blind = attempt.assist.startswith("random-")
     blindly = generator(attempt.seed, "random-plans", problem.id) if is_blind else None
     return sub_plan_answer(library, aimed_view(problem, vehicle), vehicle, blindly)
-
-
-def _is_free(recollection: Recollection) -> bool:
-    return not recollection.blocked.any() and recollection.goal_missed_m <= 1e-9
-
-
-def _use_of_blocked(attempt: Attempt) -> str:
-    """What the least blocked of the recalled plans was to an attempt that it helped."""
-    return "repaired" if attempt.source == "repaired" else "guide"

@@ -22,7 +22,7 @@ from planners.memory.library.recalling import (
     allocate_recalling,
     recall_one,
 )
-from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.descent import arrives
 from planners.search.connection.candidates import list_connections, next_word
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
@@ -144,7 +144,7 @@ def sub_plan_answer(
     r.states[0] = start
     r.work.fill(0)
     goal = goal_of(problem, vehicle)
-    if steps_to_goal(start[np.newaxis], 0, goal, vehicle) == 0:
+    if arrives(start, goal, vehicle):
         return NOTHING  # nothing has to be driven
     exact = asks_for_more(goal)
     near = place(*problem.goal, max(NEAR_M, problem.goal_radius)) if exact else goal

@@ -197,15 +197,13 @@ def _write_summary(solved: SolvedMany) -> None:
     rate = now / solved.seconds
     speed = f"{rate:,.0f} problems/s" if rate >= 10 else f"{rate:.2g} problems/s"
     mean_s, median_s, ninth_s = solved.planning_seconds
-    hits = solved.tally.hits
+    hits, fit = solved.tally.hits, []
+    if hits is not None:
+        fit = [f"memory   recalled plans fit {hits:,} of {count:,} problems ({hits / count:.2%})"]
     driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",
-        *(
-            []
-            if hits is None
-            else [f"memory   recalled plans fit {hits:,} of {count:,} problems ({hits / count:.2%})"]
-        ),
+        *fit,
         f"planning mean {1e3 * mean_s:.2f} ms, median {1e3 * median_s:.2f} ms, 90 % {1e3 * ninth_s:.2f} ms",
         *([] if driving_s is None else [f"driving  mean {driving_s:.2f} s"]),
         *([f"speed    {speed}: {now:,} in {solved.seconds:,.1f} s"] if now else []),

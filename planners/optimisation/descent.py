@@ -109,6 +109,11 @@ def steps_to_goal(states: Floats, steps: int, goal: Floats, vehicle: Vehicle) ->
     return -1
 
 
+def arrives(state: Floats, goal: Floats, vehicle: Vehicle) -> bool:
+    """Whether a state ``[S]`` is what the goal asks for."""
+    return bool(steps_to_goal(state.reshape(1, -1), 0, goal, vehicle) == 0)
+
+
 @lean
 def _gone_on(model: Model, steps: int, goal: Floats, vehicle: Vehicle) -> int:
     """Go straight on from the end until the goal could be reached; how many steps the drive has then."""

@@ -189,11 +189,8 @@ def search_and_polish(
     if given is not None:
         most = min(BESIDE if varies else AGAIN, most)
     found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
-    if given is not None:
-        found.insert(0, Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0))
-    plan = None if varies else found[-1].plan
-    shortest_s = min((each.plan.duration_s for each in found if each.plan is not None), default=0.0)
-    searches = 1
+    plan = None if varies else found[0].plan
+    shortest_s = min((each.duration_s for each in (given, found[0].plan) if each is not None), default=0.0)
     while plan is not None and shortest_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
@@ -203,11 +200,12 @@ def search_and_polish(
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
             break
-        rng = generator(seed, "again", query.problem.id, planner, searches)
+        rng = generator(seed, "again", query.problem.id, planner, len(found))
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
-        plan, searches = found[-1].plan, searches + 1
+        plan = found[-1].plan
         shortest_s = shortest_s if plan is None else plan.duration_s
-    solved = [(each, each.plan) for each in found if each.plan is not None]
+    answers = found if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0), *found]
+    solved = [(each, each.plan) for each in answers if each.plan is not None]
     shortest = sorted(range(len(solved)), key=lambda k: solved[k][1].duration_s)[:POLISHED]
     solved = [solved[k] for k in sorted(shortest)]  # a given plan first: it stays unless another is quicker
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]

@@ -88,9 +88,7 @@ def _recall_line(
     if not recalled:
         told = f"no plan {of_them} seemed likely to fit" if parts is None else _told_of(parts, attempt, plans)
         return f"recall   {told}"
-    free = sum(
-        not (recollection.blocked.any() or recollection.goal_missed_m > 1e-9) for recollection, _ in recalled
-    )
+    free = sum(recollection.is_free for recollection, _ in recalled)
     quicker = ", but the search found a quicker one" if free and attempt.source == "searched" else ""
     return (
         f"recall   {attempt.recall}, {len(recalled)} {of_them}, {free or 'none'} of them free{quicker}; "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -11,11 +12,13 @@ from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
+from planners.search.registry import plan
 from planners.solve import solve
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR, Vehicle
+from tests.worlds import box, problem_of, strewn
 
 
 def memory_of(
@@ -50,3 +53,19 @@ def memory_of_plans(
         weights=initial_weights(network, generator(0)),
         metadata=metadata or {},
     )
+
+
+def memory_that_prefers(biases: Sequence[float]) -> Memory:
+    """Five plans through strewn boxes, ranked by ``biases`` whatever the problem; row 0 is "no plan"."""
+    found = [plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5)]
+    return memory_of_plans([each for each in found if each is not None], biases)
+
+
+@functools.cache
+def shared_memory() -> Memory:
+    return memory_that_prefers([-1, 1, 2, 3, 4, 5])
+
+
+def blocked_everywhere() -> Problem:
+    """A wall with one gap that no plan of ``memory_that_prefers`` takes."""
+    return problem_of([box(10, -2, 2.35, 4, 1), box(24, 30, 2.35, 30, 0.5)], "wall")

@@ -9,34 +9,21 @@ from hypothesis import strategies as st
 from planners.memory.plans.free import free_plans, turned
 from planners.memory.recall import RECALLS
 from planners.optimisation import polish
-from planners.search import anytime
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
-from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
+from planners.solve import ASSISTS, solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.randomness import generator
 from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from planners.world.workspace import Workspace
-from tests.planners.clock import ticks
 from tests.planners.early_help import early_help
-from tests.planners.memories import memory_of_plans
+from tests.planners.memories import blocked_everywhere, memory_of_plans, memory_that_prefers, shared_memory
 from tests.worlds import box, problem_of, strewn, walled_goal
 
 first = functools.partial(solve, polished=False)  # the plan as it is found
 PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
-
-
-def memory_that_prefers(biases):
-    """Five plans through strewn boxes, ranked by ``biases`` whatever the problem; row 0 is "no plan"."""
-    plans = [plan("follow", strewn(seed, 30), generator(seed)).plan for seed in range(5)]
-    return memory_of_plans(plans, biases)
-
-
-@functools.cache
-def shared_memory():
-    return memory_that_prefers([-1, 1, 2, 3, 4, 5])
 
 
 @pytest.fixture
@@ -47,11 +34,6 @@ def memory():
 def test_a_memory_of_one_vehicle_is_not_used_for_another(memory):
     with pytest.raises(ValueError, match="built for vehicle car, expected car-1-trailer"):
         solve(problem_of([]), "gust", "closed", 1, memory, vehicle=CAR_1_TRAILER)
-
-
-def blocked_everywhere():
-    """A wall with one gap that no stored plan takes."""
-    return problem_of([box(10, -2, 2.35, 4, 1), box(24, 30, 2.35, 30, 0.5)], "wall")
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
@@ -250,56 +232,6 @@ def test_a_repaired_plan_begins_as_a_recalled_one_and_passes_the_authority(assis
     assert faults(problem, attempt.plan) == []
     assert any((attempt.plan.states[:5] == memory.plans[i].states[:5]).all() for i in attempt.recalled)
     assert attempt.repair_seconds > 0.0
-
-
-@pytest.mark.parametrize("assist", ["none", "closed"])
-def test_an_improved_attempt_has_a_quicker_plan_and_took_longer(assist, memory, monkeypatch):
-    monkeypatch.setattr(anytime, "working_clock", ticks())
-    monkeypatch.setattr(polish, "working_clock", ticks())
-    problem = strewn(4, 20)
-    found = first(problem, "gust", assist, 5, memory)
-    better = improved(found, problem, 0.1)
-    assert better.duration_s < found.duration_s
-    assert better.planning_seconds >= found.planning_seconds + 0.1
-    assert better.expansions > found.expansions
-    assert better.source in (found.source, "searched")
-    assert faults(problem, better.plan) == []
-
-
-@pytest.mark.parametrize("planner", PLANNERS)
-@pytest.mark.parametrize("assist", ["none", "fresh", "closed", "repair"])
-def test_an_answer_is_polished_and_takes_no_longer_than_the_first_plan_or_a_recalled_one(
-    memory, planner, assist
-):
-    for problem in (strewn(4, 20), strewn(5, 30), blocked_everywhere()):
-        attempt, found = (each(problem, planner, assist, 5, memory) for each in (solve, first))
-        assert attempt.duration_s <= found.duration_s
-        assert (attempt.hit, attempt.recalled, attempt.recall) == (found.hit, found.recalled, found.recall)
-        assert (attempt.hit is None) == (assist in WITHOUT_MEMORY)
-        assert found.hit or found.source != "recalled"
-        assert faults(problem, attempt.plan) == []
-
-
-@given(st.sampled_from(["gust", "lattice"]), st.integers(0, 10**6), st.integers(0, 30))
-@settings(max_examples=25, deadline=None)
-def test_with_a_memory_an_answer_takes_no_longer_than_the_plan_that_is_soon_found_without(
-    planner, seed, boxes
-):
-    """The plans of the memory are Follow's, as they were found."""
-    problem = strewn(seed, boxes)
-    alone = first(problem, planner)
-    attempt = solve(problem, planner, "closed", 5, shared_memory())
-    if alone.solved and alone.expansions <= anytime.AGAIN:
-        assert attempt.duration_s <= alone.duration_s
-
-
-def test_a_recalled_plan_of_a_worse_kind_is_not_what_is_polished():
-    """The free plan leads around a wall that is not there."""
-    around = plan("follow", blocked_everywhere(), generator(0)).plan
-    memory, nothing_there = memory_of_plans([around], np.zeros(2)), problem_of([])
-    recalled, alone = solve(nothing_there, "lattice", "closed", 5, memory), solve(nothing_there, "lattice")
-    assert recalled.hit
-    assert recalled.duration_s <= 1.01 * alone.duration_s
 
 
 def test_a_recalled_plan_that_is_blocked_is_passed_over(memory):

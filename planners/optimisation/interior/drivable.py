@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planners.optimisation.descent import steps_to_goal
+from planners.optimisation.descent import arrives
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, state_is_free
@@ -21,8 +21,7 @@ def driven(model: Model, steps: int, goal: Floats, vehicle: Vehicle, scene: Scen
     states = _follow(model, controls, vehicle)
     controls = in_asked_motion(controls, states[-1], goal, vehicle)
     states = simulate(states[0], controls, vehicle)
-    arrives = steps_to_goal(states[-1:], 0, goal, vehicle) == 0
-    if not arrives or count_free_prefix(states, vehicle, scene) <= len(controls):
+    if not arrives(states[-1], goal, vehicle) or count_free_prefix(states, vehicle, scene) <= len(controls):
         return None
     return Plan(states, controls, vehicle.dt)
 
