@@ -43,6 +43,7 @@ class Attempt:
     duration_s: float | None  # None if not solved
     seed: int
     plan: Plan | None
+    polished: bool  # whether the plan was polished, or is the first one, as it was found
     verified: bool | None  # what the authority said of the plan; None: it was not asked
 
 

@@ -133,6 +133,7 @@ def solve(
         duration_s=None if plan is None else plan.duration_s,
         seed=seed,
         plan=plan,
+        polished=polished,
         verified=None,
     )
 

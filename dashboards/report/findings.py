@@ -12,6 +12,7 @@ import pandas as pd
 from dashboards.cells import duration, planner_title
 from dashboards.statistics.headline import FEW, used_by_default
 from dashboards.statistics.panels import COMBINED
+from storage.tables.configurations import as_found, as_returned
 
 Row = Mapping[Any, Any]  # of a summary
 _SAME_S: Final = 0.05  # arrivals that differ by less are called the same: they are written to 0.1 s
@@ -29,13 +30,15 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
     """Say for each panel what a memory is worth beside the strongest planner alone, then beside the others.
 
     The strongest planner is the one whose robot arrives first without a memory, planning and driving taken
-    together. The memory is used as by default: recalled plans are repaired, if the run measured that.
+    together. The memory is used as by default: recalled plans are repaired, if the run measured that. Plans
+    are as they were found, but where the text says that they are polished.
 
     Args:
         summary: of ``panels.summarise``.
     """
     found = []
-    for panel, rows in summary.groupby("panel", sort=False):
+    for panel, every in summary.groupby("panel", sort=False):
+        rows = as_found(every)
         alone = _by_planner(rows[rows["assist"] == "none"])
         helped = _by_planner(used_by_default(rows))
         compared = sorted(alone.keys() & helped.keys(), key=lambda each: (_arrives_s(alone[each]), each))
@@ -60,6 +63,11 @@ def findings(summary: pd.DataFrame) -> list[Finding]:
             )
         answered = now["recalled"] + now["repaired"]
         sentences.append(f"{100.0 * answered:.0f} % of the plans come from the memory.")
+        returned = _by_planner(used_by_default(as_returned(every))).get(first)
+        if returned is not None:
+            sentences.append(
+                f"Answers are polished before they are returned: then the robot {_arrival(returned)}."
+            )
         if rows["problems"].max() < FEW:
             sentences.append("So few problems say little.")
         title = f"{panel}, {int(rows['problems'].max()):,} new problems"

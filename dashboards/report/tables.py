@@ -38,7 +38,9 @@ _FIELDS: Final = (
     "planner", "configuration", "solved_percent", "planning_mean_ms", "reduction_percent", "slower_percent",
     "hits_percent", "driving_s", "sooner_s",
 )  # fmt: skip
-_UNITS: Final = "plans as they are found; planning in ms, drives and sooner in s, the rest in %"
+_UNITS: Final = (
+    "plans as found, or polished as answers are; planning in ms, drives and sooner in s, the rest in %"
+)
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from dashboards.statistics.panels import COMBINED
+from storage.tables.configurations import as_found, as_returned
 
 FEW: Final = 100  # problems; fewer are for trying things out
 _PREFERRED: Final = ("repair", "open", "closed", "published-open")  # the first that was measured counts
@@ -30,7 +31,10 @@ def used_by_default(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def times_faster(own: pd.DataFrame) -> float:
-    """How many times faster planning is with a memory used as by default: geometric mean over rows."""
+    """How many times faster planning is with a memory used as by default: geometric mean over rows.
+
+    ``own``: rows of a summary, of plans as they were found.
+    """
     helped = used_by_default(own).set_index(["panel", "planner"])
     alone = own[own["assist"] == "none"].set_index(["panel", "planner"]).loc[helped.index]
     return math.exp(np.log(alone["mean_ms"] / helped["mean_ms"]).mean())
@@ -40,7 +44,8 @@ def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]
     """The headline figures of a run, each class with its own memory.
 
     Returns, of a memory used as by default against none: ``1-gain/sooner_s``, seconds, and ``1-gain/faster``,
-    times (geometric mean). With it, under ``2-with/``: ``solved``, ``recalled``, ``repaired``, ``slower``,
+    times (geometric mean); of answers as they are returned, polished: ``1-gain/returned_s``. With it, under
+    ``2-with/``: ``solved``, ``recalled``, ``repaired``, ``slower``,
     ``driving_s`` and ``checks`` (of collisions); without it, under ``3-alone/``: ``solved``, ``driving_s``
     and ``checks``. Then the figures of ``headline_retrieval``. Of all configurations, shares of the mean
     planning time: ``5-saved/<configuration>``, and ``5-saved/all``, the mean of those with a memory. Figures
@@ -50,10 +55,12 @@ def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]
         summary: table of ``panels.summarise``.
         retrieval: table of ``retrieval_rates.summarise_retrieval``.
     """
-    own = summary[summary["panel"] != COMBINED]
+    every = summary[summary["panel"] != COMBINED]
+    own = as_found(every)
     helped = used_by_default(own).set_index(["panel", "planner"])
     alone = own[own["assist"] == "none"].set_index(["panel", "planner"]).loc[helped.index]
     figures = {"1-gain/sooner_s": helped["sooner_s"].mean(), "1-gain/faster": times_faster(own)}
+    figures["1-gain/returned_s"] = used_by_default(as_returned(every))["sooner_s"].mean()
     figures |= {f"2-with/{name}": helped[name].mean() for name in ("recalled", "repaired", "slower")}
     for prefix, rows in (("2-with", helped), ("3-alone", alone)):
         figures |= {f"{prefix}/{name}": rows[name].mean() for name in ("solved", "driving_s")}

@@ -23,7 +23,7 @@ from dashboards.statistics.intervals import (
 )
 from dashboards.statistics.sign_tests import holm, signs
 from planners.world.arrays import Floats
-from storage.tables.configurations import BASELINE, Configuration, configured
+from storage.tables.configurations import Configuration, configured
 
 COMBINED: Final = "combined"  # the memory of all classes, whose attempts form a panel of their own
 PANELS: Final = ("curves", "random", "trap")
@@ -75,8 +75,8 @@ class Panel(NamedTuple):
         return self.columns.index(wanted) if wanted in self.columns else None
 
     def baseline(self, values: Floats) -> Floats:
-        """``values [problems, columns]`` of each column's planner without memory; NaN if not attempted."""
-        indices = [self.column(planner, BASELINE) for planner, _ in self.columns]
+        """``values [problems, columns]`` of what each column is compared with; NaN if not attempted."""
+        indices = [self.column(planner, each.baseline) for planner, each in self.columns]
         nothing = np.full(self.problems, np.nan)
         return np.column_stack([nothing if i is None else values[:, i] for i in indices])
 
@@ -186,7 +186,7 @@ def ranked(names: Iterable[Hashable], order: tuple[str, ...]) -> list[str]:
 
 
 COLUMNS: Final = (
-    "panel", "planner", "configuration", "assist", "recall", "top_k", "problems", "solved",
+    "panel", "planner", "configuration", "assist", "recall", "top_k", "polished", "problems", "solved",
     "mean_ms", "mean_low_ms", "mean_high_ms",
     "interquartile_mean_ms", "interquartile_mean_low_ms", "interquartile_mean_high_ms",
     "median_ms", "median_low_ms", "median_high_ms", "p90_ms", "p90_low_ms", "p90_high_ms",
@@ -245,7 +245,7 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     compared = [
         signs(mine, other) for mine, other in zip(censored.T, panel.baseline(censored).T, strict=True)
     ]
-    of_baseline = [each == BASELINE for _, each in panel.columns]
+    of_baseline = [each == each.baseline for _, each in panel.columns]
     for name in ("slower", "slowdown", "p_value"):
         table[name] = [getattr(each, name) for each in compared]
         table.loc[of_baseline, name] = np.nan

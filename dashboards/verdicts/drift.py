@@ -4,8 +4,9 @@ A hit is a problem that a recalled plan answers as it is, whatever a search find
 that of planning and driving, of the problems that were solved. A memory has drifted if its hits have fallen
 so far (Fisher's exact test, one-sided), or its total times have risen so far (Welch's test, one-sided), as
 they would in at most one case of a thousand if all were as in the benchmark: rare enough for a retraining
-that nobody asked for. Plans of the benchmark are not polished. Where those at work are, their total times are
-shorter, so that only later ones than that count.
+that nobody asked for. Polished answers are compared with polished ones of the benchmark. Where it has none
+(of planners that do not answer by default), total times at work are shorter, and only later ones than that
+count.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import pandas as pd
 from scipy.stats import fisher_exact, ttest_ind_from_stats
 
 from planners.world.arrays import Floats
-from storage.tables.configurations import configured
+from storage.tables.configurations import POLISHED, configured
 
 SIGNIFICANCE: Final = 0.001  # of both tests together
 FEWEST: Final = 20  # problems; fewer never count as a fall
@@ -139,12 +140,16 @@ def usefulness_of(hits: int, planning: Floats, driving: Floats) -> Usefulness:
 
 
 def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Usefulness]) -> Sequence[Drift]:
-    """The drift of a ``memory`` in each planner and configuration that is in both ``now`` and ``then``."""
-    return [
-        Drift(memory, name, mine, then[name], _fewer(mine, then[name]), _later(mine, then[name]))
-        for name, mine in now.items()
-        if name in then
-    ]
+    """The drift of a ``memory`` in each planner and configuration that is in both ``now`` and ``then``.
+
+    What was measured only as found is what polished answers are compared with then.
+    """
+    found = []
+    for name, mine in now.items():
+        before = then.get(name) or then.get(name.removesuffix(f" {POLISHED}"))
+        if before is not None:
+            found.append(Drift(memory, name, mine, before, _fewer(mine, before), _later(mine, before)))
+    return found
 
 
 def _fewer(now: Usefulness, then: Usefulness) -> float:

@@ -12,7 +12,7 @@ from scipy.stats import binomtest, norm
 
 from dashboards.statistics.intervals import CONFIDENCE, RESAMPLES
 from dashboards.statistics.panels import compare
-from storage.tables.configurations import BASELINE, Configuration, configured
+from storage.tables.configurations import BASELINE, Configuration, as_found, configured
 
 CLOSED_1, CLOSED_5 = Configuration("closed", "encoder", 1), Configuration("closed", "encoder", 5)
 OPEN_1, OPEN_5 = Configuration("open", "encoder", 1), Configuration("open", "encoder", 5)
@@ -99,6 +99,7 @@ class Evidence:
         column
         ``experiences``. ``resamples``: of the bootstrap.
         """
+        attempts = as_found(attempts)
         self.method = PUBLISHED if attempts["assist"].str.endswith(_PUBLISHED_OPEN).any() else PRODUCT
         self._faster = _reductions(attempts, "planning_seconds", resamples)
         parts = [name for name in _OVERHEAD if name in attempts]

@@ -128,7 +128,7 @@ def judgement_markdown(judged: Judgement, verdict: str) -> str:
 
 
 def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:
-    keys = rows[["problem_id", "planner", "assist", "top_k", "recall"]].astype(object)
+    keys = rows[["problem_id", "planner", "assist", "top_k", "recall", "polished"]].astype(object)
     return set(keys.where(keys.notna(), None).itertuples(index=False, name=None))
 
 

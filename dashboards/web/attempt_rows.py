@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 
 from planners.world.arrays import Array, Flags, Floats
-from storage.tables.configurations import BASELINE, Configuration, configured
+from storage.tables.configurations import Configuration, configured
 
 COLUMNS: Final = (
-    "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "memory", "status", "solved",
-    "source", "planning_seconds", "collision_checks", "expansions", "length_m", "duration_s", "seed",
-    "vehicle",
+    "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "polished", "memory", "status",
+    "solved", "source", "planning_seconds", "collision_checks", "expansions", "length_m", "duration_s",
+    "seed", "vehicle",
 )  # fmt: skip
 SHOWS: Final = {
     "all": "all attempts",
@@ -89,13 +89,15 @@ def attempts_of(frame: pd.DataFrame, faults: Sequence[str]) -> Attempts:
     for name in ("memory", "recall", "source", "vehicle"):
         if frame[name].isna().all():
             frame[name] = frame[name].astype("category")
-    keys = frame[["assist", "top_k", "recall"]].astype({"assist": object, "recall": object})
+    keys = frame[["assist", "top_k", "recall", "polished"]].astype({"assist": object, "recall": object})
     labelled, configurations = configured(keys)
+    polished = labelled["polished"].eq(True).to_numpy(bool)
     problem, planner = frame["problem_id"].cat.codes.to_numpy(np.int64), frame["planner"].cat.codes.to_numpy()
     memory = frame["memory"].cat.codes.to_numpy(np.int64)
     milliseconds = 1e3 * frame["planning_seconds"].to_numpy(float)
-    of_planner = problem * (int(planner.max(initial=0)) + 1) + planner
-    baseline = (labelled["configuration"] == BASELINE.label).to_numpy(bool)
+    of_planner = 2 * (problem * (int(planner.max(initial=0)) + 1) + planner) + polished
+    labels = [each.label for each in configurations.values() if each == each.baseline]
+    baseline = labelled["configuration"].isin(labels).to_numpy(bool)
     count = int(of_planner.max(initial=0)) + 1
     alone = _means(of_planner[baseline], milliseconds[baseline], count)[of_planner]
     ratio = np.divide(milliseconds, alone, out=np.full(len(frame), np.nan), where=alone > 0.0)

@@ -51,10 +51,10 @@ def replay(
         ValueError: memory and problem do not fit each other.
     """
     used = None if configuration.assist in WITHOUT_MEMORY else memory
-    assist, recall, top_k = configuration
+    assist, recall, top_k, polished = configuration
     workspace = Workspace()
     asked = problem, planner, assist, max(top_k, 1), used, seed, limits, vehicle, recall or None
-    attempt = solve(*asked, workspace, polished=False)
+    attempt = solve(*asked, workspace, polished=polished)
     searched = attempt.source == "searched" or not attempt.solved
     tree = last_tree(workspace, limits, vehicle) if searched else None
     roadmap = last_roadmap(workspace, planner) if searched and attempt.roadmap_seconds > 0.0 else None

@@ -13,7 +13,9 @@ ASSISTS: Final = (
 RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "sub-plans", "random")
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
+_KEYS: Final = ("assist", "top_k", "recall", "polished")  # columns of an attempt row
 WITHOUT_MEMORY: Final = ("none", "fresh")
+POLISHED: Final = "polished"  # the last word of a label, if plans are
 
 
 class Configuration(NamedTuple):
@@ -22,17 +24,25 @@ class Configuration(NamedTuple):
     assist: str  # one of ASSISTS
     recall: str  # one of RECALLS; empty if nothing is recalled
     top_k: int  # how many plans are recalled; 0 if they are not ranked
+    polished: bool = False  # whether the plan is polished, as answers are, or as it was found
 
     @property
     def label(self) -> str:
-        """The name in tables, figures and exports: ``none``, ``closed 5 encoder``, ``random-open 1``."""
+        """The name in tables, figures and exports: ``none``, ``closed 5 encoder``, ``none polished``."""
         count = [str(self.top_k)] if self.top_k else []
-        return " ".join([self.assist, *count, *([] if self.recall in _UNNAMED else [self.recall])])
+        recall = [] if self.recall in _UNNAMED else [self.recall]
+        return " ".join([self.assist, *count, *recall, *[POLISHED] * self.polished])
 
     @property
-    def rank(self) -> tuple[int, str, int, str, int]:
+    def rank(self) -> tuple[bool, int, str, int, str, int]:
         """The key that sorts configurations for display: known names in their order, then others."""
-        return (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS), self.top_k)
+        names = (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS))
+        return (self.polished, *names, self.top_k)
+
+    @property
+    def baseline(self) -> Configuration:
+        """What it is compared with: the same planner without memory, its plans polished alike."""
+        return BASELINE._replace(polished=self.polished)
 
 
 BASELINE: Final = Configuration("none", "", 0)
@@ -41,11 +51,13 @@ BASELINE: Final = Configuration("none", "", 0)
 def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configuration]]:
     """``attempts`` with a categorical column ``configuration`` of labels.
 
-    Rows that were written before there was a field ``recall`` count as ranked by the encoder.
+    Rows that were written before there was a field ``recall`` count as ranked by the encoder, those from
+    before ``polished`` as found.
 
     Returns the rows, and the configurations by label, in reading order.
     """
-    keys = pd.DataFrame({name: attempts.get(name) for name in ("assist", "top_k", "recall")}, attempts.index)
+    keys = pd.DataFrame({name: attempts.get(name) for name in _KEYS}, attempts.index)
+    keys = keys.assign(polished=keys["polished"].eq(True))
     distinct = keys.drop_duplicates()
     configurations = [_understood(*row) for row in distinct.itertuples(index=False, name=None)]
     by_label = {each.label: each for each in sorted(set(configurations), key=lambda each: each.rank)}
@@ -55,23 +67,33 @@ def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configur
 
 
 def configurations_in(table: pd.DataFrame) -> list[Configuration]:
-    """The distinct configurations in a ``table`` with columns ``assist, recall, top_k``, in reading order."""
+    """The distinct configurations in a ``table`` with a column for each of their fields, in reading order."""
     if table.empty:
         return []
     rows = table[list(Configuration._fields)].drop_duplicates().itertuples(index=False, name=None)
     return sorted((Configuration(*row) for row in rows), key=lambda configuration: configuration.rank)
 
 
-def _understood(assist: str, top_k: float, recall: object) -> Configuration:
+def as_found(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a ``table`` of attempts, or of their summary, whose plans are as they were found."""
+    return table[~table["polished"].eq(True)] if "polished" in table else table
+
+
+def as_returned(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a ``table`` of attempts, or of their summary, whose plans are polished, as answers are."""
+    return table[table["polished"].eq(True)] if "polished" in table else table.head(0)
+
+
+def _understood(assist: str, top_k: float, recall: object, polished: bool) -> Configuration:
     """The configuration that a row's fields mean, whichever version wrote it."""
     if assist in WITHOUT_MEMORY:
-        return Configuration(assist, "", 0)
+        return Configuration(assist, "", 0, polished)
     if assist == "exhaustive":
-        return Configuration("closed", "exhaustive", 0)
-    blindly = assist.startswith(_BLINDLY) or recall == "random"
-    if blindly:
-        return Configuration(f"{_BLINDLY}{assist.removeprefix(_BLINDLY)}", "random", int(top_k))
-    return Configuration(assist, recall if isinstance(recall, str) else "encoder", int(top_k))
+        return Configuration("closed", "exhaustive", 0, polished)
+    if assist.startswith(_BLINDLY) or recall == "random":
+        blind = f"{_BLINDLY}{assist.removeprefix(_BLINDLY)}"
+        return Configuration(blind, "random", int(top_k), polished)
+    return Configuration(assist, recall if isinstance(recall, str) else "encoder", int(top_k), polished)
 
 
 def _position(name: str, order: tuple[str, ...]) -> tuple[int, str]:

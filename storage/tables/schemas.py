@@ -136,8 +136,18 @@ ATTEMPTS: Final = _schema(
         ("vehicle", pa.string()),  # its name
         ("recall", pa.string()),  # the strategy (``planners.memory.recall``); null without memory
         ("hit", pa.bool_()),  # whether recalled plans answer it as they are; null without memory
+        ("polished", pa.bool_()),  # whether its plan is polished, as answers are, or as it was found
     ],
-    optional=("scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall", "hit"),
+    optional=(
+        "scene_seconds",
+        "guide_seconds",
+        "repair_seconds",
+        "verified",
+        "vehicle",
+        "recall",
+        "hit",
+        "polished",
+    ),
 )
 
 

@@ -91,13 +91,13 @@ def side_by_side(
     def attempt(problem: Problem, number: int) -> Attempt:
         by = contestants[number]
         memory = memories[by.memory, by.run] if by.memory else None
-        assist, top_k, recall = by.assist
+        assist, top_k, recall, polished = by.assist
         return solve(
             *(problem, by.planner, assist, top_k, memory, seed),
             vehicle=vehicle,
             strategy=recall,
             workspace=workspace,
-            polished=False,
+            polished=polished,
         )
 
     compile_assists(vehicle)

@@ -24,7 +24,9 @@ PROBLEMS: Final = 300  # a class
 AT_ONCE: Final = 100  # problems that are attempted before one of them is attempted again
 ROUNDS: Final = 3  # attempts of each run at a problem; the median counts
 FIRST, OTHER = "first", "other"
-_SAME: Final = ("planner", "problem_class", "problem_id", "assist", "recall", "top_k", "memory", "run_id")
+_SAME: Final = (
+    "planner", "problem_class", "problem_id", "assist", "recall", "top_k", "polished", "memory", "run_id",
+)  # fmt: skip
 
 
 class MeasuredRun(NamedTuple):
@@ -110,10 +112,10 @@ def _contestants(
     first: RunSettings, other: RunSettings, planners: list[str], memories: dict[MemoryOfRun, Memory]
 ) -> list[Contestant]:
     """Every planner with every assist that both runs have, with each memory, once for each run."""
-    assists = [UNASSISTED, *(each for each in first.assists if each in other.assists)]
     everyone = []
     for planner in planners:
-        for assist in assists:
+        assists = [each for each in first.assists_of(planner) if each in other.assists]
+        for assist in (UNASSISTED, *assists):
             if assist.name in WITHOUT_MEMORY:
                 everyone += [Contestant(planner, assist, None, side) for side in (FIRST, OTHER)]
                 continue

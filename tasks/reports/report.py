@@ -40,6 +40,7 @@ from storage.places.files import whole_file
 from storage.places.mirror import is_there
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import distinct_values, read_attempts
+from storage.tables.configurations import as_found
 from storage.tables.recalls import read_recalls
 from tasks.fan_out.chunk import Chunk, run_folder
 from tasks.inputs.shortfalls import shortfalls
@@ -95,15 +96,16 @@ def report_run(data: str, settings: RunSettings) -> Report:
         judgement,
     ]
     _write(run.summary("md"), "\n".join(texts))
+    drawn, found = as_found(summary), as_found(attempts)  # a polish would hide what planners and recall take
     figures = {
-        "planning-times": planning_times(summary),
-        "controls": controls(summary),
-        "solved-against-time": solved_against_time(solved_curve(attempts)),
-        "performance-profile": performance_profile(profile_curve(attempts)),
-        "time-split": time_split(split_of(attempts)),
+        "planning-times": planning_times(drawn),
+        "controls": controls(drawn),
+        "solved-against-time": solved_against_time(solved_curve(found)),
+        "performance-profile": performance_profile(profile_curve(found)),
+        "time-split": time_split(split_of(found)),
     }
     if (summary["recall"] == "random").any():
-        figures["ablation"] = ablation(summary)
+        figures["ablation"] = ablation(drawn)
     if len(continual):
         figures["continual-improvement"] = continual_improvement(summarise_continual(continual))
     for name, figure in figures.items():

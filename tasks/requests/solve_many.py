@@ -222,7 +222,7 @@ def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally
     from storage.tables.configurations import configured
     from tasks.champions.drift_watch import report_drift
 
-    columns = attempt_columns(request.out, ["assist", "top_k", "recall"])
+    columns = attempt_columns(request.out, ["assist", "top_k", "recall", "polished"])
     (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
     now = usefulness_of(tally.hits or 0, tally.seconds, tally.driving)
     return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)

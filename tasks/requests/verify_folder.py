@@ -233,7 +233,7 @@ def _attempts(
                 vehicle=vehicle,
                 strategy=row["recall"],
                 workspace=workspace,
-                polished=False,
+                polished=bool(row["polished"]),
             )
             attempt = check_attempt(problem, attempt, set(), vehicle)
             attempts_repeated += 1

@@ -23,6 +23,7 @@ class Assist(NamedTuple):
     name: str  # one of planners.solve.ASSISTS
     top_k: int  # recalled plans; 0 without memory
     recall: str | None = None  # a strategy of planners.memory.recall; None: the best for the memory's size
+    polished: bool = False  # whether plans are polished, as answers are, or as they were found
 
 
 UNASSISTED: Final = Assist("none", 0)
@@ -35,6 +36,8 @@ ASSISTS: Final = (
     Assist("open", 1, "encoder"),
     Assist("open", 5, "encoder"),
     Assist("fresh", 0),  # a control: no memory, a guide made on the spot
+    Assist("none", 0, polished=True),  # as answers are returned, without and with a memory
+    Assist("repair", 5, polished=True),
 )
 PUBLISHED_ASSISTS: Final = (
     Assist("closed", 1, "centroid"),
@@ -49,6 +52,7 @@ ABLATION: Final = (  # plans drawn blindly, for runs that have the same assist w
     Assist("random-published-open", 1),
     Assist("random-published-open", 5),
 )
+ANSWERING: Final = "lattice"  # the planner that answers by default, which alone is measured polished, too
 COLLECTOR: Final = "lattice"  # its plans drive shortest, and polish makes them clear of obstacles
 ABLATION_PLANNER: Final = "gust"
 CONTINUAL: Final = ("none", "paper", "all")  # the second: one planner on one class, as published
@@ -139,6 +143,10 @@ class RunSettings:
         """The memories that are measured on a class: its own, and the combined one if there is one."""
         return [class_name, COMBINED] if self.combined else [class_name]
 
+    def assists_of(self, planner: str) -> list[Assist]:
+        """The assists that a planner is measured with; only answers of ``ANSWERING`` are polished."""
+        return [each for each in self.assists if not each.polished or planner == ANSWERING]
+
     @property
     def ablation(self) -> list[Assist]:
         """Plans drawn blindly, for each assist that is measured with plans recalled."""
@@ -170,7 +178,7 @@ class RunSettings:
         """Eight hexadecimal digits that tell settings with different results apart."""
         values = asdict(self) | {"worlds": [world_class(folder) for folder in self.worlds]}
         del values["strict"], values["continual"], values["left_out"]
-        values["assists"] = [_renamed(each, _DIGESTED) for each in self.assists]
+        values["assists"] = [_digested(each) for each in self.assists]
         for name, default in _LATER.items():  # so that runs from before a field was added keep their names
             if values.get(name) == default:
                 del values[name]
@@ -214,6 +222,11 @@ class RunSettings:
         if values["retraining"] is not None:
             values["retraining"] = Retraining(**values["retraining"])
         return cls(**values)
+
+
+def _digested(assist: Assist) -> tuple[Any, ...]:
+    """The fields of an ``assist`` that count in a digest: ``polished`` was added, and only tells if it is."""
+    return tuple(_renamed(assist, _DIGESTED))[: None if assist.polished else -1]
 
 
 def _renamed(assist: Assist, names: dict[str, str]) -> Assist:

@@ -21,10 +21,11 @@ def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
     """Every planner without memory, and with every memory that is measured on a class."""
     run, everyone = settings.run_name, []
     for planner in settings.planners:
-        alone = [assist for assist in settings.assists if assist.name in WITHOUT_MEMORY]
+        measured = settings.assists_of(planner)
+        alone = [assist for assist in measured if assist.name in WITHOUT_MEMORY]
         everyone += [Contestant(planner, assist, None, run) for assist in (UNASSISTED, *alone)]
         for memory in settings.memories_of(class_name):
-            assists = [each for each in settings.assists if each not in alone]
+            assists = [each for each in measured if each not in alone]
             everyone += [Contestant(planner, assist, memory, run) for assist in assists]
         if planner == ABLATION_PLANNER:
             everyone += [Contestant(planner, assist, class_name, run) for assist in settings.ablation]

@@ -12,6 +12,7 @@ from planners.solve import solve
 from storage.archives.memories import load_memory
 from storage.places.mirror import is_there
 from storage.tables.attempts import read_attempts
+from storage.tables.configurations import as_found
 from tasks.fan_out.chunk import Chunk, Cut
 from tasks.fan_out.stage import Stage
 from tasks.inputs.problem_sources import source_of
@@ -36,7 +37,7 @@ def _examples(chunk: Chunk) -> Iterator[Example]:
     """Some problems solved again, which gives the same plans."""
     settings, name, vehicle = chunk.settings, chunk.class_name, chunk.vehicle
     planner = SHOWN_PLANNER if SHOWN_PLANNER in settings.planners else settings.planners[0]
-    rows = read_attempts(chunk.run.table("results", name))
+    rows = as_found(read_attempts(chunk.run.table("results", name)))
     memory = load_memory(chunk.run.memory(name), vehicle)
     rows = rows[(rows["memory"] == name) & (rows["planner"] == planner)]
     rows = rows[(rows["recall"] == default_recall(memory)) & (rows["top_k"] == SHOWN_TOP_K)]

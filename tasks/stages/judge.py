@@ -61,7 +61,7 @@ def contestants(settings: RunSettings, class_name: str) -> list[Contestant]:
     return [
         Contestant(planner, assist, *side)
         for planner in settings.planners
-        for assist in settings.assists
+        for assist in settings.assists_of(planner)
         if assist.name not in WITHOUT_MEMORY
         for side in sides_of(settings, class_name)
     ]

@@ -18,6 +18,7 @@ STANDARD = [
     Configuration("fresh", "", 0),
 ]
 CLOSED_1 = STANDARD[1]
+POLISHED = [each._replace(polished=True) for each in (BASELINE, STANDARD[-2])]
 ABLATION = [Configuration("random-open", "random", 1), Configuration("random-open", "random", 5)]
 PARTS = ("occupancy", "encode", "recall", "scene", "check", "guide", "repair", "roadmap", "search")
 
@@ -36,7 +37,7 @@ def attempts(
     rows: list[dict[str, Any]] = []
     for name, planner in product(classes, planners):
         hardness = rng.lognormal(0.0, 1.0, problems)
-        for (assist, recall, top_k), i in product(configurations, range(problems)):
+        for (assist, recall, top_k, polished), i in product(configurations, range(problems)):
             seconds = 1e-3 * hardness[i] * rng.lognormal(0.0, 0.3) / (1.0 if assist == "none" else speed_up)
             solved = bool(rng.random() < 0.95)
             recalled = assist not in ("none", "fresh") and rng.random() < 0.5
@@ -49,6 +50,7 @@ def attempts(
                     "assist": assist,
                     "top_k": top_k,
                     "recall": recall or None,
+                    "polished": polished,
                     "memory": None if assist in ("none", "fresh") else memory or name,
                     "status": "solved" if solved else "budget-spent",
                     "solved": solved,
@@ -66,7 +68,7 @@ def attempts(
 def meant(row: Mapping[Any, Any]) -> Configuration:
     """The configuration of an attempt row."""
     recall = row["recall"] if isinstance(row["recall"], str) else ""
-    return Configuration(row["assist"], recall, row["top_k"])
+    return Configuration(row["assist"], recall, row["top_k"], bool(row["polished"]))
 
 
 def recalls(

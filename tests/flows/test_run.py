@@ -15,6 +15,7 @@ import pytest
 
 from flows.cli.main import call
 from planners.search.registry import PLANNERS
+from planners.solve import WITHOUT_MEMORY
 from storage.archives.memories import load_memory
 from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder
@@ -22,7 +23,7 @@ from storage.tables.recalls import read_recalls
 from tasks.reports.stage_times import stages_of
 from tasks.settings.presets import for_preset
 from tasks.settings.recorded_settings import recorded_settings
-from tasks.settings.run_settings import ASSISTS
+from tasks.settings.run_settings import UNASSISTED
 from tasks.stages.collect_gained import COLLECT_GAINED
 from tests.flows.conftest import SmallRuns
 from tests.flows.same_rows import assert_same_rows, rows_of
@@ -53,16 +54,19 @@ def test_one_process_and_two_workers_give_the_same_memories(runs: tuple[RunFolde
 
 def test_every_configuration_meets_every_problem(runs: tuple[RunFolder, RunFolder]) -> None:
     rows = pd.concat([rows_of(path) for path in sorted(runs[0].results.rglob("*.parquet"))])
-    asked = rows.groupby(["problem_class", "planner", "assist", "recall", "top_k"], dropna=False)[
-        "problem_id"
-    ].nunique()
+    way = ["problem_class", "planner", "assist", "recall", "top_k", "polished"]
+    asked = rows.groupby(way, dropna=False)["problem_id"].nunique()
     assert (asked == 6).all()
-    planners, assists, picked = len(PLANNERS), len(ASSISTS), len(for_preset("smoke").ablation)
-    assert len(asked) == 2 * (planners * (1 + assists) + picked)
+    settings = for_preset("smoke")
+    picked = len(settings.ablation)
+    ways = [UNASSISTED.name] * len(PLANNERS)
+    ways += [assist.name for planner in PLANNERS for assist in settings.assists_of(planner)]
+    assert len(asked) == 2 * (len(ways) + picked)
     counts = Counter(rows["memory"].fillna("none"))
-    guided = planners * (assists - 1)  # one assist needs no memory
+    alone = sum(name in WITHOUT_MEMORY for name in ways)
+    guided = len(ways) - alone
     of_class = 6 * (guided + picked)
-    assert counts == {"none": 24 * planners, "random": of_class, "trap": of_class, "combined": 12 * guided}
+    assert counts == {"none": 12 * alone, "random": of_class, "trap": of_class, "combined": 12 * guided}
     assert rows.loc[rows["solved"], "verified"].all()
 
 

@@ -29,11 +29,12 @@ from dashboards.web.page import Page
 from dashboards.web.parameters import Parameters, link
 from storage.places.run_folder import RunFolder
 from storage.tables.attempts import readable_attempts
-from storage.tables.configurations import BASELINE, Configuration, configurations_in
+from storage.tables.configurations import BASELINE, Configuration, as_found, configurations_in
 
 VIEWS: Final = {"reduction": "How much faster", "solved": "Solved", "time": "Where the time goes"}
 _SPLIT: Final = (
-    "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "memory", "planning_seconds",
+    "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "polished", "memory",
+    "planning_seconds",
     *(column for part in TIME_PARTS for column in part.columns),
 )  # fmt: skip
 
@@ -71,9 +72,9 @@ def overview(data: DataReader, params: Parameters) -> Page:
                 charts = [_time_chart(data, run)]
                 values["faults"] = data.attempts(run).faults
             case "solved":
-                charts = [_solved_chart(summary, name)]
+                charts = [_solved_chart(as_found(summary), name)]
             case _:
-                charts = [_reduction_chart(summary, name, origin)]
+                charts = [_reduction_chart(as_found(summary), name, origin)]
         data.read_ahead(run)
         values |= {
             "tables": _tables(summary, name),
@@ -137,7 +138,7 @@ def _dots(
                 Dot(
                     row["configuration"],
                     estimate(row),
-                    colour_of(Configuration(row["assist"], row["recall"], row["top_k"])),
+                    colour_of(Configuration(*(row[name] for name in Configuration._fields))),
                     f"{title}, {row['configuration']}: {words(row)}",
                     _problems_address(run, row, **more),
                 )
@@ -194,7 +195,7 @@ def _time_chart(data: DataReader, run: RunFolder) -> Chart:
 
     def made() -> pd.DataFrame:
         frame, _ = readable_attempts(run.results, _SPLIT)
-        return time_split(frame.astype({"recall": object, "assist": object}))
+        return time_split(as_found(frame).astype({"recall": object, "assist": object}))
 
     split = data.kept(("time split", stamp_of(run.results)), made)
     drawings: list[Drawing] = []

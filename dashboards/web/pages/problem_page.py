@@ -33,6 +33,7 @@ from storage.tables.configurations import Configuration
 SECONDS: Final = 5.0  # that it may take to make an attempt again
 USES: Final = {
     "answer": "is the answer",
+    "polished": "is the answer, polished",
     "repaired": "was repaired",
     "guide": "guided the search",
     "": NOTHING,

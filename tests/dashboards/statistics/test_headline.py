@@ -38,6 +38,16 @@ def test_headlines_are_means_of_the_tables(
     assert 0.6 < figures["5-saved/all"] < 0.9  # memory was made four times as fast
 
 
+def test_what_answers_gain_as_returned_stands_beside_what_they_gain_as_found() -> None:
+    rows = synthetic.attempts(("curves",), ("lattice",), [*synthetic.STANDARD, *synthetic.POLISHED])
+    none = summarise_retrieval(retrieval_curve(synthetic.recalls(("curves",))))
+    summary = summarise(rows, resamples=100)
+    returned = summary[summary["configuration"] == "repair 5 exhaustive polished"]
+    figures = headline(summary, none)
+    assert figures.pop("1-gain/returned_s") == pytest.approx(returned["sooner_s"].item())
+    assert figures == pytest.approx(headline(summarise(rows[~rows["polished"]], resamples=100), none))
+
+
 def test_names_do_not_depend_on_what_was_measured_and_no_figure_is_no_number(
     found: tuple[pd.DataFrame, pd.DataFrame, dict[str, float]],
 ) -> None:

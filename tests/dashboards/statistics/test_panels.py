@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from dashboards.statistics.intervals import interquartile_mean
 from dashboards.statistics.panels import COLUMNS, COMBINED, compare, panels, summarise, summarise_continual
 from storage.tables.configurations import BASELINE, Configuration, configured
-from tests.dashboards.synthetic import ABLATION, CLOSED_1, STANDARD, attempts, meant
+from tests.dashboards.synthetic import ABLATION, CLOSED_1, POLISHED, STANDARD, attempts, meant
 
 
 def only(summary: pd.DataFrame, **wanted: object) -> pd.Series:
@@ -204,6 +204,23 @@ def test_rows_of_before_there_was_a_recall_mean_the_same() -> None:
     (rows, known), (old_rows, old_known) = configured(now), configured(before)
     assert list(rows["configuration"]) == list(old_rows["configuration"])
     assert known == old_known
+
+
+def test_polished_answers_are_compared_with_polished_ones_and_change_no_other_row() -> None:
+    rows = attempts(("trap",), ("lattice",), [*STANDARD, *POLISHED])
+    summary = summarise(rows, resamples=10)
+    found = summary[~summary["polished"]].reset_index(drop=True)
+    pd.testing.assert_frame_equal(found, summarise(rows[~rows["polished"]], resamples=10), check_dtype=False)
+    alone, helped = (
+        rows[rows["polished"] & (rows["assist"] == assist)].set_index("problem_id")
+        for assist in ("none", "repair")
+    )
+    total = [each["planning_seconds"] + each["duration_s"] for each in (alone, helped)]
+    (row,) = summary[summary["configuration"] == "repair 5 exhaustive polished"].to_dict("records")
+    assert row["sooner_s"] == pytest.approx((total[0] - total[1]).mean())
+    assert row["reduction"] == pytest.approx(
+        1.0 - helped["planning_seconds"].mean() / alone["planning_seconds"].mean()
+    )
 
 
 def test_growing_experience_is_a_summary_for_each_number_of_experiences(attempt_rows: pd.DataFrame) -> None:

@@ -84,6 +84,16 @@ def test_only_configurations_that_both_know_are_compared() -> None:
     assert found.to_json()["hit_rate"] == found.to_json()["benchmark_hit_rate"]
 
 
+def test_polished_answers_are_compared_with_polished_ones_where_the_benchmark_has_them() -> None:
+    polished = f"{NAME} polished"
+    later = replace(THEN, total_s=25.0)
+    (found,) = drifts("trap/2", {polished: THEN}, {NAME: later, polished: THEN})
+    assert found.then == THEN
+    (found,) = drifts("trap/2", {polished: THEN}, {NAME: later})
+    assert found.then == later
+    assert not found.has_drifted
+
+
 def test_usefulness_counts_recalled_plans() -> None:
     rows = attempts(("trap",), ("gust",), [Configuration("open", "exhaustive", 5)], problems=30)
     (found,) = usefulness(rows).values()

@@ -31,6 +31,7 @@ from storage.tables.attempts import write_attempts
 from storage.tables.hallucinated import write_hallucinated
 from storage.tables.recalls import write_recalls
 from storage.tables.watched import add_watched
+from tasks.settings.run_settings import Assist
 from tests.planners.memories import memory_of
 
 CLASS = "trap"
@@ -41,7 +42,10 @@ VERSIONS = (
     MemoryVersion("motion-memory-trap", 3, 2, "gone", "refused", "2", -0.1, -0.2, 0.0, "not sooner", False),
 )
 SEEN = Usefulness(200, hits=160, mean_ms=1.5, median_ms=0.5, solved=200, total_s=21.0, total_sd_s=2.0)
-WAYS = (("none", 0, None), ("closed", 5, "exhaustive"), ("repair", 5, "exhaustive"), ("open", 1, "encoder"))
+WAYS = (
+    Assist("none", 0), Assist("closed", 5, "exhaustive"), Assist("repair", 5, "exhaustive"),
+    Assist("open", 1, "encoder"), Assist("none", 0, polished=True), Assist("repair", 5, "exhaustive", True),
+)  # fmt: skip
 
 
 def small_data(folder: Path, runs: Sequence[str] = ("first", "second")) -> DataFolder:
@@ -97,10 +101,10 @@ def attempt_rows(memory: Memory, problems: Sequence[Problem]) -> list[dict[str, 
     rows = []
     for problem in problems:
         for planner in ("rrt", "gust"):
-            for assist, top_k, recall in WAYS:
+            for assist, top_k, recall, polished in WAYS:
                 known = None if assist == "none" else memory
                 attempt = solve(
-                    problem, planner, assist, max(top_k, 1), known, 1, strategy=recall, polished=False
+                    problem, planner, assist, max(top_k, 1), known, 1, strategy=recall, polished=polished
                 )
                 left_out = ("plan", "helped")
                 fields = {name: value for name, value in vars(attempt).items() if name not in left_out}

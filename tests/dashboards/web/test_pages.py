@@ -93,15 +93,16 @@ def test_a_filter_shows_what_fits_and_nothing_else(client: httpx.Client, data: D
 def test_what_memory_hurts_is_what_took_longer_than_the_planner_alone(data: DataFolder) -> None:
     frame, _ = readable_attempts(data.run("first").results, COLUMNS)
     found = attempts_of(frame, ())
+    alike = ["problem_id", "planner", "polished"]
     alone = {
-        (row["problem_id"], row["planner"]): row["planning_seconds"]
+        tuple(row[name] for name in alike): row["planning_seconds"]
         for row in frame.to_dict("records")
         if row["assist"] == "none"
     }
     slower = {
         index
         for index, row in frame.iterrows()
-        if row["assist"] != "none" and row["planning_seconds"] > alone[row["problem_id"], row["planner"]]
+        if row["assist"] != "none" and row["planning_seconds"] > alone[tuple(row[name] for name in alike)]
     }
     assert set(found.chosen({}, "hurt").index) == slower
 

@@ -210,7 +210,7 @@ def test_attempts_of_a_folder_come_back_in_the_order_of_their_files(tmp_path: Pa
     (tmp_path / "curves" / ".0002.parquet.abc.partial").write_text("half")
     frame = read_attempts(tmp_path)
     added = ["scene_seconds", "guide_seconds", "repair_seconds", "verified", "vehicle", "recall", "hit"]
-    assert list(frame.columns) == [*ATTEMPT, *added]
+    assert list(frame.columns) == [*ATTEMPT, *added, "polished"]
     assert frame["solved"].tolist() == [True, True, False]
     assert frame["recalled"][0].tolist() == [3, 1, 2]
     assert frame["planning_seconds"].tolist() == [0.001] * 3

@@ -34,7 +34,11 @@ SETTINGS = st.builds(
     planners=st.just(("rrt", "gust")),
     assists=st.lists(
         st.builds(
-            Assist, st.sampled_from(["closed", "open"]), st.integers(1, 9), st.sampled_from([None, "mask"])
+            Assist,
+            st.sampled_from(["closed", "open"]),
+            st.integers(1, 9),
+            st.sampled_from([None, "mask"]),
+            st.booleans(),
         )
     ).map(tuple),
     epochs=st.integers(1, 60),
@@ -99,13 +103,20 @@ def test_a_run_of_another_vehicle_says_its_name() -> None:
 def _first_version(settings: RunSettings) -> dict[str, Any]:
     values: dict[str, Any] = json.loads(settings.to_json())
     del values["version"]
-    for assist in values["assists"]:
-        assist[2] = "centroid" if assist[2] == "encoder" else assist[2]
+    values["assists"] = [
+        [name, top_k, "centroid" if recall == "encoder" else recall]
+        for name, top_k, recall, _ in values["assists"]
+    ]
     return values
 
 
+def _as_found(settings: RunSettings) -> RunSettings:
+    """The settings as they were before polished answers were measured."""
+    return replace(settings, assists=tuple(each for each in settings.assists if not each.polished))
+
+
 def test_settings_from_before_there_were_more_of_them_keep_their_meaning_and_name() -> None:
-    settings = for_preset("smoke", learning={"origin_weight": 40.0})  # nobody could choose another
+    settings = _as_found(for_preset("smoke", learning={"origin_weight": 40.0}))  # nobody could choose another
     values = _first_version(settings)
     del values["vehicle"], values["learning"], values["hallucination"]
     del values["learned"], values["retraining"], values["as_published"], values["left_out"]
@@ -122,7 +133,7 @@ def test_settings_that_chose_whether_plans_are_optimised_still_read() -> None:
 
 
 def test_runs_that_set_the_learning_rate_before_there_was_a_network_keep_their_name() -> None:
-    settings = for_preset("smoke", learning={"learning_rate": 0.01})
+    settings = _as_found(for_preset("smoke", learning={"learning_rate": 0.01}))
     values = _first_version(settings)
     for name in ("network", "batch", "weight_decay", "own_anchors"):
         del values["learning"][name]
@@ -147,6 +158,16 @@ def test_the_papers_method_differs_in_plans_problems_network_objective_recall_an
         assert uses == {"closed", "published-open", "random-published-open"}
         assert for_preset(preset, experiences=6).wanted == 6
         assert for_preset(preset, learning={"batch": 8}).learning == replace(settings.learning, batch=8)
+
+
+def test_only_answers_of_the_planner_that_answers_by_default_are_measured_polished() -> None:
+    settings = for_preset("smoke")
+    by_planner = {
+        planner: {each.name for each in settings.assists_of(planner) if each.polished}
+        for planner in settings.planners
+    }
+    assert by_planner.pop("lattice") == {"none", "repair"}
+    assert not any(by_planner.values())
 
 
 def test_nearest_centroids_are_not_what_was_once_called_centroid() -> None:
