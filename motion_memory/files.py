@@ -101,7 +101,8 @@ def solve_many(
         polished: as of ``load``.
 
     Raises:
-        UsageError: A name is unknown, or a file would be written over another one.
+        UsageError: A name is unknown, ``top_k`` is no whole number above 0, ``polished`` is no truth value,
+            or a file would be written over another one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
     from tasks.registry.settled_vehicle import settled_vehicle  # late: a robot may not have pyarrow

@@ -26,8 +26,8 @@ from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.registry.memory_at import memory_at
-from tasks.settings.checks import check_known, check_no_recall, checked_vehicle
-from tasks.settings.errors import RunError, UsageError
+from tasks.settings.checks import check_flag, check_known, check_no_recall, check_whole, checked_vehicle
+from tasks.settings.errors import RunError
 
 
 def load(
@@ -61,8 +61,8 @@ def load(
             before, which is quicker if only a few problems follow after an installation.
 
     Raises:
-        UsageError: A name is unknown, ``top_k`` is below 1, a flag is no truth value, or a library is to be
-            recalled from in some way.
+        UsageError: A name is unknown, ``top_k`` is no whole number above 0, a flag is no truth value, or a
+            library is to be recalled from in some way.
         StorageError: The memory is missing, damaged, or made for another vehicle.
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
@@ -71,11 +71,9 @@ def load(
     check_known("planner", [planner], PLANNERS)
     check_known("assist", [assist], ASSISTS)
     check_known("recall", [] if recall is None else [recall], RECALLS)
-    if top_k < 1:
-        raise UsageError(f"top_k is {top_k}: give 1 or more.")
+    check_whole("top_k", top_k)
     for name, value in (("judged", judged), ("polished", polished), ("warm", warm)):
-        if not isinstance(value, bool):
-            raise UsageError(f"{name} is {value!r}: give True or False.")
+        check_flag(name, value)
     with memory_at(str(memory)) as folder:
         # mapped files stay readable after they are deleted
         archive = load_memory_or_library(folder, named or vehicle_of(folder))

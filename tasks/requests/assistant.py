@@ -29,7 +29,14 @@ from tasks.attempts.compile_assists import EMPTY, compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import check_known, check_no_recall, check_seed, checked_vehicle
+from tasks.settings.checks import (
+    check_flag,
+    check_known,
+    check_no_recall,
+    check_seed,
+    check_whole,
+    checked_vehicle,
+)
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -64,13 +71,13 @@ class Assistant:
             UsageError: a name is unknown, a number is out of range, or the assist needs a memory.
             StorageError: the memory lies in object storage and cannot be fetched.
         """
-        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall, _ = settings
+        planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall, polished = settings
         check_known("planner", [planner], tuple(PLANNERS))
         check_known("assist", [assist], ASSISTS)
         vehicle = checked_vehicle(vehicle)
         check_known("recall", [] if recall is None else [recall], RECALLS)
-        if top_k < 1:
-            raise UsageError(f"top-k is {top_k}: give 1 or more.")
+        check_whole("top-k", top_k)
+        check_flag("polished", polished)
         check_seed(seed)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,6 +54,18 @@ def check_count(what: str, count: int) -> None:
     """Refuse a number below one."""
     if count < 1:
         raise UsageError(f"{count} {what}: give 1 or more.")
+
+
+def check_whole(name: str, value: object) -> None:
+    """Refuse what is not a whole number of 1 or more; ``name`` is what the caller calls it."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise UsageError(f"{name} is {value!r}: give a whole number, 1 or more.")
+
+
+def check_flag(name: str, value: object) -> None:
+    """Refuse what is no truth value, since any text would count as true; ``name`` as in ``check_whole``."""
+    if not isinstance(value, bool):
+        raise UsageError(f"{name} is {value!r}: give True or False.")
 
 
 def check_no_recall(recall: str | None, library: str, option: str) -> None:

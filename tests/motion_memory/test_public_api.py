@@ -96,6 +96,10 @@ def test_what_goes_wrong_is_caught_by_its_public_name(
         motion_memory.load(folder, planner="luck")
     with pytest.raises(motion_memory.UsageError, match="'no'"):
         motion_memory.load(folder, polished="no")
+    with pytest.raises(motion_memory.UsageError, match=r"2\.5"):
+        motion_memory.load(folder, top_k=2.5)
+    with pytest.raises(motion_memory.UsageError, match="'no'"):
+        motion_memory.solve_many(tmp_path / "problems.jsonl", tmp_path / "rows.parquet", polished="no")
     with pytest.raises(ValueError, match="goal"):
         memory.plan(fields_of(problem(0)) | {"goal": [1]})
 

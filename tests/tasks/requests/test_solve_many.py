@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 import shutil
@@ -199,6 +200,18 @@ def test_ctrl_c_loses_no_problem_that_was_solved(
     assert equal_but_for_seconds(read_attempts(out), undisturbed)
     assert len(list(plans.iterdir())) == COUNT
     assert {each.name for each in tmp_path.iterdir()} == {"rows.parquet", "plans"}
+
+
+def test_rows_of_other_options_are_not_replaced_without_a_word(
+    problems: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    out, told = tmp_path / "rows.parquet", []
+    caplog.set_level(logging.INFO)
+    for seed in (1, 2):
+        solve_many(ASSISTANT._replace(seed=seed), problems, out)
+        told.append(str(out) in caplog.text)
+        assert set(read_attempts(out)["seed"]) == {seed}
+    assert told == [False, True]
 
 
 def test_another_question_never_takes_the_parts_of_this_one(
