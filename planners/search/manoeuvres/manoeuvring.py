@@ -44,7 +44,8 @@ MEETING: Final = 3  # times as many with trailers: trees meet where they are wid
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
 TIGHT: Final = 0.6  # a goal with less room around it is tight
-PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth
+PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
+PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
@@ -180,8 +181,8 @@ class Manoeuvring:
 
         Args:
             most: expansions.
-            longer: without trailers, at most so many while all that was found takes long, and at least so
-                many in any case.
+            longer: at most so many while all that was found takes long, and without trailers at least so many
+                in any case.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
             until: when to end, by ``working_clock``.
@@ -196,14 +197,17 @@ class Manoeuvring:
         while self._finds_drive(min(began + most, last), until):
             self._keep()
         self._soon = [other for other in self._kept if other is not None]
-        while not self.meets and self._finds_drive(min(began + self._worth(*longer), last), until):
+        while self._finds_drive(min(began + self._worth(*longer), last), until):
             self._keep()
         return last - self.expansions
 
     def _worth(self, longest: int, least: int) -> int:
         """How many expansions the quickest drive is worth that was found, if there is one."""
+        if not self.kept:
+            return 0
+        per, least = (PER_SQUARE_SECOND_MEETING, 0) if self.meets else (PER_SQUARE_SECOND, least)
         seconds = float(self._drive.ways.seconds.min())
-        return int(max(min(PER_SQUARE_SECOND * seconds * seconds, longest), least)) if self.kept else 0
+        return int(max(min(per * seconds * seconds, longest), least))
 
     def _finds_drive(self, end: int, until: float = math.inf) -> bool:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.

@@ -64,26 +64,33 @@ def test_others_are_plans_that_differ_and_the_first_stays(name: str, vehicle: st
     assert found >= 3  # in most of them
 
 
-def quickest_of(problem: Problem, found: Outcome) -> float:
+def quickest_of(query: Query, found: Outcome) -> float:
     """The driving time of the plan that gets quickest when polished, in seconds."""
     assert found.plan is not None
     plans = [found.plan, *(other.plan for other in found.others)]
-    plan = polish_quickest(problem, plans, CAR, scene_of(problem), WORKSPACE)[1].plan
+    plan = polish_quickest(query.problem, plans, query.vehicle, query.scene, WORKSPACE)[1].plan
     assert plan is not None
     return plan.duration_s
 
 
-def test_after_a_long_drive_the_search_goes_on_and_keeps_what_it_had() -> None:
-    drawn, longer, saved = family("lot"), {}, {}
-    for number in (0, 17):
-        query = asked(to_canonical(drawn.draw(11, number))[0])
+@pytest.mark.parametrize(
+    ("name", "difficulty", "vehicle", "seed", "short", "long"),
+    [("lot", "standard", "car", 11, 0, 17), ("yard", "hard", "car-1-trailer", 7, 24, 21)],
+)
+def test_after_a_long_drive_the_search_goes_on_and_keeps_what_it_had(
+    name: str, difficulty: str, vehicle: str, seed: int, short: int, long: int
+) -> None:
+    driven, longer, saved = VEHICLES[vehicle], {}, {}
+    for number in (short, long):
+        problem = to_canonical(family(name, difficulty, driven).draw(seed, number))[0]
+        query = asked(problem, driven)
         soon, whole = lattice.lattice(query, LatticeSettings(longest=0)), PLANNERS["lattice"](query)
         found = {other.plan.controls.tobytes() for other in whole.others}
         assert found >= {other.plan.controls.tobytes() for other in soon.others}
         longer[number] = whole.expansions - soon.expansions
-        saved[number] = quickest_of(query.problem, soon) - quickest_of(query.problem, whole)
-    assert longer[0] == 0  # its drive is short
-    assert saved[17] > 2.0
+        saved[number] = quickest_of(query, soon) - quickest_of(query, whole)
+    assert longer[short] == 0
+    assert saved[long] > 2.0
 
 
 def test_looking_for_others_keeps_the_limit_of_expansions() -> None:
