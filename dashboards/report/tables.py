@@ -237,9 +237,9 @@ def _cells(row: Row, decimals: int) -> list[str]:
 
 
 def _hits(row: Row) -> str:
-    """The share of problems whose plan was recalled, and after a plus those whose plan was repaired."""
+    """The share of problems that a recalled plan answers, and after a plus those whose plan was repaired."""
     repairs = str(row["assist"]).endswith("repair")
-    recalled, repaired = 100.0 * row["recalled"], 100.0 * row["repaired"]
+    hit, repaired = 100.0 * row["hit"], 100.0 * row["repaired"]
     if not repairs:
-        return percent(row["recalled"])
-    return Cell(f"{recalled:.0f}+{repaired:.0f}", recalled=recalled, repaired=repaired)
+        return percent(row["hit"])
+    return Cell(f"{hit:.0f}+{repaired:.0f}", recalled=hit, repaired=repaired)

@@ -22,7 +22,7 @@ from dashboards.statistics.intervals import (
     ratio,
 )
 from dashboards.statistics.sign_tests import holm, signs
-from planners.world.arrays import Floats
+from planners.world.arrays import Flags, Floats
 from storage.tables.configurations import Configuration, configured
 
 COMBINED: Final = "combined"  # the memory of all classes, whose attempts form a panel of their own
@@ -179,6 +179,17 @@ def compare(
     return pd.concat(tables, ignore_index=True)[names] if tables else pd.DataFrame(columns=names)
 
 
+def hits_of(attempts: pd.DataFrame) -> Flags:
+    """Where a recalled plan answers the problem as it is, ``[n]``, whatever a search found beside it.
+
+    Rows of earlier versions do not say so: there it is where a recalled plan is the answer.
+    """
+    answers = attempts["source"] == "recalled"
+    if "hit" not in attempts:
+        return answers.to_numpy(bool)
+    return attempts["hit"].where(attempts["hit"].notna(), answers).to_numpy(bool)
+
+
 def ranked(names: Iterable[Hashable], order: tuple[str, ...]) -> list[str]:
     """The distinct ``names``: those in ``order`` first, in that order, then the others alphabetically."""
     distinct = {str(name) for name in names}
@@ -191,7 +202,7 @@ COLUMNS: Final = (
     "interquartile_mean_ms", "interquartile_mean_low_ms", "interquartile_mean_high_ms",
     "median_ms", "median_low_ms", "median_high_ms", "p90_ms", "p90_low_ms", "p90_high_ms",
     "reduction", "reduction_low", "reduction_high", "slower", "slowdown", "p_value",
-    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "recalled", "repaired", "searched",
+    "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s", "hit", "recalled", "repaired", "searched",
     "collision_checks",
 )  # fmt: skip
 
@@ -220,6 +231,8 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     table = panel.labels().join(pd.DataFrame([each._asdict() for _, each in panel.columns]))
     table["problems"] = (~np.isnan(times)).sum(axis=0)
     table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
+    hits = panel._replace(rows=panel.rows.assign(hit=hits_of(panel.rows)))
+    table["hit"] = np.nanmean(hits.matrix("hit"), axis=0)
     for source in ("recalled", "repaired", "searched"):  # what the plans of the problems are
         of_source = panel.rows.assign(is_so=panel.rows["source"] == source)
         table[source] = np.nanmean(panel._replace(rows=of_source).matrix("is_so"), axis=0)

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import fisher_exact, ttest_ind_from_stats
 
+from dashboards.statistics.panels import hits_of
 from planners.world.arrays import Floats
 from storage.tables.configurations import POLISHED, configured
 
@@ -106,11 +107,7 @@ class Drift:
 
 def usefulness(attempts: pd.DataFrame) -> dict[str, Usefulness]:
     """How useful one memory was in ``attempts``, by planner and configuration: ``gust open 5 exhaustive``."""
-    rows, _ = configured(attempts)
-    hit = rows["source"] == "recalled"
-    if "hit" in rows:  # not in those of earlier versions
-        hit = rows["hit"].where(rows["hit"].notna(), hit).astype(bool)
-    rows = rows.assign(hit=hit)
+    rows, _ = configured(attempts.assign(hit=hits_of(attempts)))
     by_name = {}
     for (planner, configuration), of_both in rows.groupby(["planner", "configuration"], observed=True):
         hits = int(of_both["hit"].sum())

@@ -223,6 +223,17 @@ def test_polished_answers_are_compared_with_polished_ones_and_change_no_other_ro
     )
 
 
+def test_a_hit_is_what_the_row_says_and_where_it_says_nothing_a_recalled_answer() -> None:
+    rows = attempts(("trap",), ("lattice",), [BASELINE, CLOSED_1], problems=20)
+    helped = rows["assist"] == "closed"
+    recalled = rows["source"] == "recalled"
+    summary = summarise(rows.assign(hit=helped.where(helped, None)), resamples=10)
+    assert summary["hit"].tolist() == [0.0, 1.0]
+    assert summary["recalled"].tolist() == [0.0, recalled[helped].mean()]
+    for before in (rows, rows.assign(hit=None)):
+        assert summarise(before, resamples=10)["hit"].tolist() == [0.0, recalled[helped].mean()]
+
+
 def test_growing_experience_is_a_summary_for_each_number_of_experiences(attempt_rows: pd.DataFrame) -> None:
     both = pd.concat([attempt_rows.assign(experiences=20), attempt_rows.assign(experiences=40)])
     grown = summarise_continual(both, resamples=10)
