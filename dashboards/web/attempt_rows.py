@@ -9,12 +9,13 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
+from dashboards.statistics.panels import hits_of
 from planners.world.arrays import Array, Flags, Floats
 from storage.tables.configurations import Configuration, configured
 
 COLUMNS: Final = (
     "problem_id", "problem_class", "planner", "assist", "top_k", "recall", "polished", "memory", "status",
-    "solved", "source", "planning_seconds", "collision_checks", "expansions", "length_m", "duration_s",
+    "solved", "source", "hit", "planning_seconds", "collision_checks", "expansions", "length_m", "duration_s",
     "seed", "vehicle",
 )  # fmt: skip
 SHOWS: Final = {
@@ -102,15 +103,15 @@ def attempts_of(frame: pd.DataFrame, faults: Sequence[str]) -> Attempts:
     alone = _means(of_planner[baseline], milliseconds[baseline], count)[of_planner]
     ratio = np.divide(milliseconds, alone, out=np.full(len(frame), np.nan), where=alone > 0.0)
     of_memory = problem * (int(memory.max(initial=0)) + 1) + memory
-    recalled = equals(frame["source"], "recalled")
+    hit = hits_of(frame)
     has_free_plan = np.zeros(int(of_memory.max(initial=0)) + 1, bool)
-    has_free_plan[of_memory[recalled & (memory >= 0)]] = True
+    has_free_plan[of_memory[hit & (memory >= 0)]] = True
     rows = frame.assign(
         configuration=labelled["configuration"],
         ms=milliseconds,
         alone_ms=alone,
         ratio=np.where(baseline, np.nan, ratio),
-        missed=(memory >= 0) & ~recalled & has_free_plan[of_memory],
+        missed=(memory >= 0) & ~hit & has_free_plan[of_memory],
     )
     return Attempts(rows, configurations, tuple(faults))
 

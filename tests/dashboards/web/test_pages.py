@@ -107,6 +107,17 @@ def test_what_memory_hurts_is_what_took_longer_than_the_planner_alone(data: Data
     assert set(found.chosen({}, "hurt").index) == slower
 
 
+def test_missed_is_what_another_attempt_had_a_free_stored_plan_for(data: DataFolder) -> None:
+    frame, _ = readable_attempts(data.run("first").results, COLUMNS)
+    with_memory = frame[frame["memory"].notna()]
+    fits = with_memory[with_memory["hit"].eq(True)]
+    free = set(fits["problem_id"])
+    missed = {
+        index for index, row in with_memory.iterrows() if row["problem_id"] in free and row["hit"] is not True
+    }
+    assert set(attempts_of(frame, ()).chosen({}, "missed").index) == missed
+
+
 def test_next_and_previous_walk_through_the_selection(client: httpx.Client) -> None:
     table = client.get("/runs/first/problems?show=slowest&planner=gust").text
     places = [each.replace("&amp;", "&") for each in re.findall(r'class="key"><a href="([^"]+)"', table)]
