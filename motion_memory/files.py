@@ -101,14 +101,17 @@ def solve_many(
         polished: as of ``load``.
 
     Raises:
-        UsageError: A name is unknown, ``top_k`` is no whole number above 0, ``polished`` is no truth value,
-            or a file would be written over another one.
+        UsageError: A name is unknown, a number, flag or path is none, or a file would be written over another
+            one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
     from tasks.registry.settled_vehicle import settled_vehicle  # late: a robot may not have pyarrow
     from tasks.requests.assistant import AssistantSettings
     from tasks.requests.solve_many import solve_many as solve_file
+    from tasks.settings.checks import check_path
 
+    for name, value in (("problems", problems), ("out", out), ("plans", plans or "")):
+        check_path(name, value)
     stored = None if memory is None else str(memory)
     settings = AssistantSettings(
         planner=planner,

@@ -26,7 +26,14 @@ from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.registry.memory_at import memory_at
-from tasks.settings.checks import check_flag, check_known, check_no_recall, check_whole, checked_vehicle
+from tasks.settings.checks import (
+    check_flag,
+    check_known,
+    check_no_recall,
+    check_seed,
+    check_whole,
+    checked_vehicle,
+)
 from tasks.settings.errors import RunError
 
 
@@ -61,7 +68,7 @@ def load(
             before, which is quicker if only a few problems follow after an installation.
 
     Raises:
-        UsageError: A name is unknown, ``top_k`` is no whole number above 0, a flag is no truth value, or a
+        UsageError: A name is unknown, ``top_k`` or ``seed`` is no such number, a flag is no truth value, or a
             library is to be recalled from in some way.
         StorageError: The memory is missing, damaged, or made for another vehicle.
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
@@ -72,6 +79,7 @@ def load(
     check_known("assist", [assist], ASSISTS)
     check_known("recall", [] if recall is None else [recall], RECALLS)
     check_whole("top_k", top_k)
+    check_seed(seed)
     for name, value in (("judged", judged), ("polished", polished), ("warm", warm)):
         check_flag(name, value)
     with memory_at(str(memory)) as folder:

@@ -27,6 +27,7 @@ from storage.exchange.problems import problem_of
 from storage.fields import parse_json
 from storage.vehicles.vehicle_files import scale_for_vehicle
 from tasks.attempts.judged_attempts import check_attempt
+from tasks.settings.checks import is_whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,10 +144,10 @@ class Memory:
 
         Raises:
             ValueError: The problem is malformed or impossible, the memory is not made for its scale, or ``k``
-                is below 1.
+                is no whole number above 0.
         """
-        if k < 1:
-            raise ValueError(f"k is {k}: give 1 or more")
+        if not is_whole(k, 1):
+            raise ValueError(f"k is {k!r}: give a whole number, 1 or more")
         read = self._read(problem)
         fault = scale_fault(self.stored, read.scale)
         if fault is not None:

@@ -123,4 +123,5 @@ def _arrival(row: Row) -> str:
 
 
 def _sooner(seconds: float) -> str:
-    return f"{seconds:.2f} s sooner" if seconds >= 0.0 else f"{-seconds:.2f} s later"
+    amount = f"{abs(seconds):.2f} s" if abs(seconds) >= 0.01 else f"{1e3 * abs(seconds):.1f} ms"
+    return f"{amount} {'sooner' if seconds >= 0.0 else 'later'}"

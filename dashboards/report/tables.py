@@ -44,8 +44,8 @@ _UNITS: Final = (
 FULL_HEADINGS: Final = (
     "planner", "configuration", "solved %", "mean ms [95 %]", "reduction of the mean % [95 %]", "slower %",
     "median slowdown", "p (sign test, Holm)", "median ms [95 %]", "90 % ms [95 %]",
-    "interquartile mean ms [95 %]", "driving s", "sooner s [95 %]", "recalled %", "repaired %", "searched %",
-    "collision checks",
+    "interquartile mean ms [95 %]", "driving s", "sooner s [95 %]", "hits %", "recalled %", "repaired %",
+    "searched %", "collision checks",
 )  # fmt: skip
 _SWEEP_HEADINGS: Final = (
     "class", "rate", "channels", "hidden", "parameters", "hit@1", "hit@5", "seconds"
@@ -195,7 +195,7 @@ def full_cells(row: Row, decimals: int) -> list[str]:
         p_value(row["p_value"]),
         *[time(name) for name in ("median", "p90", "interquartile_mean")],
         *driving_cells(row, 2),
-        *[NOTHING if row["assist"] == "none" else percent(row[name]) for name in SOURCES],
+        *[NOTHING if row["assist"] == "none" else percent(row[name]) for name in ("hit", *SOURCES)],
         count(row["collision_checks"]),
     ]
 

@@ -55,6 +55,7 @@ class Drift:
     then: Usefulness
     p_value: float  # of so few hits by chance
     later_p_value: float  # of so long total times by chance
+    then_as_found: bool = False  # whether polished answers are compared with plans as they were found
 
     @property
     def has_fallen(self) -> bool:
@@ -98,9 +99,10 @@ class Drift:
                 f"; planning and driving {self.now.total_s:.1f} s, {self.then.total_s:.1f} then ({later}, "
                 f"p = {self.later_p_value:.2g})"
             )
+        benchmark = "its benchmark, of plans as found" if self.then_as_found else "its benchmark"
         return (
             f"{self.memory}, {self.configuration}: {100 * self.now.hit_rate:.1f} % hits, "
-            f"{100 * self.then.hit_rate:.1f} in its benchmark ({verdict}, p = {self.p_value:.2g}); "
+            f"{100 * self.then.hit_rate:.1f} in {benchmark} ({verdict}, p = {self.p_value:.2g}); "
             f"mean {self.now.mean_ms:.2f} ms, {self.then.mean_ms:.2f} then{total}"
         )
 
@@ -145,7 +147,8 @@ def drifts(memory: str, now: Mapping[str, Usefulness], then: Mapping[str, Useful
     for name, mine in now.items():
         before = then.get(name) or then.get(name.removesuffix(f" {POLISHED}"))
         if before is not None:
-            found.append(Drift(memory, name, mine, before, _fewer(mine, before), _later(mine, before)))
+            p_values = _fewer(mine, before), _later(mine, before)
+            found.append(Drift(memory, name, mine, before, *p_values, then_as_found=name not in then))
     return found
 
 

@@ -10,9 +10,9 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, get_args
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import App, CycloptsError, Group, Parameter, convert
 from cyclopts.config import Toml
 from cyclopts.exceptions import UnusedCliTokensError
 
@@ -43,7 +43,21 @@ def package_version() -> str:
     return f"motion-memory {version('motion-memory')} (Python {platform.python_version()}, {libraries})"
 
 
+def _converted(type_: Any, tokens: Any) -> Any:
+    """The value of an option; without this, cyclopts rounds a fraction where a whole number is wanted."""
+    if _holds_whole_numbers(type_):
+        for token in tokens:
+            if "." in token.value:
+                raise ValueError(f"{token.value} is no whole number; give one")
+    return convert(type_, tokens)
+
+
+def _holds_whole_numbers(type_: Any) -> bool:
+    return type_ is int or any(map(_holds_whole_numbers, get_args(type_)))
+
+
 app = App(
+    default_parameter=Parameter(converter=_converted),
     name="motion-memory",
     help="Plan robot motions from experience: collect, learn, recall, measure.",
     version=package_version,

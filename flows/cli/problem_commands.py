@@ -199,7 +199,11 @@ def _write_summary(solved: SolvedMany) -> None:
     mean_s, median_s, ninth_s = solved.planning_seconds
     hits, fit = solved.tally.hits, []
     if hits is not None:
-        fit = [f"memory   recalled plans fit {hits:,} of {count:,} problems ({hits / count:.2%})"]
+        answers = outcomes["recalled"] + outcomes["repaired"]
+        fit = [
+            f"memory   {answers:,} of {count:,} answers are from memory ({answers / count:.2%}); "
+            f"recalled plans fit {hits:,} problems as they are"
+        ]
     driving_s = solved.driving_seconds
     write_answer(
         f"solved   {with_plan:,} of {count:,} ({with_plan / count:.2%}): {named}",

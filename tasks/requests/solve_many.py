@@ -126,8 +126,6 @@ def solve_many(
         if _is_finished(request, key):
             _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
             return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [])
-        if out.exists():
-            _LOG.info("%s holds other rows, of other problems or options; these take their place.", out)
         with unfinished(out):
             left = [part for part in parts if not SOLVE.is_written(part)]
             begun = sum(len(part.rows_begun()) for part in left)
@@ -145,6 +143,8 @@ def solve_many(
             repeated = _repeated_id(parts)
             if repeated is not None:
                 raise StorageError(repeated)
+            if out.exists():
+                _LOG.info("%s held rows of other problems or options; these take their place.", out)
             join_attempts(out, [part.shard for part in parts], key)
             remove_folder(request.folder)
     solved_now = sum(part.problem_slice.count for part in left) - begun

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
@@ -30,10 +31,11 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
     """
     for name in names:
         if name not in choices:
-            raise UsageError(f"Unknown {kind} {name!r}{nearest(name, choices)}. Known: {', '.join(choices)}.")
+            near = nearest(name, choices) if isinstance(name, str) else ""
+            raise UsageError(f"Unknown {kind} {name!r}{near}. Known: {', '.join(choices)}.")
 
 
-def checked_vehicle(given: str) -> str:
+def checked_vehicle(given: object) -> str:
     """A complete description of a vehicle (``storage.vehicles.vehicle_files.said_vehicle``).
 
     Args:
@@ -44,6 +46,8 @@ def checked_vehicle(given: str) -> str:
         UsageError: there is no such vehicle, or its file is wrong; the message is one line.
 
     """
+    if not isinstance(given, str):  # a caller in Python may give anything
+        raise UsageError(f"The vehicle is {given!r}: give its name, or the path of its .yaml file, as text.")
     try:
         return text_of_vehicle(given)
     except StorageError as error:
@@ -56,9 +60,14 @@ def check_count(what: str, count: int) -> None:
         raise UsageError(f"{count} {what}: give 1 or more.")
 
 
+def is_whole(value: object, least: float) -> bool:
+    """Whether a value is a whole number, and not below the ``least``; a truth value is none."""
+    return not isinstance(value, bool) and isinstance(value, Integral) and int(value) >= least
+
+
 def check_whole(name: str, value: object) -> None:
     """Refuse what is not a whole number of 1 or more; ``name`` is what the caller calls it."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+    if not is_whole(value, 1):
         raise UsageError(f"{name} is {value!r}: give a whole number, 1 or more.")
 
 
@@ -66,6 +75,12 @@ def check_flag(name: str, value: object) -> None:
     """Refuse what is no truth value, since any text would count as true; ``name`` as in ``check_whole``."""
     if not isinstance(value, bool):
         raise UsageError(f"{name} is {value!r}: give True or False.")
+
+
+def check_path(name: str, value: object) -> None:
+    """Refuse what is no path; ``name`` is what the caller calls it."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise UsageError(f"{name} is {type(value).__name__} {value!r:.80}: give a path.")
 
 
 def check_no_recall(recall: str | None, library: str, option: str) -> None:
@@ -77,10 +92,11 @@ def check_no_recall(recall: str | None, library: str, option: str) -> None:
         )
 
 
-def check_seed(seed: int) -> None:
-    """Refuse a negative seed."""
-    if seed < 0:
-        raise UsageError(f"Seed {seed} is negative. Give 0 or more.")
+def check_seed(seed: object) -> None:
+    """Refuse a seed that is negative, or no whole number."""
+    if not is_whole(seed, 0):
+        fault = "negative" if is_whole(seed, -math.inf) else "no whole number"
+        raise UsageError(f"Seed {seed!r} is {fault}. Give 0 or more.")
 
 
 def check_picture(path: Path | None) -> None:

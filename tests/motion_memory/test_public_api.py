@@ -96,10 +96,25 @@ def test_what_goes_wrong_is_caught_by_its_public_name(
         motion_memory.load(folder, planner="luck")
     with pytest.raises(motion_memory.UsageError, match="'no'"):
         motion_memory.load(folder, polished="no")
-    with pytest.raises(motion_memory.UsageError, match=r"2\.5"):
-        motion_memory.load(folder, top_k=2.5)
-    with pytest.raises(motion_memory.UsageError, match="'no'"):
-        motion_memory.solve_many(tmp_path / "problems.jsonl", tmp_path / "rows.parquet", polished="no")
+    for wrong in (
+        {"top_k": 2.5}, {"seed": -1}, {"seed": 1.5}, {"seed": "a"},
+        {"planner": 3}, {"assist": None}, {"vehicle": 3},
+    ):  # fmt: skip
+        with pytest.raises(motion_memory.UsageError):
+            motion_memory.load(folder, **wrong)
+    asked = {"problems": tmp_path / "problems.jsonl", "out": tmp_path / "rows.parquet"}
+    for wrong in (
+        {"polished": "no"},
+        {"seed": "1"},
+        {"top_k": True},
+        {"plans": 3},
+        {"problems": [problem(0)]},
+    ):
+        with pytest.raises(motion_memory.UsageError):
+            motion_memory.solve_many(**asked | wrong)
+    for k in (0, 2.5, True, "2"):
+        with pytest.raises(ValueError, match=repr(k)):
+            memory.recall(problem(0), k=k)
     with pytest.raises(ValueError, match="goal"):
         memory.plan(fields_of(problem(0)) | {"goal": [1]})
 

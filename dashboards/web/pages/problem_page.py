@@ -155,7 +155,10 @@ def _recalled(replayed: Replay) -> list[dict[str, Any]]:
             f"{int(recollection.blocked.sum())} of {len(plan.states)}",
             NOTHING if first is None else f"({plan.states[first, 0]:.1f}, {plan.states[first, 1]:.1f})",
         ]
-        table.append({"order": order, "numbers": numbers, "use": USES[recollection.use]})
+        use = (
+            USES[recollection.use] if recollection.use or first is not None else "fits, but is not the answer"
+        )
+        table.append({"order": order, "numbers": numbers, "use": use})
     return table
 
 

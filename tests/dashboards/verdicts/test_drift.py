@@ -88,9 +88,9 @@ def test_polished_answers_are_compared_with_polished_ones_where_the_benchmark_ha
     polished = f"{NAME} polished"
     later = replace(THEN, total_s=25.0)
     (found,) = drifts("trap/2", {polished: THEN}, {NAME: later, polished: THEN})
-    assert found.then == THEN
+    assert (found.then, found.then_as_found) == (THEN, False)
     (found,) = drifts("trap/2", {polished: THEN}, {NAME: later})
-    assert found.then == later
+    assert (found.then, found.then_as_found) == (later, True)
     assert not found.has_drifted
 
 
