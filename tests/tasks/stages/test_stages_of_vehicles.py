@@ -24,7 +24,6 @@ from tasks.requests.plan_one import plan_one
 from tasks.requests.solve_many import solve_many
 from tasks.requests.verify_folder import verify_folder
 from tasks.settings.presets import for_preset
-from tasks.settings.run_settings import ASSISTS
 from tasks.stages.benchmark import BENCHMARK
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.draw_examples import DRAW_EXAMPLES
@@ -42,6 +41,7 @@ SETTINGS = replace(
     collector=PLANNER,
     epochs=1,
 )
+WAYS = 1 + len(SETTINGS.assists_of(PLANNER))  # in which a problem is attempted
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def problems(tmp_path: Path) -> Path:
 def test_every_attempt_is_of_the_trailer_and_its_plan_was_judged(run: RunFolder) -> None:
     rows = read_attempts(run.results)
     assert set(rows["vehicle"]) == {"car-1-trailer"}
-    assert len(rows) == 3 * (1 + len(ASSISTS))
+    assert len(rows) == 3 * WAYS
     assert rows["solved"].all()
     assert rows["verified"].all()
 
@@ -81,20 +81,20 @@ def test_its_figures_are_drawn(run: RunFolder) -> None:
 
 def test_verify_makes_the_same_attempts_again(run: RunFolder) -> None:
     checked = verify_folder(run.path.parents[1], sample=1.0, workers=1)
-    assert checked["attempts made again"] == 3 * (1 + len(ASSISTS))
+    assert checked["attempts made again"] == 3 * WAYS
 
 
 def test_its_memories_measured_in_turn_do_not_differ_from_themselves(run: RunFolder) -> None:
     side = MeasuredRun(run, SETTINGS)
     first, other = (rows.reset_index(drop=True) for rows in measure_in_turn(side, side, problems=2))
-    assert len(first) == 2 * (1 + len(ASSISTS))
+    assert len(first) == 2 * WAYS
     attempt = ["problem_id", "planner", "assist", "top_k", "recall"]
     assert not first.duplicated(attempt).any()
     ours, theirs = (rows.sort_values(attempt).drop(columns="run_id") for rows in (first, other))
     assert equal_but_for_seconds(ours, theirs)
     timed = (rows.assign(planning_seconds=0.01 + 0.001 * rows["expansions"]) for rows in (first, other))
     rows = compare_runs(*timed, in_turn=True)
-    assert len(rows) == 1 + len(ASSISTS)
+    assert len(rows) == WAYS
     assert set(rows["verdict"]) == {SAME, CONTROL}
 
 
