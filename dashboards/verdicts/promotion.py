@@ -128,7 +128,8 @@ def judgement_markdown(judged: Judgement, verdict: str) -> str:
 
 
 def _attempted(rows: pd.DataFrame) -> set[tuple[Any, ...]]:
-    keys = rows[["problem_id", "planner", "assist", "top_k", "recall", "polished"]].astype(object)
+    names = ["problem_id", "planner", "assist", "top_k", "recall", "polished"]
+    keys = rows.reindex(columns=names).astype(object)  # rows of earlier versions lack the last
     return set(keys.where(keys.notna(), None).itertuples(index=False, name=None))
 
 

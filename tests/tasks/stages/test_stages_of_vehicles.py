@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from dashboards.verdicts.comparison import CONTROL, SAME, compare_runs
@@ -82,6 +84,15 @@ def test_its_figures_are_drawn(run: RunFolder) -> None:
 def test_verify_makes_the_same_attempts_again(run: RunFolder) -> None:
     checked = verify_folder(run.path.parents[1], sample=1.0, workers=1)
     assert checked["attempts made again"] == 3 * WAYS
+
+
+def test_attempts_of_earlier_versions_are_made_again_as_they_were(run: RunFolder, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    shutil.copytree(run.path.parents[1], data)
+    for path in (data / "runs" / run.path.name / "results").rglob("*.parquet"):
+        table = pq.read_table(path)
+        pq.write_table(table.drop_columns(["polished", "hit"]), path)
+    assert verify_folder(data, sample=1.0, workers=1)["attempts made again"] == 3 * WAYS
 
 
 def test_its_memories_measured_in_turn_do_not_differ_from_themselves(run: RunFolder) -> None:
