@@ -221,6 +221,10 @@ def _summary_at(path: Path) -> pd.DataFrame:
         summary = pd.read_csv(StringIO(read_text(path)), keep_default_na=True)
     except ValueError as error:
         raise StorageError(f"{path} is no table ({str(error)[:80]}); run report again.") from None
+    if "recalled" in summary:  # of an earlier version, which measured plans as found
+        summary = summary.assign(
+            polished=summary.get("polished", False), hit=summary.get("hit", summary["recalled"])
+        )
     if not set(SUMMARY_COLUMNS) <= set(summary.columns):
         raise StorageError(f"{path} lacks columns of a summary; run report again.")
     return summary.fillna({"recall": ""})

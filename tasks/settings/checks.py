@@ -30,7 +30,7 @@ def check_known(kind: str, names: Iterable[str], choices: Sequence[str] | Mappin
         UsageError: one of the names is not among the choices.
     """
     for name in names:
-        if name not in choices:
+        if name not in list(choices):
             near = nearest(name, choices) if isinstance(name, str) else ""
             raise UsageError(f"Unknown {kind} {name!r}{near}. Known: {', '.join(choices)}.")
 

@@ -98,7 +98,7 @@ def test_what_goes_wrong_is_caught_by_its_public_name(
         motion_memory.load(folder, polished="no")
     for wrong in (
         {"top_k": 2.5}, {"seed": -1}, {"seed": 1.5}, {"seed": "a"},
-        {"planner": 3}, {"assist": None}, {"vehicle": 3},
+        {"planner": 3}, {"planner": ["lattice"]}, {"assist": None}, {"vehicle": 3},
     ):  # fmt: skip
         with pytest.raises(motion_memory.UsageError):
             motion_memory.load(folder, **wrong)

@@ -14,6 +14,7 @@ from dashboards.web.parameters import Parameters
 from planners.world.vehicles.vehicle import name_of
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
+from storage.tables.configurations import as_found
 
 
 def runs(data: DataReader, params: Parameters) -> Page:
@@ -57,7 +58,7 @@ def _result(data: DataReader, run: RunFolder) -> str:
         summary, _ = data.summary(run)
     except StorageError:
         return NOTHING
-    own = summary[summary["panel"] != COMBINED]
+    own = as_found(summary[summary["panel"] != COMBINED])
     if own.empty or used_by_default(own).empty:
         return NOTHING
     faster, sooner_s = times_faster(own), used_by_default(own)["sooner_s"].mean()

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import httpx
 import numpy as np
+import pandas as pd
 import pytest
 
 from dashboards.verdicts.comparison_words import NOT_SHOWN
@@ -29,6 +30,7 @@ from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
 from storage.tables.watched import read_watched
 from tests.dashboards.web.conftest import LocalClient
+from tests.dashboards.web.server import served
 from tests.dashboards.web.small_data import VERSIONS, small_data, write_settings
 
 ADDRESSES = (
@@ -105,6 +107,23 @@ def test_what_memory_hurts_is_what_took_longer_than_the_planner_alone(data: Data
         if row["assist"] != "none" and row["planning_seconds"] > alone[tuple(row[name] for name in alike)]
     }
     assert set(found.chosen({}, "hurt").index) == slower
+
+
+def test_a_summary_of_before_answers_were_polished_is_shown_and_is_of_plans_as_found(tmp_path: Path) -> None:
+    data = small_data(tmp_path / "data", ("first",))
+    path = data.run("first").summary("csv")
+    now = pd.read_csv(path)
+    shown = []
+    for table in (now, now[~now["polished"]].drop(columns=["polished", "hit"])):
+        path.write_text(table.to_csv(index=False), "utf-8")
+        with (
+            served(data, lambda: VERSIONS) as address,
+            httpx.Client(base_url=address, timeout=60.0) as reading,
+        ):
+            assert reading.get("/runs/first").status_code == 200
+            shown.append(re.findall(r"[\d.]+ × faster", reading.get("/").text))
+    assert shown[0]
+    assert shown[0] == shown[1]  # polished rows do not enter it
 
 
 def test_missed_is_what_another_attempt_had_a_free_stored_plan_for(data: DataFolder) -> None:
