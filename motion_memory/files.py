@@ -101,8 +101,8 @@ def solve_many(
         polished: as of ``load``.
 
     Raises:
-        UsageError: A name is unknown, a number, flag or path is none, or a file would be written over another
-            one.
+        UsageError: A name is unknown, a number, flag or path is not one, or a file would be written over
+            another one.
         StorageError: A problem is malformed; the others are solved and kept.
     """
     from tasks.registry.settled_vehicle import settled_vehicle  # late: a robot may not have pyarrow

@@ -12,10 +12,8 @@ from motion_memory.memory import Memory
 from planners.attempt import SUB_PLANS
 from planners.drive_answers import first_question
 from planners.memory.library.plan_library import PlanLibrary
-from planners.memory.recall import RECALLS, default_recall
+from planners.memory.recall import default_recall
 from planners.optimisation.polish import driven_near
-from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import families_of, family
@@ -26,14 +24,7 @@ from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.attempts.compile_assists import compile_assists
 from tasks.registry.memory_at import memory_at
-from tasks.settings.checks import (
-    check_flag,
-    check_known,
-    check_no_recall,
-    check_seed,
-    check_whole,
-    checked_vehicle,
-)
+from tasks.settings.checks import check_asked, check_flag, check_no_recall, checked_vehicle
 from tasks.settings.errors import RunError
 
 
@@ -68,20 +59,16 @@ def load(
             before, which is quicker if only a few problems follow after an installation.
 
     Raises:
-        UsageError: A name is unknown, ``top_k`` or ``seed`` is no such number, a flag is no truth value, or a
-            library is to be recalled from in some way.
+        UsageError: A name is unknown, ``top_k`` or ``seed`` is not a number as it should be, a flag is
+            not True or False, or a library is to be recalled from in some way.
         StorageError: The memory is missing, damaged, or made for another vehicle.
         RunError: MLflow does not have the memory, the run has several, or its encoder needs a library that is
             missing.
     """
     named = None if vehicle is None else said_vehicle(checked_vehicle(vehicle))
-    check_known("planner", [planner], PLANNERS)
-    check_known("assist", [assist], ASSISTS)
-    check_known("recall", [] if recall is None else [recall], RECALLS)
-    check_whole("top_k", top_k)
-    check_seed(seed)
-    for name, value in (("judged", judged), ("polished", polished), ("warm", warm)):
-        check_flag(name, value)
+    check_asked(planner, assist, recall, top_k, seed, polished, "top_k")
+    check_flag("judged", judged)
+    check_flag("warm", warm)
     with memory_at(str(memory)) as folder:
         # mapped files stay readable after they are deleted
         archive = load_memory_or_library(folder, named or vehicle_of(folder))

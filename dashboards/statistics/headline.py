@@ -45,11 +45,11 @@ def headline(summary: pd.DataFrame, retrieval: pd.DataFrame) -> dict[str, float]
 
     Returns, of a memory used as by default against none: ``1-gain/sooner_s``, seconds, and ``1-gain/faster``,
     times (geometric mean); of answers as they are returned, polished: ``1-gain/returned_s``. With it, under
-    ``2-with/``: ``solved``, ``recalled``, ``repaired``, ``slower``,
-    ``driving_s`` and ``checks`` (of collisions); without it, under ``3-alone/``: ``solved``, ``driving_s``
-    and ``checks``. Then the figures of ``headline_retrieval``. Of all configurations, shares of the mean
-    planning time: ``5-saved/<configuration>``, and ``5-saved/all``, the mean of those with a memory. Figures
-    that were not measured are left out.
+    ``2-with/``: ``solved``, ``recalled``, ``repaired``, ``slower``, ``driving_s`` and ``checks`` (of
+    collisions); without it, under ``3-alone/``: ``solved``, ``driving_s`` and ``checks``. Then the figures of
+    ``headline_retrieval``. Of all configurations, shares of the mean planning time:
+    ``5-saved/<configuration>``, and ``5-saved/all``, the mean of those with a memory. Figures that were not
+    measured are left out.
 
     Args:
         summary: table of ``panels.summarise``.

@@ -55,6 +55,10 @@ class Panel(NamedTuple):
         """Planning times ``[problems, columns]``, failures with the time they took."""
         return 1e3 * self.matrix("planning_seconds")
 
+    def hits(self) -> Floats:
+        """Whether a recalled plan fits the problem (``hits_of``), ``[problems, columns]``."""
+        return self._replace(rows=self.rows.assign(hit=hits_of(self.rows))).matrix("hit")
+
     def censored(self) -> Floats:
         """Planning times in milliseconds ``[problems, columns]``, infinite where an attempt failed."""
         solved = self.matrix("solved")
@@ -231,8 +235,7 @@ def _summarise(panel: Panel, seed: int, resamples: int) -> pd.DataFrame:
     table = panel.labels().join(pd.DataFrame([each._asdict() for _, each in panel.columns]))
     table["problems"] = (~np.isnan(times)).sum(axis=0)
     table["solved"] = np.nanmean(panel.matrix("solved"), axis=0)
-    hits = panel._replace(rows=panel.rows.assign(hit=hits_of(panel.rows)))
-    table["hit"] = np.nanmean(hits.matrix("hit"), axis=0)
+    table["hit"] = np.nanmean(panel.hits(), axis=0)
     for source in ("recalled", "repaired", "searched"):  # what the plans of the problems are
         of_source = panel.rows.assign(is_so=panel.rows["source"] == source)
         table[source] = np.nanmean(panel._replace(rows=of_source).matrix("is_so"), axis=0)

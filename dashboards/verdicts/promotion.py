@@ -26,7 +26,7 @@ import pandas as pd
 
 from dashboards.cells import Cell, CellTable, Rows, as_markdown, decimal, decimals_of, percent, titled_tables
 from dashboards.statistics.intervals import CONFIDENCE, bootstrap
-from dashboards.statistics.panels import Panel, hits_of, panels
+from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.sign_tests import holm, signs
 from planners.world.arrays import Floats
 
@@ -138,10 +138,7 @@ def _compared(before: Panel, after: Panel) -> pd.DataFrame:
     times = [panel.milliseconds().mean(0) for panel in (before, after)]
     driving = [panel.driving_seconds() for panel in (before, after)]
     solved = [panel.matrix("solved") for panel in (before, after)]
-    hits = [
-        panel._replace(rows=panel.rows.assign(hit=hits_of(panel.rows))).matrix("hit").mean(0)
-        for panel in (before, after)
-    ]
+    hits = [panel.hits().mean(0) for panel in (before, after)]
     tests = [signs(2.0 - mine, 2.0 - other) for mine, other in zip(solved[1].T, solved[0].T, strict=True)]
     return after.labels().assign(
         problems=after.problems,

@@ -57,7 +57,7 @@ def configured(attempts: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Configur
     Returns the rows, and the configurations by label, in reading order.
     """
     keys = pd.DataFrame({name: attempts.get(name) for name in _KEYS}, attempts.index)
-    keys = keys.assign(polished=keys["polished"].eq(True))
+    keys = keys.assign(polished=_is_polished(keys))
     distinct = keys.drop_duplicates()
     configurations = [_understood(*row) for row in distinct.itertuples(index=False, name=None)]
     by_label = {each.label: each for each in sorted(set(configurations), key=lambda each: each.rank)}
@@ -76,12 +76,18 @@ def configurations_in(table: pd.DataFrame) -> list[Configuration]:
 
 def as_found(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of a ``table`` of attempts, or of their summary, whose plans are as they were found."""
-    return table[~table["polished"].eq(True)] if "polished" in table else table
+    return table[~_is_polished(table)]
 
 
 def as_returned(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of a ``table`` of attempts, or of their summary, whose plans are polished, as answers are."""
-    return table[table["polished"].eq(True)] if "polished" in table else table.head(0)
+    return table[_is_polished(table)]
+
+
+def _is_polished(table: pd.DataFrame) -> pd.Series[bool]:
+    """Whether each row says so; those of earlier versions do not."""
+    column = table["polished"] if "polished" in table else pd.Series(False, table.index)
+    return column.eq(True)
 
 
 def _understood(assist: str, top_k: float, recall: object, polished: bool) -> Configuration:

@@ -13,12 +13,10 @@ from planners.explanation import MovedDrive, drive_found
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
-from planners.memory.recall import RECALLS
 from planners.optimisation.polish import most_iterations
 from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.query import Limits, usual_limits
-from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
+from planners.solve import WITHOUT_MEMORY, improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace
@@ -29,14 +27,7 @@ from tasks.attempts.compile_assists import EMPTY, compile_free_answer
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.registry.model_uris import is_model_uri, load_from
-from tasks.settings.checks import (
-    check_flag,
-    check_known,
-    check_no_recall,
-    check_seed,
-    check_whole,
-    checked_vehicle,
-)
+from tasks.settings.checks import check_asked, check_no_recall, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 from tasks.settings.run_settings import COMBINED, DEFAULT_VEHICLE, UNASSISTED
 
@@ -72,13 +63,8 @@ class Assistant:
             StorageError: the memory lies in object storage and cannot be fetched.
         """
         planner, assist, top_k, memory, seed, vehicle, improve_seconds, recall, polished = settings
-        check_known("planner", [planner], tuple(PLANNERS))
-        check_known("assist", [assist], ASSISTS)
+        check_asked(planner, assist, recall, top_k, seed, polished, "top-k")
         vehicle = checked_vehicle(vehicle)
-        check_known("recall", [] if recall is None else [recall], RECALLS)
-        check_whole("top-k", top_k)
-        check_flag("polished", polished)
-        check_seed(seed)
         if assist not in WITHOUT_MEMORY and memory is None:
             raise UsageError(f"Assist {assist!r} needs --memory: a folder, or a model in MLflow.")
         if not 0.0 <= improve_seconds < math.inf:

@@ -83,6 +83,35 @@ def check_path(name: str, value: object) -> None:
         raise UsageError(f"{name} is {type(value).__name__} {value!r:.80}: give a path.")
 
 
+def check_asked(
+    planner: str, assist: str, recall: str | None, top_k: int, seed: int, polished: bool, top_k_name: str
+) -> None:
+    """Refuse a wrong way to ask for plans, by command or in Python.
+
+    Args:
+        planner: one of ``PLANNERS``.
+        assist: one of ``ASSISTS``.
+        recall: one of ``RECALLS``, or None.
+        top_k: how many plans to recall, 1 or more.
+        seed: 0 or more.
+        polished: True or False.
+        top_k_name: what the caller calls ``top_k``.
+
+    Raises:
+        UsageError: one of them is wrong.
+    """
+    from planners.memory.recall import RECALLS  # imported late: Numba costs half a second
+    from planners.search.registry import PLANNERS
+    from planners.solve import ASSISTS
+
+    check_known("planner", [planner], PLANNERS)
+    check_known("assist", [assist], ASSISTS)
+    check_known("recall", [] if recall is None else [recall], RECALLS)
+    check_whole(top_k_name, top_k)
+    check_flag("polished", polished)
+    check_seed(seed)
+
+
 def check_no_recall(recall: str | None, library: str, option: str) -> None:
     """Refuse a strategy of recall for a library, which recalls in one way; ``option`` is how it was given."""
     if recall is not None:

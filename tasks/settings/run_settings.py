@@ -225,8 +225,9 @@ class RunSettings:
 
 
 def _digested(assist: Assist) -> tuple[Any, ...]:
-    """The fields of an ``assist`` that count in a digest: ``polished`` was added, and only tells if it is."""
-    return tuple(_renamed(assist, _DIGESTED))[: None if assist.polished else -1]
+    """The fields of an ``assist`` that count in a digest: ``polished``, added later, only if true."""
+    fields_of = _renamed(assist, _DIGESTED)._asdict().items()
+    return tuple(value for name, value in fields_of if name != "polished" or value)
 
 
 def _renamed(assist: Assist, names: dict[str, str]) -> Assist:

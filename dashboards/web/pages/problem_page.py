@@ -155,9 +155,8 @@ def _recalled(replayed: Replay) -> list[dict[str, Any]]:
             f"{int(recollection.blocked.sum())} of {len(plan.states)}",
             NOTHING if first is None else f"({plan.states[first, 0]:.1f}, {plan.states[first, 1]:.1f})",
         ]
-        use = (
-            USES[recollection.use] if recollection.use or first is not None else "fits, but is not the answer"
-        )
+        beaten = recollection.is_free and not recollection.use
+        use = "fits, but is not the answer" if beaten else USES[recollection.use]
         table.append({"order": order, "numbers": numbers, "use": use})
     return table
 
