@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -16,7 +17,13 @@ from typing import Any, ParamSpec, TypeVar
 import numba
 from llvmlite import binding as llvm
 from numba.core import event, types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator, UserWideCacheLocator
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    IndexDataCacheFile,
+    InTreeCacheLocator,
+    UserWideCacheLocator,
+)
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, compile_result
 from numba.core.registry import CPUDispatcher
@@ -56,8 +63,30 @@ class _KernelCacheImpl(CompileResultCacheImpl):
     _locator_classes: list[type[object]] = [_KernelLocator, UserWideCacheLocator]  # noqa: RUF012 as in Numba
 
 
+class KernelFiles(IndexDataCacheFile):
+    """The files of one kernel: an index, and one for each kind of arguments, whose names occur only once.
+
+    Numba counts them. Two processes that compile a kernel for two vehicles at a time then take the same
+    number, and from then on one vehicle gets what was compiled for the other. Here at worst an entry of the
+    index is lost, and compiled again.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep what was compiled (``data``) for a kind of arguments (``key``)."""
+        name = self._data_name_pattern.format(number=uuid.uuid4().int)
+        self._save_data(name, data)
+        self._save_index(self._load_index() | {key: name})
+
+
 class _KernelCache(FunctionCache):
     _impl_class = _KernelCacheImpl
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        locator = self._impl.locator
+        self._cache_file = KernelFiles(
+            locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp()
+        )
 
 
 class _LinkedLibrary(JITCodeLibrary):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from numba import TypingError
 
-from planners.world.jit import jit
+from planners.world.jit import KernelFiles, jit
 
 OTHERS = """
 import numba, numpy as np
@@ -100,6 +100,21 @@ began, working = time.perf_counter(), working_clock()
 assert tripled(2.0) == 6.0
 assert working_clock() - working < time.perf_counter() - began
 """
+
+
+def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(tmp_path, monkeypatch):
+    mine, other, later = (KernelFiles(str(tmp_path), "kernel", "stamp") for _ in range(3))
+    save = mine._save_data
+
+    def save_after_the_other(name: str, data: str) -> None:
+        other.save("two trailers", "code for two trailers")
+        save(name, data)
+
+    monkeypatch.setattr(other, "_load_index", dict)  # as it was before either began
+    monkeypatch.setattr(mine, "_save_data", save_after_the_other)
+    mine.save("one trailer", "code for one trailer")
+    for kind in ("one trailer", "two trailers"):
+        assert later.load(kind) in (None, f"code for {kind}")
 
 
 def test_the_working_clock_does_not_count_compiling(tmp_path, monkeypatch):
