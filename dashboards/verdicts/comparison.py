@@ -2,7 +2,7 @@
 
 A time says something of a run only if both were measured in turn on one machine; else the machine differs
 too. So rows of two runs are judged by what no machine changes: problems solved, seconds of driving, checks,
-expansions, plans recalled. Where all attempts were made in turn, the whole time until the robot is there and
+expansions, hits. Where all attempts were made in turn, the whole time until the robot is there and
 planning are judged. What uses no memory cannot differ: it raises an alarm instead of a verdict.
 """
 
@@ -33,7 +33,7 @@ COLUMNS: Final = (
     "panel", "planner", "configuration", "problems", "first_ms", "ms", "reduction", "reduction_low",
     "reduction_high", "mostly", "mostly_low", "mostly_high", "checks_reduction", "checks_reduction_low",
     "checks_reduction_high", "first_driving_s", "driving_s", "sooner_s", "sooner_low_s", "sooner_high_s",
-    "first_solved", "solved", "first_recalled", "recalled", "verdict", "why",
+    "first_solved", "solved", "first_hit", "hit", "verdict", "why",
 )  # fmt: skip
 
 
@@ -53,11 +53,6 @@ def _logarithm(values: Floats) -> Floats:
     return np.log(np.maximum(values, 1e-6))
 
 
-def _not_recalled(panel: Panel) -> Floats:
-    rows = panel.rows.assign(missed=(panel.rows["source"] != "recalled").astype(float))
-    return panel._replace(rows=rows).matrix("missed")
-
-
 _UNSOLVED: Final = _Measure(lambda panel: 1.0 - panel.matrix("solved"), "solves more", "solves fewer")
 _ARRIVAL: Final = _Measure(_arrival, "there sooner", "there later")
 _DRIVING: Final = _Measure(lambda panel: panel.matrix("duration_s"), "drives shorter", "drives longer")
@@ -65,7 +60,7 @@ _PLANNING: Final = _Measure(lambda panel: panel.milliseconds(), "plans faster", 
 _MOSTLY: Final = _Measure(lambda panel: _logarithm(panel.milliseconds()), "mostly faster", "mostly slower")
 _CHECKS: Final = _Measure(lambda panel: panel.matrix("collision_checks"), "fewer checks", "more checks")
 _EXPANSIONS: Final = _Measure(lambda panel: panel.matrix("expansions"), "expands less", "expands more")
-_MISSED: Final = _Measure(_not_recalled, "recalls more", "recalls less")
+_MISSED: Final = _Measure(lambda panel: 1.0 - panel.hits(), "more hits", "fewer hits")
 _COUNTS: Final = (_CHECKS, _EXPANSIONS, _MISSED)
 
 
@@ -115,6 +110,8 @@ def compare_runs(
         problem; unless ``in_turn`` only driving counts. ``_low`` and ``_high`` are the ends of intervals that
         hold for all rows at once; planning has them only ``in_turn``. ``verdict`` is BETTER, WORSE or SAME,
         without memory CONTROL or ALARM, and ``why`` says by what.
+        ``first_hit`` and ``hit`` are shares of problems that a recalled plan fits; of recalled answers, if
+        one of the runs is of an earlier version, which does not say what fits.
     """
     pairs = _paired(first, other)
     if not pairs:
@@ -149,6 +146,8 @@ def verdict(rows: pd.DataFrame) -> str:
 def _paired(first: pd.DataFrame, other: pd.DataFrame) -> list[_Sides]:
     """The panels in which both attempted the same problems in the same ways."""
     shared = np.intersect1d(first["problem_id"], other["problem_id"])
+    if not all("hit" in rows and rows["hit"].notna().any() for rows in (first, other)):
+        first, other = (rows.drop(columns="hit", errors="ignore") for rows in (first, other))
     before, after = (
         {panel.name: panel for panel in panels(rows[rows["problem_id"].isin(shared)])}
         for rows in (first, other)
@@ -169,7 +168,7 @@ def _table(sides: _Sides, found: dict[_Measure, Difference], reach: _Measure) ->
     rows["problems"] = (~np.isnan(sides.values(_UNSOLVED)[0])).sum(axis=0)
     rows["first_ms"], rows["ms"] = sides.means(_PLANNING)
     rows["first_driving_s"], rows["driving_s"] = sides.means(_DRIVING)
-    for name, measure in (("solved", _UNSOLVED), ("recalled", _MISSED)):
+    for name, measure in (("solved", _UNSOLVED), ("hit", _MISSED)):
         rows[f"first_{name}"], rows[name] = (1.0 - each for each in sides.means(measure))
     rows["reduction"] = 1.0 - ratio(rows["ms"].to_numpy(), rows["first_ms"].to_numpy())
     rows[["reduction_low", "reduction_high", "mostly", "mostly_low", "mostly_high"]] = np.nan

@@ -19,15 +19,15 @@ from dashboards.cells import (
 )
 
 _SHARED: Final = ("planner", "configuration", "ms", "sooner s", "solved %")
-HEADINGS: Final = (*_SHARED, "fewer checks %", "recalled %", "verdict")
+HEADINGS: Final = (*_SHARED, "fewer checks %", "hits %", "verdict")
 HEADINGS_IN_TURN: Final = (*_SHARED, "less time %", "mostly %", "verdict")
 _SHARED_FIELDS: Final = ("planner", "configuration", "planning_ms", "sooner_s", "solved_percent")
-FIELDS: Final = (*_SHARED_FIELDS, "fewer_checks_percent", "recalled_percent", "verdict")
+FIELDS: Final = (*_SHARED_FIELDS, "fewer_checks_percent", "hits_percent", "verdict")
 FIELDS_IN_TURN: Final = (*_SHARED_FIELDS, "less_time_percent", "mostly_percent", "verdict")
 BY_COUNTS: Final = (
     "These runs were measured one after the other, so a difference in their times may come from how busy "
     "the machine was: times are shown, but not judged. What is judged is problems solved, then seconds of "
-    "driving, then checks, expansions and plans recalled. `compare --measure` measures the memories of both "
+    "driving, then checks, expansions and hits. `compare --measure` measures the memories of both "
     "in turn."
 )
 IN_TURN: Final = (
@@ -66,7 +66,7 @@ def comparison_cells(rows: pd.DataFrame) -> Iterator[tuple[str, list[Rows]]]:
 def _cells(row: dict[Any, Any], decimals: int, in_turn: bool) -> list[str]:
     sooner, low, high = row["sooner_s"], row["sooner_low_s"], row["sooner_high_s"]
     first_ms, other_ms = row["first_ms"], row["ms"]
-    counted = [_interval(row, "checks_reduction"), _both(row["first_recalled"], row["recalled"])]
+    counted = [_interval(row, "checks_reduction"), _both(row["first_hit"], row["hit"])]
     return [
         row["planner"],
         row["configuration"],

@@ -5,7 +5,7 @@
 99 % of planning time; by how much its mean, and the mean work of searching and checking, are less than those
 of the same planner alone; mean driving time; the share of stored plans among the answers; and how much sooner
 the robot is there than with the lattice alone, planning and driving counted, on the problems that both
-solved. Intervals are of 95 %, problems resampled.
+solved. Polished answers are compared with polished ones. Intervals are of 95 %, problems resampled.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from dashboards.statistics.panels import Panel, panels
 from planners.search.outcome import EXPANSION
 from planners.world.arrays import Floats
 from storage.tables.attempts import read_attempts
+from storage.tables.configurations import WITHOUT_MEMORY
 
 WAYS: Final = {
     ("gust", "none"): "GUST alone",
@@ -32,6 +33,8 @@ WAYS: Final = {
     ("lattice", "none"): "lattice alone",
     ("gust", "repair 5 exhaustive"): "GUST with memory",
     ("lattice", "repair 5 exhaustive"): "lattice with memory",
+    ("lattice", "none polished"): "lattice alone, polished",
+    ("lattice", "repair 5 exhaustive polished"): "lattice with memory, polished",
 }
 HEADINGS: Final = (
     "class", "", "solved, %", "planning, ms: mean (median, 99 %)", "less than alone, %", "less work, %",
@@ -59,16 +62,17 @@ def percent(share: float, low: float, high: float) -> str:
 
 def lines_of(panel: Panel) -> Iterator[list[str]]:
     """The cells of a class, a line for each of ``WAYS`` that was measured."""
-    column = {(planner, way.label): number for number, (planner, way) in enumerate(panel.columns)}
     times, driving, solved = panel.milliseconds(), panel.matrix("duration_s"), panel.matrix("solved")
     works = panel.matrix("collision_checks") + EXPANSION * panel.matrix("expansions")
     rows = panel.rows.assign(recalled=panel.rows["source"] == "recalled")
     recalled = panel._replace(rows=rows).matrix("recalled")
     total = driving + 1e-3 * times
-    alone = column["lattice", "none"]
-    for number, (way, name) in enumerate((way, name) for way, name in WAYS.items() if way in column):
-        here = column[way]
-        less, work = (lesser(each[:, here], each[:, column[way[0], "none"]]) for each in (times, works))
+    columns = {(planner, each.label): here for here, (planner, each) in enumerate(panel.columns)}
+    for number, (way, name) in enumerate((way, name) for way, name in WAYS.items() if way in columns):
+        here = columns[way]
+        planner, configuration = panel.columns[here]
+        own, alone = (columns[each, configuration.baseline.label] for each in (planner, "lattice"))
+        less, work = (lesser(each[:, here], each[:, own]) for each in (times, works))
         median, tail = np.quantile(times[:, here], [0.5, 0.99])
         sooner, least, most = mean_and_ends(total[:, alone] - total[:, here])
         yield [
@@ -76,10 +80,10 @@ def lines_of(panel: Panel) -> Iterator[list[str]]:
             name,
             f"{100 * solved[:, here].mean():.1f}",
             f"{times[:, here].mean():.2f} ({median:.2f}, {tail:.1f})",
-            *("" if way[1] == "none" else percent(*each) for each in (less, work)),
+            *("" if here == own else percent(*each) for each in (less, work)),
             f"{np.nanmean(driving[:, here]):.2f}",
-            "" if way[1] in ("none", "fresh") else f"{100 * recalled[:, here].mean():.1f}",
-            "" if here == alone else f"{sooner:+.2f} [{least:+.2f}, {most:+.2f}]",
+            "" if configuration.assist in WITHOUT_MEMORY else f"{100 * recalled[:, here].mean():.1f}",
+            "" if here == alone else f"{sooner:+.3f} [{least:+.3f}, {most:+.3f}]",
         ]
 
 

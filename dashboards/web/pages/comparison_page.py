@@ -94,7 +94,7 @@ def _chart(table: pd.DataFrame, first: str, other: str) -> Chart:
         "How much less work the other run needs",
         f"{other} against {first}, on the problems that are in both: collision checks, which no machine "
         "changes, with 95 % intervals that hold for all rows at once. Colours say what is better or worse by "
-        "problems solved, then seconds of driving, then checks, expansions and plans recalled.",
+        "problems solved, then seconds of driving, then checks, expansions and hits.",
         drawings,
         table,
         [(GREEN, BETTER), (VERMILLION, WORSE), (ORANGE, ALARM), (GREY, SAME)],

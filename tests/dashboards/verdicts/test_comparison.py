@@ -73,6 +73,23 @@ def test_a_slower_machine_is_an_alarm_and_no_difference(run: pd.DataFrame) -> No
     assert "more time" in alarms(rows)[0]
 
 
+def test_a_search_that_betters_what_fits_is_no_miss(run: pd.DataFrame) -> None:
+    with_hits = run.assign(hit=(run["source"] == "recalled").where(run["memory"].notna()))
+    bettered = with_hits.assign(source=run["source"].replace("recalled", "searched"))
+    rows = _compare(with_hits, bettered)
+    assert (rows["first_hit"] > 0.5).any()
+    assert rows["hit"].equals(rows["first_hit"])
+    assert set(rows["verdict"]) == {SAME, CONTROL}
+
+
+def test_runs_that_do_not_both_tell_hits_are_compared_by_recalled_answers(run: pd.DataFrame) -> None:
+    fits_everywhere = run.assign(hit=run["memory"].notna())
+    for older in (run, run.assign(hit=None)):
+        rows = _compare(older, fits_everywhere)
+        assert 0.0 < rows["hit"].max() < 1.0
+        assert rows["hit"].equals(rows["first_hit"])
+
+
 def test_load_on_attempts_without_memory_makes_no_memory_better(run: pd.DataFrame) -> None:
     loaded = _times(run, 2.0, run["assist"] == "none", "planning_seconds")
     assert set(_compare(run, loaded)["verdict"]) <= {SAME, CONTROL, ALARM}
