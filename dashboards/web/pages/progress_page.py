@@ -27,7 +27,7 @@ from dashboards.web.pages.retraining_charts import (
 from dashboards.web.parameters import Parameters, link
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder
-from storage.tables.configurations import BASELINE
+from storage.tables.configurations import configurations_in
 from storage.tables.gained_experiences import gained_shards
 from storage.tables.recalls import read_recalls
 from storage.tables.watched import read_watched
@@ -60,8 +60,8 @@ def progress(data: DataReader, params: Parameters) -> Page:
     measured, left_out = _measured_runs(data)
     versions, unreached = data.versions()
     seen, damaged = read_watched(data.folder.watched)
-    labels = list(dict.fromkeys(label for each in measured for label in each.summary["configuration"]))
-    labels = [label for label in labels if label != BASELINE.label]
+    measured_ways = (way for each in measured for way in configurations_in(each.summary))
+    labels = list(dict.fromkeys(way.label for way in measured_ways if way != way.baseline))
     chosen = params.one_of("configuration", labels, _default(labels))
     of_runs = []
     if measured and chosen:

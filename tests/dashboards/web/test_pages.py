@@ -28,6 +28,7 @@ from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, state_size
 from storage.archives.libraries import save_library
 from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
+from storage.tables.configurations import WITHOUT_MEMORY
 from storage.tables.watched import read_watched
 from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.server import served
@@ -230,6 +231,17 @@ def test_progress_shows_every_version_and_everything_seen_at_work(
     for name, count in (("retrainings", len(VERSIONS)), ("drift", len(seen))):
         rows = list(csv.reader(io.StringIO(client.get(f"/progress?as=csv&chart={name}").text)))
         assert len(rows) == 1 + count
+
+
+def test_progress_offers_the_ways_with_a_memory_but_not_what_they_are_compared_with(
+    client: httpx.Client, data: DataFolder
+) -> None:
+    offered = set(re.findall('<option value="([^"]*)"', client.get("/progress").text))
+    summary = pd.read_csv(data.run("first").summary("csv"))
+    assert {"none", "none polished"} <= set(summary["configuration"])
+    with_memory = summary[~summary["assist"].isin(WITHOUT_MEMORY)]["configuration"]
+    assert set(with_memory) <= offered
+    assert not offered & {"none", "none polished"}
 
 
 def test_a_registry_that_does_not_answer_is_named_and_the_rest_is_shown(data: DataFolder) -> None:
