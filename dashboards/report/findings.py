@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
@@ -15,7 +15,6 @@ from dashboards.statistics.panels import COMBINED
 from storage.tables.configurations import as_found, as_returned
 
 Row = Mapping[Any, Any]  # of a summary
-_SAME_S: Final = 0.05  # arrivals that differ by less are called the same: they are written to 0.1 s
 
 
 class Finding(NamedTuple):
@@ -113,13 +112,10 @@ def _arrival(row: Row) -> str:
     low, high = row["sooner_low_s"], row["sooner_high_s"]
     if math.isnan(row["sooner_s"]):
         return "has no drive to compare"
-    if abs(row["sooner_s"]) < _SAME_S:
-        return f"arrives at the same time (95 %: {_sooner(low)} to {_sooner(high)})"
-    if low > 0.0:
-        return f"arrives {row['sooner_s']:.1f} s sooner (95 %: {low:.2f} to {high:.2f} s)"
-    if high < 0.0:
-        return f"arrives {-row['sooner_s']:.1f} s later (95 %: {-high:.2f} to {-low:.2f} s)"
-    return f"arrives at the same time, as far as this shows (95 %: {_sooner(low)} to {_sooner(high)})"
+    ends = f"(95 %: {_sooner(low)} to {_sooner(high)})"
+    if low <= 0.0 <= high:
+        return f"arrives at the same time, as far as this shows {ends}"
+    return f"arrives {_sooner(row['sooner_s'])} {ends}"
 
 
 def _sooner(seconds: float) -> str:

@@ -35,8 +35,8 @@ def _summary(
 @pytest.mark.parametrize(
     ("sooner", "reduction", "told"),
     [
-        ((2.0, 1.5, 2.5), (0.75, 0.7, 0.8), ("75 % less", "70 to 80 %", "2.0 s sooner")),
-        ((-0.4, -0.5, -0.3), (-1.0, -1.2, -0.9), ("100 % more", "90 to 120 %", "0.4 s later")),
+        ((2.0, 1.5, 2.5), (0.75, 0.7, 0.8), ("75 % less", "70 to 80 %", "2.00 s sooner")),
+        ((-0.4, -0.5, -0.3), (-1.0, -1.2, -0.9), ("100 % more", "90 to 120 %", "0.40 s later")),
         (
             (0.1, -0.1, 0.3),
             (0.58, -0.28, 0.87),
@@ -51,7 +51,7 @@ def test_gains_and_losses_are_told_alike(
     first = finding.text.partition(" RRT:")[0]
     assert first.startswith("With this memory, GUST")  # the strongest alone, not the one that gains most
     assert all(words in first for words in told)
-    assert "9.0 s" not in finding.text  # of the way that is not the default
+    assert "9.00 s" not in finding.text  # of the way that is not the default
 
 
 @given(st.lists(st.floats(-3.0, 0.99), min_size=3, max_size=3, unique=True).map(sorted))
@@ -63,6 +63,16 @@ def test_a_gain_in_planning_is_claimed_only_where_its_interval_shows_one(ends: l
     assert ("more planning time" in first) == (high < 0.0)
     assert ("no difference" in first) == (low <= 0.0 <= high)
     assert all(f"{abs(100.0 * end):.0f}" in first.partition("95 %: ")[2] for end in (low, high))
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3, unique=True).map(sorted))
+def test_arrivals_differ_where_their_interval_says_so_by_however_little(ends: list[float]) -> None:
+    low, sooner, high = ends
+    (finding,) = findings(_summary((sooner, low, high)))
+    arrival = finding.text.partition("its robot ")[2].partition(" RRT:")[0]
+    assert ("at the same time" in arrival) == (low <= 0.0 <= high)
+    assert ("sooner" in arrival.partition(" (95 %")[0]) == (low > 0.0)
+    assert ("later" in arrival.partition(" (95 %")[0]) == (high < 0.0)
 
 
 def test_without_a_memory_nothing_is_claimed() -> None:
