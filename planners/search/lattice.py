@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
+from planners.search.manoeuvres.squeezing import squeeze
 from planners.search.outcome import Other, Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query
@@ -60,7 +61,7 @@ class LatticeSettings(NamedTuple):
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
-UNPOLISHED = 0.5  # share of the seconds that are left after a first drive that is kept for polishing
+KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for what follows
 
 
 def lattice(query: Query, settings: LatticeSettings) -> Outcome:
@@ -79,6 +80,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     manoeuvring: Manoeuvring | None = None
     joining: Manoeuvring | None = None
     joined = False
+    squeezed: Plan | None = None
+    may_squeeze = not improving
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
         nonlocal level, tried, ahead, manoeuvring, joining
@@ -111,6 +114,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         while counts[trees.GOAL_VERTEX] < 0 and counts[trees.EXPANSIONS] < until:
             if join(tree, manoeuvring.is_tight):
                 return
+            if squeezes(tree, manoeuvring):
+                return
             before = int(counts[trees.EXPANSIONS])
             grow_lattice(tree, goal, min(before + now, until), frontier, ahead, level, vehicle, scene)
             if counts[trees.GOAL_VERTEX] < 0:
@@ -130,7 +135,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         counts = tree.counts
         if manoeuvring is None or not manoeuvring.is_hard:
             at_random(tree, goal, until)
-        elif not join(tree, manoeuvring.is_tight):
+        elif not join(tree, manoeuvring.is_tight) and not squeezes(tree, manoeuvring):
             manoeuvre(tree, manoeuvring, until - int(counts[trees.EXPANSIONS]))
             if manoeuvring.is_over:
                 at_random(tree, goal, until)
@@ -151,13 +156,39 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         joined = found and joining.joined
         return found
 
+    def squeezes(tree: trees.Tree, search: Manoeuvring) -> bool:
+        """Once the search for manoeuvres is stuck, look for drives of slimmer bodies; whether that helped."""
+        nonlocal may_squeeze, squeezed
+        if may_squeeze and search.is_stuck:
+            may_squeeze = False
+            left = query.limits.expansions - int(tree.counts[trees.EXPANSIONS])
+            squeezed, expansions, checks = squeeze(query, search, left // 2, halfway())
+            tree.counts[trees.EXPANSIONS] += expansions
+            tree.counts[trees.CHECKS] += checks
+        return squeezed is not None
+
+    def halfway() -> float:
+        return latest - KEPT_BACK * (latest - working_clock())
+
+    def beside(work: int) -> Plan | None:
+        if squeezed is not None or query.beside is None:
+            return squeezed
+        return query.beside(work)
+
     at_random = growing(query)
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
-    outcome = attempt(query, settings.restart_after, prepare, grow, explore, explore_from=explore_from)
-    if query.others and outcome.plan is not None and manoeuvring is not None:
+    outcome = attempt(
+        replace(query, beside=beside),
+        settings.restart_after,
+        prepare,
+        grow,
+        explore,
+        explore_from=explore_from,
+    )
+    if query.others and outcome.plan is not None and manoeuvring is not None and squeezed is None:
         began, checks, expansions = working_clock(), manoeuvring.checks, manoeuvring.expansions
         left = query.limits.expansions - outcome.expansions
-        ends = latest - UNPOLISHED * (latest - working_clock())
+        ends = halfway()
         longest = settings.longest, query.limits.further
         left = manoeuvring.further(settings.further, longest, settings.for_one, left, ends)
         kept = manoeuvring.kept

@@ -19,6 +19,7 @@ from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.variants import (
     at_its_slowest,
     less_folded,
+    slimmer,
     time_reversed,
     without_trailers,
     word_radius,
@@ -43,6 +44,8 @@ from planners.world.vehicles.vehicle import (
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
+FINE: Final = 5  # the level from which on cells are fine ...
+STUCK: Final = 1000  # ... and after how many expansions there the search is stuck
 TIGHT: Final = 0.6  # a goal with less room around it is tight
 PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer
@@ -134,18 +137,14 @@ class Manoeuvring:
         self._from_start = (
             self._stands and not self.is_tight and room_around(start, vehicle, vehicle, query.scene) < TIGHT
         )
-        self._level = self._spent = self.expansions = 0
+        self._level = self._spent = self._before_fine = self.expansions = 0
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
         self._grow(0)  # compiled, if need be, before the planner's clock runs
 
     def joining(self, query: Query, endings: Endings) -> Manoeuvring:
         """The same search from its beginning, which goes on from known endings too, in buffers of its own."""
-        other = copy.copy(self)
-        size = state_size(query.vehicle)
-        other._tree, other._other = query.workspace.buffers(allocate_trees, size, 1)
-        other._drive = other._drive._replace(ways=allocate_ways())
-        other._kept, other._soon = [None] * KEPT, []
+        other = self._another(query, 1)
         other._known = self._known._replace(endings=endings)
         other._known_there = self._known_there._replace(endings=endings)
         other._begin_at_coarsest()
@@ -153,10 +152,32 @@ class Manoeuvring:
             other._level = len(LEVELS)  # nothing that is known is free here
         return other
 
+    def of_slimmer(self, query: Query, share: float) -> Manoeuvring:
+        """The same search from its beginning with slimmer bodies (``slimmer``), in buffers of its own."""
+        other = self._another(query, 2)
+        vehicles = self._vehicle, self._leaving, self._outgoing
+        other._vehicle, other._leaving, other._outgoing = (slimmer(each, share) for each in vehicles)
+        other._begin_at_coarsest()
+        return other
+
+    def _another(self, query: Query, number: int) -> Manoeuvring:
+        """A search of another ``number`` than this one, which still has to begin."""
+        other = copy.copy(self)
+        other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
+        other._drive = other._drive._replace(ways=allocate_ways())
+        other._kept, other._soon = [None] * KEPT, []
+        return other
+
     @property
     def is_over(self) -> bool:
         """Whether nothing is left to try."""
         return self._level == len(LEVELS)
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether no drive was found where cells are coarse, nor soon where they are fine."""
+        soon = self.expansions - self._before_fine < STUCK and not self.is_over
+        return self._level >= FINE and not soon and not self.kept
 
     @property
     def _expansions(self) -> int:
@@ -223,6 +244,8 @@ class Manoeuvring:
             ended = self._ended and self._level + 1 < len(LEVELS)  # nothing is left to open at the start
             if used == 0 or used == level_ends or ended:
                 self._level, self._spent = self._level + 1, 0
+                if self._level == FINE:
+                    self._before_fine = self.expansions
                 self._begin()
         return False
 
