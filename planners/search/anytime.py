@@ -30,7 +30,8 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
 FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner mostly needs
-GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer
+GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer ...
+MOST_EXPANSIONS = 10_000_000  # ... up to this, which no search reaches in its time: it holds too few nodes
 LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when all slack is used up
 FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer before it is polished
 SLACK_KEPT = 0.5  # after each search in vain
@@ -148,7 +149,7 @@ def improve(
         if outcome.plan is not None and consider(outcome.plan):
             is_given = False
         else:
-            budget *= GROWTH
+            budget = min(budget * GROWTH, MOST_EXPANSIONS)
             slack *= SLACK_KEPT
     return Improved(best, tuple(history), working_clock() - began, checks, spent, nodes, is_given)
 

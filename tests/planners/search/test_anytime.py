@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from planners.search import anytime
 from planners.search.anytime import improve
+from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
 from planners.world.authority.authority import faults
@@ -85,6 +86,21 @@ def test_a_limit_in_seconds_is_kept(monkeypatch):
 @EVERY
 def test_what_has_no_solution_ends_too(name):
     assert improve(name, walled_goal(), expansions=500).plan is None
+
+
+def test_thousands_of_searches_in_vain_end_with_the_time(monkeypatch):
+    asked = []
+
+    def in_vain(query):
+        asked.append(query.limits.expansions)
+        return Outcome(Status.START_BLOCKED, None, 0, 0, 0, 0.0, 0.0)
+
+    monkeypatch.setattr(anytime, "working_clock", ticks())
+    monkeypatch.setitem(anytime.PLANNERS, "lattice", in_vain)
+    assert improve("lattice", walled_goal(), seconds=20.0).plan is None
+    assert len(asked) > 2_000
+    assert asked == sorted(asked)
+    assert asked[-1] == anytime.MOST_EXPANSIONS
 
 
 def test_without_a_limit_nothing_is_begun():
