@@ -19,6 +19,7 @@ from planners.world.classes.families import family
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, VEHICLES
 from storage.archives.libraries import save_library
+from storage.archives.memories import load_memory, save_memory
 from storage.exchange.problems import fields_of, write_problems
 from storage.tables.attempts import read_attempts
 from tests.prepared.prefect_database import with_prefect_database
@@ -74,6 +75,16 @@ def test_a_library_and_a_memory_recall_an_answer_to_any_question(
         (answer,) = stored.recall(asked)
         assert answer.free
         assert stored.check(asked, answer.plan) == []
+
+
+def test_a_memory_and_a_library_of_problems_of_any_scale_are_loaded(folder: Path, tmp_path: Path) -> None:
+    memory = load_memory(folder)
+    twice = replace(problem(0), scale=2.0)
+    save_memory(tmp_path / "memory", replace(memory, metadata={**memory.metadata, "scales": [2.0]}))
+    plans = [(str(number), plan) for number, plan in enumerate(memory.plans)]
+    save_library(tmp_path / "library", gathered_library("random", CAR, plans, (2.0,)))
+    for name in ("memory", "library"):
+        assert motion_memory.load(tmp_path / name).plan(twice).plan is not None
 
 
 def test_every_public_name_is_typed_and_explained() -> None:
