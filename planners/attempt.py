@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 from planners.world.problem import Plan
 
-SUB_PLANS = "sub-plans"  # what recall from a library is called ...
-DRIVES = "drives"  # ... if a whole plan of it was moved to the problem
+SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a library or from a memory ...
+DRIVES = "drives"  # ... if a whole plan was moved to the problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ JOINS = ("open", "repair", "join")  # the assists that move stored plans, and ai
 class MemoryAnswer(NamedTuple):
     """What a memory has for a problem. By default nothing, as if there were no memory."""
 
-    strategy: str | None = None  # of recall
+    strategy: str | None = None  # of recall, or what was recalled if that is no whole plan as it is
     plan: Plan | None = None  # that fits
     # of the plan: "recalled", "repaired" if it was moved, or "searched" if most steps are not stored
     source: str = ""
@@ -90,14 +90,14 @@ def answer_from(
         drive = drive_answer(library, view, vehicle, until, blindly)
         if drive.plan is not None:
             return MemoryAnswer(
-                *(DRIVES if strategy == usual else strategy, drive.plan, "repaired", drive.is_long),
+                *(DRIVES if blindly is None else strategy, drive.plan, "repaired", drive.is_long),
                 recalled=(drive.number,),
                 checks=drive.checks,
                 is_polished=True,
             )
     parts = sub_plan_answer(library, view, vehicle, blindly)
     answer = MemoryAnswer(
-        strategy,
+        SUB_PLANS if blindly is None else strategy,
         parts.plan,
         checks=drive.checks + parts.checks,
         endings=library.endings if use in JOINS and blindly is None else None,

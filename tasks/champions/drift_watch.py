@@ -19,7 +19,7 @@ from dashboards.verdicts.drift import Drift, Usefulness, drifts, usefulness
 from storage.errors import StorageError
 from storage.places.data_folder import MARK, DataFolder
 from storage.places.run_folder import RunFolder
-from storage.tables.attempts import read_attempts
+from storage.tables.attempts import read_attempts, readable_attempts
 from storage.tables.watched import add_watched
 from tasks.registry.champion_registry import CHAMPION, Registry
 from tasks.servers.access import auth_environment
@@ -29,6 +29,10 @@ from tasks.settings.errors import RunError
 
 SOLVED: Final = "motion-memory.solved"
 DRIFT: Final = "motion-memory.drift"
+_COLUMNS: Final = (
+    *("planner", "assist", "top_k", "recall", "polished"),
+    *("hit", "source", "planning_seconds", "duration_s"),
+)
 _MODEL: Final = re.compile(r"models:/(?P<name>[^/@]+)(?:@(?P<alias>[^/]+)|/(?P<number>\d+))")
 
 
@@ -85,6 +89,19 @@ def _of_run(folder: Path) -> BenchmarkedMemory | None:
     rows = read_attempts(results, ("recalled",))
     benchmark = usefulness(rows[rows["memory"] == memory_folder.name])
     return BenchmarkedMemory(f"{run.name}/{memory_folder.name}", benchmark, run.parent.parent)
+
+
+def usefulness_at_work(rows: Path) -> dict[str, Usefulness]:
+    """How useful memories were in a file of attempts, by planner and configuration.
+
+    A file may hold problems of several kinds, which are answered by whole plans, by moved ones or by parts of
+    plans. Each is another configuration: what is recalled is part of it.
+
+    Args:
+        rows: the file, .parquet.
+    """
+    attempts, _ = readable_attempts(rows, _COLUMNS)
+    return usefulness(attempts)
 
 
 def report_drift(memory: BenchmarkedMemory, now: Mapping[str, Usefulness], data: Path | None) -> list[str]:

@@ -148,7 +148,7 @@ def solve_many(
             join_attempts(out, [part.shard for part in parts], key)
             remove_folder(request.folder)
     solved_now = sum(part.problem_slice.count for part in left) - begun
-    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request, tally))
+    return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request))
 
 
 def _in_this_process(parts: Sequence[FilePart], most_seconds: float) -> list[PartResult]:
@@ -214,20 +214,13 @@ def _benchmarked_memory(memory: str | None) -> BenchmarkedMemory | None:
     return benchmarked_memory(memory)
 
 
-def _drift(memory: BenchmarkedMemory | None, request: SolveRequest, tally: Tally) -> Sequence[str]:
-    """Compare the memory with its benchmark; all rows are of one planner and configuration."""
+def _drift(memory: BenchmarkedMemory | None, request: SolveRequest) -> Sequence[str]:
+    """Compare the memory with its benchmark."""
     if memory is None:
         return []
-    import pandas as pd
+    from tasks.champions.drift_watch import report_drift, usefulness_at_work
 
-    from dashboards.verdicts.drift import usefulness_of
-    from storage.tables.configurations import configured
-    from tasks.champions.drift_watch import report_drift
-
-    columns = attempt_columns(request.out, ["assist", "top_k", "recall", "polished"])
-    (label,) = configured(pd.DataFrame({name: values[:1] for name, values in columns.items()}))[1]
-    now = usefulness_of(tally.hits or 0, tally.seconds, tally.driving)
-    return report_drift(memory, {f"{request.settings.planner} {label}": now}, request.learn)
+    return report_drift(memory, usefulness_at_work(request.out), request.learn)
 
 
 def _repeated_id(parts: Sequence[FilePart]) -> str | None:

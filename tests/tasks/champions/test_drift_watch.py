@@ -8,16 +8,29 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from dashboards.cells import NOTHING
 from dashboards.verdicts.drift import Drift, Usefulness, drifts
 from dashboards.web.pages.retraining_charts import watched_charts, watched_rows
+from planners.attempt import DRIVES, SUB_PLANS
 from storage.places.data_folder import open_data_folder
+from storage.tables.attempts import write_attempts
+from storage.tables.configurations import Configuration
+from storage.tables.schemas import ATTEMPTS
 from storage.tables.watched import add_watched, read_watched
 from tasks.champions import drift_watch as task
-from tasks.champions.drift_watch import DRIFT, SOLVED, BenchmarkedMemory, benchmarked_memory, report_drift
+from tasks.champions.drift_watch import (
+    DRIFT,
+    SOLVED,
+    BenchmarkedMemory,
+    benchmarked_memory,
+    report_drift,
+    usefulness_at_work,
+)
 from tasks.registry.champion_registry import Version
+from tests.dashboards.synthetic import attempts
 
 NAME = "gust open 5 exhaustive"
 THEN = Usefulness(500, hits=400, mean_ms=1.0, median_ms=0.1, solved=500, total_s=21.0, total_sd_s=2.0)
@@ -60,6 +73,26 @@ def test_drift_is_told_exactly_when_hits_have_fallen(
 def test_drift_is_told_when_robots_are_there_later(sent: Sent) -> None:
     report_drift(BENCHMARKED, {NAME: LATER}, None)
     assert sent.events == [SOLVED, DRIFT]
+
+
+@pytest.mark.parametrize("hits", [38, 0])
+@pytest.mark.parametrize("others_first", [False, True])
+def test_problems_of_another_kind_in_the_same_file_change_nothing(
+    sent: Sent, tmp_path: Path, hits: int, others_first: bool
+) -> None:
+    ranked = attempts(("trap",), ("gust",), [Configuration("open", "exhaustive", 5)], problems=40)
+    ranked["hit"] = [number < hits for number in range(len(ranked))]
+    others = [ranked.assign(recall=recall, hit=False, duration_s=90.0) for recall in (DRIVES, SUB_PLANS)]
+    mixed = [*others, ranked] if others_first else [ranked, *others]
+    told = []
+    for name, tables in (("alone", [ranked]), ("mixed", mixed)):
+        table = pd.concat(tables).astype(object)
+        rows = table.where(table.notna(), None).to_dict("records")
+        blank = dict.fromkeys(ATTEMPTS.names)
+        write_attempts(tmp_path / f"{name}.parquet", [blank | row for row in rows])
+        told.append(report_drift(BENCHMARKED, usefulness_at_work(tmp_path / f"{name}.parquet"), None))
+    assert told[0] == told[1]
+    assert sent.events == [SOLVED, *([DRIFT] * (hits == 0))] * 2
 
 
 def test_nothing_is_told_of_what_no_benchmark_knows(sent: Sent) -> None:

@@ -39,7 +39,8 @@ from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, state_size
 from planners.world.view import View
-from tests.worlds import problem_of
+from tests.planners.memories import shared_memory
+from tests.worlds import problem_of, strewn
 
 first = functools.partial(solve, polished=False)  # the plan as it is found
 ORIGIN = np.array([20.0, 25.0])
@@ -138,6 +139,19 @@ def test_answers_are_right_the_same_again_and_no_fewer_than_by_search(
         assert faults(asked, answer.plan, CAR) == []
         recalled += answer.source == "recalled"
     assert recalled >= least  # of 40; blind parts answer few
+
+
+def test_a_memory_of_whole_plans_says_when_it_looks_for_parts_of_them() -> None:
+    asked = question(5, 1, False)
+    for assist, strategy, recall in (
+        ("closed", None, SUB_PLANS),
+        ("closed", "encoder", SUB_PLANS),
+        ("closed", "random", "random"),
+        ("random-closed", None, "random"),
+    ):
+        answer = solve(asked, "lattice", assist, memory=shared_memory(), strategy=strategy)
+        assert answer.recall == recall
+    assert solve(strewn(1, 10), "lattice", "closed", memory=shared_memory()).recall == "exhaustive"
 
 
 def test_a_plan_answers_its_own_question_and_the_mirrored_one_in_the_same_time() -> None:
