@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -205,6 +205,20 @@ SOLVE: Final = Job(
 def _assistant(settings: AssistantSettings, _memory_digest: str) -> Assistant:
     """The assistant of this process, which keeps the memories that it has loaded."""
     return Assistant(settings)
+
+
+def plans_are_there(part: FilePart, identities: Sequence[str]) -> bool:
+    """Whether the plans of a part lie in the folder that is asked for, if one is.
+
+    Args:
+        part: the part.
+        identities: the ids of its problems, in their order.
+    """
+    folder, first = part.request.plans, part.problem_slice.first
+    return folder is None or all(
+        _plan_path(part, folder, identity, first + number).is_file()
+        for number, identity in enumerate(identities)
+    )
 
 
 def _plan_path(part: FilePart, folder: Path, identity: str, number: int) -> Path:

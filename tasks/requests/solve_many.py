@@ -32,6 +32,7 @@ from tasks.requests.problem_parts import (
     PartResult,
     SolveRequest,
     parts_of,
+    plans_are_there,
     solve_part_reporting,
 )
 from tasks.settings.checks import check_outputs
@@ -123,7 +124,7 @@ def solve_many(
         request = SolveRequest(problems, out, settings, memory_digest(memory), plans, learn)
         parts = parts_of(request)
         key = key_of("solve", [part.key for part in parts])
-        if _is_finished(request, key):
+        if _is_finished(request, parts, key):
             _LOG.info("%s holds these rows already; remove it to solve the problems again.", out)
             return SolvedMany(_tally(attempt_batches(out, TALLIED)), 0, time.monotonic() - began, [])
         with unfinished(out):
@@ -182,13 +183,14 @@ def _malformed(faults: Sequence[str]) -> StorageError:
     )
 
 
-def _is_finished(request: SolveRequest, key: str) -> bool:
+def _is_finished(request: SolveRequest, parts: Sequence[FilePart], key: str) -> bool:
     """Whether an earlier command wrote everything that is asked for, and it is still there."""
-    return (
-        shard_is_done(request.out, key)
-        and (request.plans is None or request.plans.is_dir())
-        and (request.learn is None or has_gained(request.learn))
-    )
+    if not shard_is_done(request.out, key) or not (request.learn is None or has_gained(request.learn)):
+        return False
+    if request.plans is None:
+        return True
+    identities = iter(attempt_columns(request.out, ["problem_id"])["problem_id"])
+    return all(plans_are_there(part, [*islice(identities, part.problem_slice.count)]) for part in parts)
 
 
 def _tally(tables: Iterable[dict[str, list[Any]]]) -> Tally:

@@ -19,7 +19,6 @@ from planners.attempt import Attempt
 from planners.world.classes.problem_classes import problem_class
 from planners.world.problem import Plan, Problem
 from storage.errors import StorageError
-from storage.exchange.plans import read_plan
 from storage.exchange.problems import fields_of, write_problems
 from storage.places.data_folder import DataFolder
 from storage.places.files import locked
@@ -279,19 +278,6 @@ def test_one_output_is_written_by_one_command(problems: Path, tmp_path: Path) ->
         pytest.raises(StorageError, match=f"in use by another command .process {os.getpid()}."),
     ):
         solve_many(ASSISTANT, problems, tmp_path / "rows.parquet")
-
-
-def test_plans_lie_in_one_folder_and_very_many_in_one_a_part(
-    problems: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    solve_many(ASSISTANT, problems, tmp_path / "rows.parquet", tmp_path / "few")
-    files = sorted((tmp_path / "few").iterdir())
-    assert len(files) == COUNT
-    assert all(read_plan(file).problem_id == file.stem for file in files)
-    monkeypatch.setattr(parts, "MOST_IN_ONE_FOLDER", COUNT - 1)
-    solve_many(ASSISTANT, problems, tmp_path / "rows.parquet", tmp_path / "many")
-    assert sorted(each.name for each in (tmp_path / "many").rglob("*.json")) == [each.name for each in files]
-    assert len(list((tmp_path / "many").iterdir())) == -(-COUNT // SIZE)
 
 
 def test_what_is_newly_solved_is_learned_once(problems: Path, tmp_path: Path) -> None:
