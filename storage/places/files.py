@@ -16,7 +16,9 @@ from typing import Any, Final
 from storage.errors import InUseError, StorageError
 from storage.fields import parse_json
 from storage.places.mirror import PARTIAL, fetch, publish, publish_folder
+from storage.places.swap import swap
 
+OLD: Final = ".old"  # before the ending of a folder that is moved aside; random letters are eight
 REMOVALS: Final = 10
 REMOVAL_SECONDS: Final = 0.2
 
@@ -59,7 +61,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
     with _errors_in_one_line(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}.", suffix=PARTIAL, dir=path.parent))
-        old = temporary.with_name(f".old{temporary.name}")
+        old = temporary.with_suffix(OLD + PARTIAL)
         try:
             yield temporary
             temporary.chmod(0o777 & ~_umask())
@@ -67,9 +69,11 @@ def whole_folder(path: Path) -> Iterator[Path]:
                 _synchronise(file)
             _synchronise(temporary)
             publish_folder(temporary, path)
-            if path.exists():  # a full folder cannot be replaced by renaming, so the old one is moved aside
+            if not path.exists():
+                temporary.replace(path)
+            elif not swap(temporary, path):  # then the old folder has to be moved aside before
                 path.replace(old)
-            temporary.replace(path)
+                temporary.replace(path)
             _synchronise(path.parent)
         finally:
             if old.exists() and not path.exists():
@@ -108,12 +112,24 @@ def locked(path: Path, what: str) -> Iterator[None]:
 
 
 def remove_leftovers(folder: Path) -> None:
-    """Delete leftovers of killed writers below ``folder``; only while no other process writes there."""
+    """Delete leftovers of killed writers below ``folder``; only while no other process writes there.
+
+    A folder that was moved aside is moved back if the new one has not taken its place.
+    """
     for leftover in [*folder.rglob(f".*{PARTIAL}")]:
+        if leftover.name.endswith(OLD + PARTIAL):
+            _restore(leftover)
         if leftover.is_dir():
             shutil.rmtree(leftover, ignore_errors=True)
         else:
             leftover.unlink(missing_ok=True)
+
+
+def _restore(old: Path) -> None:
+    """Give an ``old`` folder that was moved aside its name back, unless that is taken."""
+    name = old.name.removeprefix(".").removesuffix(OLD + PARTIAL).rpartition(".")[0]
+    if not old.with_name(name).exists():
+        old.replace(old.with_name(name))
 
 
 def remove_folder(folder: Path) -> None:

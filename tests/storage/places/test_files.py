@@ -1,0 +1,49 @@
+"""Files and folders are whole whenever a writer is killed."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from storage.places.files import remove_leftovers
+from storage.places.swap import swap
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.mark.parametrize("there", [False, True])
+@pytest.mark.parametrize("can_swap", [False, True])
+@pytest.mark.parametrize("moves", [0, 1, 2])
+def test_a_folder_is_whole_whenever_its_writer_is_killed(
+    tmp_path: Path, moves: int, can_swap: bool, there: bool
+) -> None:
+    folder = tmp_path / "champ"
+    if there:
+        folder.mkdir()
+        (folder / "plans").write_text("old")
+    command = [sys.executable, "-m", "tests.storage.places.killed_writer"]
+    killed = subprocess.run([*command, str(folder), str(moves), str(can_swap)], cwd=ROOT)
+    assert killed.returncode in (0, -signal.SIGKILL)
+    assert killed.returncode == -signal.SIGKILL or moves > 0
+    if can_swap:
+        assert folder.exists() == (there or moves > 0)
+    remove_leftovers(tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["champ"] * (there or moves > 0)
+    if folder.exists():
+        assert (folder / "plans").read_text() == ("old" if there and moves < 2 - can_swap else "new")
+
+
+def test_paths_change_places_or_stay(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for each in (first, second):
+        each.mkdir()
+        (each / each.name).touch()
+    changed = swap(first, second)
+    assert (second / "first").exists() == (first / "second").exists() == changed
+    assert (second / "second").exists() == (first / "first").exists() != changed
+    assert not swap(first, tmp_path / "missing")
+    assert first.exists()
