@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ from storage.places.mirror import PARTIAL, fetch, publish, publish_folder
 from storage.places.swap import swap
 
 OLD: Final = ".old"  # before the ending of a folder that is moved aside; random letters are eight
+OPENINGS: Final = 100  # of a lock file that others remove
 REMOVALS: Final = 10
 REMOVAL_SECONDS: Final = 0.2
 
@@ -94,21 +95,37 @@ def locked(path: Path, what: str) -> Iterator[None]:
         InUseError: another process holds it; the message says which.
         OSError: it cannot be opened.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    handle = _lock(path, what)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
-            raise InUseError(
-                f"{what} is in use by another command (process {holder}); wait for it to end or give another."
-            ) from None
         os.ftruncate(handle, 0)
         os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
         yield
     finally:
         os.close(handle)
+
+
+def _lock(path: Path, what: str) -> int:
+    """Open and lock the file ``path``; again if its holder ended and removed it before it was locked here."""
+    for _ in range(OPENINGS):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):  # the folder is gone again
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            is_held = False
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                is_held = os.path.samestat(os.fstat(handle), path.stat())
+            except BlockingIOError:
+                holder = os.read(handle, 32).decode(errors="replace").strip() or "unknown"
+                raise InUseError(
+                    f"{what} is in use by another command (process {holder}); wait for it to end or give "
+                    "another."
+                ) from None
+            finally:
+                if not is_held:
+                    os.close(handle)
+            if is_held:
+                return handle
+    raise InUseError(f"{what} is in use by other commands, which begin and end; repeat this one.")
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -139,6 +156,15 @@ def remove_folder(folder: Path) -> None:
         if not folder.exists():
             break
         time.sleep(REMOVAL_SECONDS)
+
+
+def remove_contents(folder: Path, kept: str) -> None:
+    """Delete what is in a ``folder``, but not the file that is named ``kept``."""
+    for entry in folder.glob("*"):
+        if entry.is_dir() and not entry.is_symlink():
+            remove_folder(entry)
+        elif entry.name != kept:
+            entry.unlink(missing_ok=True)
 
 
 def write_json(path: Path, value: object, indent: int | None = 2) -> None:

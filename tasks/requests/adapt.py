@@ -23,7 +23,6 @@ from storage.archives.libraries import (
     vehicle_of,
 )
 from storage.archives.memories import save_memory
-from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.vehicles.definitions import is_built_in
 from storage.vehicles.vehicle_files import label_of, said_vehicle
@@ -32,8 +31,8 @@ from tasks.requests.adapt_pieces import ADAPT, AdaptRequest, Driven
 from tasks.requests.part_folder import (
     do_here,
     part_workers,
-    parts_folder,
     refuse_existing,
+    remove_parts,
     unfinished,
 )
 from tasks.settings.checks import check_outputs, check_seed, checked_vehicle
@@ -93,10 +92,10 @@ def adapt(
             kept = [each for piece in request.pieces for each in read_experiences(piece.shard, new)]
             told = _told(old, new, [Outcome[name] for result in results for name in result.outcomes])
             if not kept:
-                remove_folder(parts_folder(out))
+                remove_parts(out)
                 raise RunError(f"{told.summary}. Gather plans for {name_of(new)} instead.")
             _save(out, stored, new, kept, seed)
-            remove_folder(parts_folder(out))
+            remove_parts(out)
     return told
 
 

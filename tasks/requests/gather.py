@@ -16,7 +16,6 @@ from planners.memory.library.plan_library import gathered_library
 from planners.memory.plans.experience import Experience
 from planners.world.classes.problem_classes import DIFFICULTIES
 from storage.archives.libraries import how_gathered, load_library, save_library
-from storage.places.files import remove_folder
 from storage.tables.experiences import read_experiences
 from storage.worlds.importing import ImportSettings
 from tasks.requests.gather_pieces import (
@@ -30,8 +29,8 @@ from tasks.requests.gather_pieces import (
 from tasks.requests.part_folder import (
     do_here,
     part_workers,
-    parts_folder,
     refuse_existing,
+    remove_parts,
     unfinished,
 )
 from tasks.requests.question_sources import is_drawn
@@ -173,7 +172,7 @@ def _gathered(request: GatherRequest, workers: int, flow: GatherFlow | None) -> 
             )
         counts = _counted(request, kept, tried)
         _save(request, kept, counts)
-        remove_folder(parts_folder(request.out))
+        remove_parts(request.out)
     return counts
 
 

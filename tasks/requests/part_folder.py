@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Final, Generic, Protocol, TypeVar
 
 from storage.errors import StorageError
 from storage.places.data_folder import MARK
-from storage.places.files import locked, remove_folder, remove_leftovers
+from storage.places.files import locked, remove_contents, remove_leftovers
 from storage.tables.schemas import EXPERIENCES
 from storage.tables.shards import read_table, shard_is_done
 from tasks.fan_out.keys import key_of
@@ -21,6 +21,7 @@ from tasks.servers.prefect_server import local_server
 from tasks.settings.errors import UsageError
 
 _LOG = logging.getLogger(__name__)
+_LOCK: Final = ".lock"
 
 
 class Request(Protocol):
@@ -80,7 +81,7 @@ def unfinished(out: Path) -> Iterator[None]:
     with ExitStack() as stack:
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            stack.enter_context(locked(folder / ".lock", str(out)))
+            stack.enter_context(locked(folder / _LOCK, str(out)))
         except OSError as error:
             raise StorageError(f"{folder} cannot be written: {error.strerror}; give another --out.") from None
         remove_leftovers(folder)
@@ -88,7 +89,15 @@ def unfinished(out: Path) -> Iterator[None]:
             yield
         finally:
             if not any(folder.glob("[0-9]*.parquet")):
-                remove_folder(folder)
+                remove_parts(out)
+                (folder / _LOCK).unlink(missing_ok=True)  # last: from now on another command may begin
+                with suppress(OSError):
+                    folder.rmdir()
+
+
+def remove_parts(out: Path) -> None:
+    """Delete the parts of ``out``, whose folder this process has locked; it stays locked."""
+    remove_contents(parts_folder(out), _LOCK)
 
 
 def _is_own(entry: Path) -> bool:

@@ -17,7 +17,6 @@ from planners.world.arrays import Floats
 from storage.errors import StorageError
 from storage.exchange.problem_files import raw_slice
 from storage.places.data_folder import open_data_folder
-from storage.places.files import remove_folder
 from storage.tables.attempts import attempt_batches, attempt_columns, join_attempts
 from storage.tables.shards import shard_is_done
 from tasks.fan_out.keys import key_of
@@ -25,7 +24,7 @@ from tasks.fan_out.progress import progress
 from tasks.inputs.gained_on_the_job import has_gained
 from tasks.registry.model_uris import memory_digest, memory_folder
 from tasks.requests.assistant import Assistant, AssistantSettings
-from tasks.requests.part_folder import part_workers, unfinished
+from tasks.requests.part_folder import part_workers, remove_parts, unfinished
 from tasks.requests.problem_parts import (
     SOLVE,
     FilePart,
@@ -147,7 +146,7 @@ def solve_many(
             if out.exists():
                 _LOG.info("%s held rows of other problems or options; these take their place.", out)
             join_attempts(out, [part.shard for part in parts], key)
-            remove_folder(request.folder)
+            remove_parts(out)
     solved_now = sum(part.problem_slice.count for part in left) - begun
     return SolvedMany(tally, solved_now, seconds, _drift(benchmarked, request))
 

@@ -1,7 +1,9 @@
-"""Files and folders are whole whenever a writer is killed."""
+"""Files and folders are whole whenever a writer is killed, and a lock has one holder."""
 
 from __future__ import annotations
 
+import fcntl
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from storage.places.files import remove_leftovers
+from storage.errors import InUseError
+from storage.places.files import locked, remove_leftovers
 from storage.places.swap import swap
 
 ROOT = Path(__file__).parents[3]
@@ -47,3 +50,26 @@ def test_paths_change_places_or_stay(tmp_path: Path) -> None:
     assert (second / "second").exists() == (first / "first").exists() != changed
     assert not swap(first, tmp_path / "missing")
     assert first.exists()
+
+
+@pytest.mark.parametrize("lost", ["lock", "folder"])
+def test_a_lock_has_one_holder_even_if_another_removed_it_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: str
+) -> None:
+    path = tmp_path / "folder" / ".lock"
+    flock = fcntl.flock
+
+    def late(handle: int, operation: int) -> None:
+        monkeypatch.undo()
+        path.unlink() if lost == "lock" else shutil.rmtree(path.parent)
+        flock(handle, operation)
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with (
+        locked(path, "it"),
+        pytest.raises(InUseError, match="it is in use by another command"),
+        locked(path, "it"),
+    ):
+        pass
+    with locked(path, "it"):
+        pass
