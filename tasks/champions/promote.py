@@ -20,6 +20,10 @@ from tasks.settings.errors import RunError
 from tasks.tracking.model_names import PREFIX
 
 
+class ChangedChampionError(RunError):
+    """The champion is no longer the version that a challenger was judged against."""
+
+
 class ChampionChange(NamedTuple):
     """A memory whose champion has changed."""
 
@@ -31,7 +35,7 @@ class ChampionChange(NamedTuple):
 def promote(registry: Registry, challenger: Version) -> None:
     """Make a judged challenger the champion.
 
-    Raises RunError if the champion is no longer the version that the challenger was judged against.
+    Raises ChangedChampionError if the champion is no longer the version that it was judged against.
     """
     champion = registry.aliased(challenger.name)
     against = challenger.tag("against")
@@ -39,7 +43,7 @@ def promote(registry: Registry, challenger: Version) -> None:
         return
     if champion is None or str(champion.number) != against:
         now = f"version {champion.number}" if champion else "none"
-        raise RunError(
+        raise ChangedChampionError(
             f"{challenger.name} version {challenger.number} was judged against version {against}, but the "
             f"champion is {now} now and stays; the next retraining judges again."
         )
@@ -48,7 +52,7 @@ def promote(registry: Registry, challenger: Version) -> None:
 
 
 def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
-    """Promote the challengers that await approval.
+    """Promote the challengers that await approval; those whose champion has changed are told at the end.
 
     Args:
         data: the data folder.
@@ -58,7 +62,8 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
         the changes of champions.
 
     Raises:
-        RunError: no challenger awaits approval, or a champion has changed since its challenger was judged.
+        RunError: no challenger awaits approval, or a champion has changed since its challenger was judged;
+            the message says which others were promoted.
     """
     registry = _registry(data)
     challengers = [registry.aliased(name, CHALLENGER) for name in _names(registry, memory)]
@@ -69,12 +74,19 @@ def promote_awaiting(data: Path, memory: str | None) -> list[ChampionChange]:
     ]
     if not awaiting:
         raise RunError(f"No challenger{_of(memory)} awaits approval; `retrain --approve` leaves one.")
-    changes = []
+    changes, faults = [], []
     for challenger in awaiting:
-        promote(registry, challenger)
+        try:
+            promote(registry, challenger)
+        except ChangedChampionError as error:
+            faults.append(str(error))
+            continue
         registry.set_tags(challenger, {"verdict": PROMOTED})
         registry.remove_alias(challenger.name, CHALLENGER)
         changes.append(ChampionChange(challenger.name, int(challenger.tag("against")), challenger.number))
+    if faults:
+        promoted = ", ".join(f"{each.name} version {each.now}" for each in changes)
+        raise RunError(" ".join([*faults, *([f"Promoted: {promoted}."] if promoted else [])]))
     return changes
 
 

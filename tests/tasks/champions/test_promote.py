@@ -49,9 +49,9 @@ class Registered:
             self.model_id = tracker.memory(self.run_id, "memory", place / "archive", "car")
         self.registry = Registry(folder)
 
-    def version(self, key: str, **tags: Any) -> Version:
+    def version(self, key: str, name: str = NAME, **tags: Any) -> Version:
         tags = {"memory": "trap"} | tags
-        return self.registry.register(NAME, self.run_id, self.model_id, key, tags, "told")
+        return self.registry.register(name, self.run_id, self.model_id, key, tags, "told")
 
     @property
     def champion(self) -> int | None:
@@ -119,6 +119,22 @@ def test_a_challenger_whose_champion_was_rolled_back_is_not_approved(registered:
     with pytest.raises(RunError, match="judged against version 2, but the champion is version 1 now"):
         promote_awaiting(registered.data, None)
     assert registered.champion == 1
+
+
+def test_the_others_are_promoted_beside_one_whose_champion_has_changed(registered: Registered) -> None:
+    registry = registered.registry
+    for name, against in ((f"{NAME}-a", 2), (NAME, 1), (f"{NAME}-b", 2)):
+        registry.set_alias(registered.version("one", name, verdict=FIRST))
+        waiting = registered.version("two", name, against=against, retraining=1, verdict=AWAITING)
+        registry.set_alias(waiting, CHALLENGER)
+    told = rf"{NAME}-a version 2 .*{NAME}-b version 2 .* Promoted: {NAME} version 2"
+    with pytest.raises(RunError, match=told):
+        promote_awaiting(registered.data, None)
+    numbers = [found and found.number for found in map(registry.aliased, (f"{NAME}-a", NAME, f"{NAME}-b"))]
+    assert numbers == [1, 2, 1]
+    assert registry.aliased(NAME, CHALLENGER) is None
+    with pytest.raises(RunError, match=rf"{NAME}-a version 2 "):
+        promote_awaiting(registered.data, f"{NAME}-a")
 
 
 def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_again(
