@@ -20,6 +20,7 @@ from storage.places.swap import swap
 
 OLD: Final = ".old"  # before the ending of a folder that is moved aside; random letters are eight
 OPENINGS: Final = 100  # of a lock file that others remove
+LOCK_SECONDS: Final = 0.1  # between two tries to lock a file
 REMOVALS: Final = 10
 REMOVAL_SECONDS: Final = 0.2
 
@@ -84,18 +85,27 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def locked(path: Path, what: str) -> Iterator[None]:
+def locked(path: Path, what: str, seconds: float = 0.0) -> Iterator[None]:
     """Hold the lock file ``path`` for this process; a killed process loses it.
 
     Args:
         path: the lock file; it is created if it does not exist.
         what: the name of what is locked, for messages.
+        seconds: how long to wait for another process that holds it.
 
     Raises:
         InUseError: another process holds it; the message says which.
         OSError: it cannot be opened.
     """
-    handle = _lock(path, what)
+    until = time.monotonic() + seconds
+    while True:
+        try:
+            handle = _lock(path, what)
+            break
+        except InUseError:
+            if time.monotonic() >= until:
+                raise
+            time.sleep(LOCK_SECONDS)
     try:
         os.ftruncate(handle, 0)
         os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)

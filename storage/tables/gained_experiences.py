@@ -38,6 +38,7 @@ MOST: Final = 5_000  # experiences per class: five times the default number of c
 SHARDS: Final = 16  # if there are more, they are merged
 SNAPSHOTS: Final = "snapshots"
 DIGITS: Final = 8  # of a snapshot's digest
+MERGE_SECONDS: Final = 60.0  # at most: merging what is kept takes some seconds
 READINGS: Final = 3  # attempts to read shards that others may merge
 
 
@@ -85,11 +86,11 @@ def take_snapshot(folder: Path, name: str, vehicle: Vehicle) -> str:
     """Keep what a ``folder`` holds of a ``vehicle`` now, unless there is a snapshot of that ``name`` already.
 
     Returns the full name of the snapshot: the name and a digest of the content. Raises StorageError if
-    nothing has been learned yet.
+    nothing has been learned yet, InUseError if other processes hold the folder for longer than merging takes.
     """
     if not gained_shards(folder):
         raise StorageError(f"{folder} holds no learned problems; solve problems with --learn first.")
-    with locked(folder / ".lock", str(folder)):
+    with locked(folder / ".lock", str(folder), MERGE_SECONDS):
         taken = files_in(folder / SNAPSHOTS, f"{name}-{'?' * DIGITS}.parquet")
         if taken:
             return taken[0].stem

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ import pytest
 from planners.memory.plans.experience import Experience
 from planners.world.problem import Plan, start_state
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
-from storage.errors import StorageError
+from storage.errors import InUseError, StorageError
+from storage.places import files
+from storage.places.files import locked
 from storage.tables import gained_experiences as learned
 from storage.tables.experiences import read_experiences, read_searched
 from storage.tables.gained_experiences import (
@@ -22,6 +26,7 @@ from storage.tables.gained_experiences import (
     snapshot_path,
     take_snapshot,
 )
+from tests.planners.clock import ticks
 from tests.storage.samples import problem_with
 
 ROOT = Path(__file__).parents[3]
@@ -89,6 +94,19 @@ def test_a_snapshot_stays_what_it_was(tmp_path: Path) -> None:
     assert take_snapshot(tmp_path, "monday", CAR) == monday
     assert [len(read_experiences(snapshot_path(tmp_path, each))) for each in (monday, tuesday)] == [1, 2]
     assert monday.removeprefix("monday") != tuesday.removeprefix("tuesday")
+
+
+def test_a_snapshot_waits_for_a_writer_that_merges_but_not_for_ever(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add(tmp_path, [experience(1)])
+    writer = ExitStack()
+    writer.enter_context(locked(tmp_path / ".lock", "it"))
+    monkeypatch.setattr(files, "time", SimpleNamespace(monotonic=ticks(1.0), sleep=lambda _: None))
+    with pytest.raises(InUseError):
+        take_snapshot(tmp_path, "now", CAR)
+    monkeypatch.setattr(files.time, "sleep", lambda _: writer.close())
+    assert len(known(tmp_path)) == 1
 
 
 def test_nothing_learned_and_another_vehicle_are_told_in_a_line(tmp_path: Path) -> None:
