@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -232,6 +233,16 @@ def _synchronise(path: Path) -> None:
 
 
 def _umask() -> int:
-    mask = os.umask(0)
+    """The process's umask. Where the system does not tell it, it has to be set for a moment: to a strict one,
+    so that what other threads create meanwhile is not open to all.
+    """
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        status = ""
+    told = re.search(r"^Umask:\s*([0-7]+)$", status, re.MULTILINE)
+    if told is not None:
+        return int(told[1], 8)
+    mask = os.umask(0o077)
     os.umask(mask)
     return mask

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import os
 import shutil
 import signal
 import subprocess
@@ -12,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from storage.errors import InUseError
-from storage.places.files import locked, remove_leftovers
+from storage.places.files import locked, remove_leftovers, whole_file, whole_folder
 from storage.places.swap import swap
 
 ROOT = Path(__file__).parents[3]
@@ -50,6 +51,25 @@ def test_paths_change_places_or_stay(tmp_path: Path) -> None:
     assert (second / "second").exists() == (first / "first").exists() != changed
     assert not swap(first, tmp_path / "missing")
     assert first.exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="the system does not tell the umask")
+@pytest.mark.parametrize("umask", [0o022, 0o027, 0o077])
+def test_permissions_follow_the_umask_which_is_never_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, umask: int
+) -> None:
+    before = os.umask(umask)
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "umask", None)
+            with whole_file(tmp_path / "file") as temporary:
+                temporary.touch()
+            with whole_folder(tmp_path / "folder"):
+                pass
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o666 & ~umask
+    assert (tmp_path / "folder").stat().st_mode & 0o777 == 0o777 & ~umask
 
 
 @pytest.mark.parametrize("lost", ["lock", "folder"])
