@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
-from planners.world.problem import Plan
+if TYPE_CHECKING:  # its import takes half a second, and who reads rows needs only the names
+    from planners.world.problem import Plan
 
+WITHOUT_MEMORY = ("none", "fresh")  # the assists whose top k is 0
 SUB_PLANS = "sub-plans"  # what recall of parts of plans is called, from a library or from a memory ...
 DRIVES = "drives"  # ... if a whole plan was moved to the problem
 
@@ -18,7 +21,7 @@ class Attempt:
     problem_class: str
     planner: str
     assist: str
-    recall: str | None  # the strategy, one of ``RECALLS``, ``SUB_PLANS``, ``DRIVES``; None without
+    recall: str | None  # the strategy, one of ``STRATEGIES``, ``SUB_PLANS``, ``DRIVES``; None without
     top_k: int  # 0 without memory
     status: str
     solved: bool

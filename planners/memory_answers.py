@@ -65,7 +65,7 @@ def answer_from(
         planner: which would look for a shorter plan.
         top_k: how many whole plans to recall.
         seed: of blind choices.
-        strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
+        strategy: of recall, one of ``STRATEGIES``; by default what is best for the size of the memory.
         vehicle: what is driven.
         assist: one with a memory, as ``solve`` takes it.
         polished: whether the planner searches beside the plan anyway, whether or not it seems a detour.

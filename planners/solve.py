@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.attempt import TIMED_PARTS, Attempt
+from planners.attempt import TIMED_PARTS, WITHOUT_MEMORY, Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.free import turned
@@ -37,7 +37,6 @@ from planners.world.workspace import Workspace
 
 _WITH_MEMORY = ("closed", "open", "repair", "join", "published-open")
 ASSISTS = ("none", *_WITH_MEMORY, "fresh", *(f"random-{each}" for each in _WITH_MEMORY))
-WITHOUT_MEMORY = ("none", "fresh")  # their top k is 0
 
 
 def solve(
@@ -82,7 +81,7 @@ def solve(
         seed: of all random choices.
         limits: when the search gives up; by default ``usual_limits``.
         vehicle: what is to be driven.
-        strategy: of recall, one of ``RECALLS``; by default what is best for the size of the memory.
+        strategy: of recall, one of ``STRATEGIES``; by default what is best for the size of the memory.
         workspace: the caller's buffers; by default new ones.
         polished: whether the plan is polished; else it is the first that was found, as it was found.
 

@@ -12,7 +12,7 @@ from planners.world.arrays import Floats
 
 MAX_K: Final = 20
 PROTOCOLS: Final = ("held-out", "fresh")
-RECALLS: Final = ("encoder", "mask", "popularity")
+RANKINGS: Final = ("encoder", "mask", "popularity")
 _KEYS: Final = ["panel", "memory", "protocol", "recall"]
 _SHARES: Final = ["hit", "origin", "random", "oracle", "nothing_recalled"]
 _COLUMNS: Final = (*_KEYS, "k", "problems", "plans", "seeds", *_SHARES, "hit_sd", "origin_sd")
@@ -38,7 +38,7 @@ def retrieval_curve(recalls: pd.DataFrame, max_k: int = MAX_K) -> pd.DataFrame:
             of_memory = of_panel[of_panel["memory"] == memory]
             for protocol in ranked(of_memory["protocol"], PROTOCOLS):
                 of_protocol = of_memory[of_memory["protocol"] == protocol]
-                for recall in ranked(of_protocol["recall"], RECALLS):
+                for recall in ranked(of_protocol["recall"], RANKINGS):
                     curve = _over_seeds(of_protocol[of_protocol["recall"] == recall], max_k)
                     names = {"panel": panel, "memory": memory, "protocol": protocol, "recall": recall}
                     tables.append(curve.assign(**names))

@@ -18,8 +18,9 @@ import pandas as pd
 from dashboards.statistics.intervals import ratio
 from dashboards.statistics.panels import Panel, panels
 from dashboards.statistics.swaps import DRAWN, Difference, differences
+from planners.attempt import WITHOUT_MEMORY
 from planners.world.arrays import Floats
-from storage.tables.configurations import WITHOUT_MEMORY, Configuration
+from storage.tables.configurations import Configuration
 
 BETTER: Final = "better"
 WORSE: Final = "worse"

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from planners.attempt import Attempt
+from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.explanation import Recollection, recollections
 from planners.memory.memory import Memory
 from planners.memory.plans.free import turned
 from planners.search.query import Limits
 from planners.search.traces import Roads, Trace, last_roadmap, last_tree
-from planners.solve import WITHOUT_MEMORY, solve
+from planners.solve import solve
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace

@@ -34,7 +34,7 @@ from planners.world.geometry.occupancy import Bits, Grid, bits_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
-RECALLS: Final = ("encoder", "centroid", "exhaustive", "mask", "hybrid", "random")
+STRATEGIES: Final = ("encoder", "centroid", "exhaustive", "mask", "hybrid", "random")
 CANDIDATES: Final = 256  # plans that the encoder picks of a large memory
 MOST_SCORED: Final = 1_000  # plans: with more, scoring by cells costs more than the encoder
 MOST_EXHAUSTIVE: Final = 10_000  # plans: with more, ranking by cells costs more than the encoder
@@ -77,7 +77,7 @@ def recall(
     Args:
         memory: to recall from.
         view: the problem.
-        strategy: one of ``RECALLS``.
+        strategy: one of ``STRATEGIES``.
         k: how many plans to return at most.
         rng: the source of the choices of ``random``.
         candidates: how many plans the encoder picks for ``hybrid``.
@@ -85,8 +85,10 @@ def recall(
     Raises:
         ValueError: The strategy is unknown, k is below 1, or ``random`` has no ``rng``.
     """
-    if strategy not in RECALLS or k < 1:
-        raise ValueError(f"recall {k} plans by '{strategy}': give 1 or more, and one of {', '.join(RECALLS)}")
+    if strategy not in STRATEGIES or k < 1:
+        raise ValueError(
+            f"recall {k} plans by '{strategy}': give 1 or more, and one of {', '.join(STRATEGIES)}"
+        )
     count, spent = len(memory.plans), 0
     as_stored = memory.begins_with(view.problem.start[2])
     if as_stored and count > TRIED_EARLY and strategy in ("exhaustive", "hybrid"):

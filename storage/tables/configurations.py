@@ -6,15 +6,18 @@ from typing import Final, NamedTuple
 
 import pandas as pd
 
+from planners.attempt import DRIVES, SUB_PLANS, WITHOUT_MEMORY
+
 ASSISTS: Final = (
     "none", "closed", "open", "published-open", "repair", "join", "fresh",
     "random-closed", "random-open", "random-published-open", "random-repair", "random-join",
 )  # fmt: skip
-RECALLS: Final = ("exhaustive", "hybrid", "mask", "encoder", "centroid", "sub-plans", "random")
+RECALLS_OF_ROWS: Final = (
+    "exhaustive", "hybrid", "mask", "encoder", "centroid", DRIVES, SUB_PLANS, "random",
+)  # fmt: skip
 _UNNAMED: Final = ("", "random")  # recalls that a label leaves out: the assist says that it is random
 _BLINDLY: Final = "random-"
 _KEYS: Final = ("assist", "top_k", "recall", "polished")  # columns of an attempt row
-WITHOUT_MEMORY: Final = ("none", "fresh")
 POLISHED: Final = "polished"  # the last word of a label, if plans are
 
 
@@ -22,7 +25,7 @@ class Configuration(NamedTuple):
     """How an attempt uses a memory, which distinguishes attempts at a problem by the same planner."""
 
     assist: str  # one of ASSISTS
-    recall: str  # one of RECALLS; empty if nothing is recalled
+    recall: str  # one of RECALLS_OF_ROWS; empty if nothing is recalled
     top_k: int  # how many plans are recalled; 0 if they are not ranked
     polished: bool = False  # whether the plan is polished, as answers are, or as it was found
 
@@ -36,7 +39,7 @@ class Configuration(NamedTuple):
     @property
     def rank(self) -> tuple[bool, int, str, int, str, int]:
         """The key that sorts configurations for display: known names in their order, then others."""
-        names = (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS))
+        names = (*_position(self.assist, ASSISTS), *_position(self.recall, RECALLS_OF_ROWS))
         return (self.polished, *names, self.top_k)
 
     @property

@@ -12,7 +12,7 @@ from planners.memory.encoder.encoder import Architecture, initial_weights
 from planners.memory.memory import Memory
 from planners.memory.plans.cell_masks import masks_of
 from planners.memory.plans.sweeps import sweep_plans
-from planners.memory.recall import RECALLS
+from planners.memory.recall import STRATEGIES
 from planners.search.guides.grid_path import grid_metres
 from planners.solve import solve
 from planners.world.problem import (
@@ -49,7 +49,7 @@ def compile_free_answer(problem: Problem, attempt: Callable[[Problem], object], 
 
 
 def compile_assists(
-    vehicle: Vehicle, planner: str = ABLATION_PLANNER, strategies: Sequence[str] = RECALLS
+    vehicle: Vehicle, planner: str = ABLATION_PLANNER, strategies: Sequence[str] = STRATEGIES
 ) -> None:
     """Plan with a small memory and each strategy of recall: copies of one plan, with a box in its way.
 

@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 import pandas as pd
 
+from planners.attempt import WITHOUT_MEMORY
 from planners.memory.memory import Memory
 from planners.memory.recall import default_recall
-from planners.solve import WITHOUT_MEMORY
 from storage.archives.memories import load_memory
 from storage.errors import StorageError
 from storage.places.run_folder import RunFolder

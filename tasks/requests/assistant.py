@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Final, NamedTuple
 
-from planners.attempt import Attempt
+from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.explanation import MovedDrive, drive_found
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory
@@ -16,7 +16,7 @@ from planners.memory.plans.free import turned
 from planners.optimisation.polish import most_iterations
 from planners.search.anytime import EXPANSIONS_AN_ITERATION, improve
 from planners.search.query import Limits, usual_limits
-from planners.solve import WITHOUT_MEMORY, improved, solve
+from planners.solve import improved, solve
 from planners.world.alignment import from_canonical, mirrored, to_canonical
 from planners.world.problem import Plan, Problem, is_canonical
 from planners.world.workspace import Workspace

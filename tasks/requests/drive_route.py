@@ -13,10 +13,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from dashboards.cells import CellTable, decimal
-from planners.attempt import Attempt
+from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.route import Leg, Route, Router, Stuck
-from planners.solve import WITHOUT_MEMORY
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Point, Pose
 from planners.world.authority.authority import faults

@@ -91,7 +91,7 @@ def check_asked(
     Args:
         planner: one of ``PLANNERS``.
         assist: one of ``ASSISTS``.
-        recall: one of ``RECALLS``, or None.
+        recall: one of ``STRATEGIES``, or None.
         top_k: how many plans to recall, 1 or more.
         seed: 0 or more.
         polished: True or False.
@@ -100,13 +100,13 @@ def check_asked(
     Raises:
         UsageError: one of them is wrong.
     """
-    from planners.memory.recall import RECALLS  # imported late: Numba costs half a second
+    from planners.memory.recall import STRATEGIES  # imported late: Numba costs half a second
     from planners.search.registry import PLANNERS
     from planners.solve import ASSISTS
 
     check_known("planner", [planner], PLANNERS)
     check_known("assist", [assist], ASSISTS)
-    check_known("recall", [] if recall is None else [recall], RECALLS)
+    check_known("recall", [] if recall is None else [recall], STRATEGIES)
     check_whole(top_k_name, top_k)
     check_flag("polished", polished)
     check_seed(seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from planners.solve import WITHOUT_MEMORY
+from planners.attempt import WITHOUT_MEMORY
 from storage.archives.memories import load_memory
 from storage.tables.attempts import write_attempts
 from tasks.attempts.side_by_side import Contestant, side_by_side

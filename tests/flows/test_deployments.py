@@ -15,7 +15,7 @@ from prefect.exceptions import ParameterTypeError, SignatureMismatchError
 from flows import deployments
 from flows.cli import choices
 from planners.memory.encoder.encoder import NETWORKS
-from planners.memory.recall import RECALLS
+from planners.memory.recall import STRATEGIES
 from planners.search.registry import PLANNERS
 from planners.solve import ASSISTS
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES
@@ -125,7 +125,7 @@ def test_choices_are_those_that_there_are() -> None:
         (choices.ContinualName, CONTINUAL),
         (choices.PlannerName, PLANNERS),
         (choices.AssistName, ASSISTS),
-        (choices.RecallName, RECALLS),
+        (choices.RecallName, STRATEGIES),
         (choices.NetworkName, NETWORKS),
     ):
         assert sorted(get_args(offered)) == sorted(there_are)

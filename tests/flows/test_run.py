@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 
 from flows.cli.main import call
+from planners.attempt import WITHOUT_MEMORY
 from planners.search.registry import PLANNERS
-from planners.solve import WITHOUT_MEMORY
 from storage.archives.memories import load_memory
 from storage.places.data_folder import DataFolder
 from storage.places.run_folder import RunFolder

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planners.attempt import WITHOUT_MEMORY
 from planners.optimisation import polish
 from planners.search import anytime
 from planners.search.registry import PLANNERS, plan
-from planners.solve import WITHOUT_MEMORY, improved, solve
+from planners.solve import improved, solve
 from planners.world.authority.authority import faults
 from planners.world.randomness import generator
 from tests.planners.clock import ticks

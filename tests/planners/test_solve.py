@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners.memory.plans.free import free_plans, turned
-from planners.memory.recall import RECALLS
+from planners.memory.recall import STRATEGIES
 from planners.optimisation import polish
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
@@ -193,7 +193,7 @@ def test_exhaustive_recall_finds_a_free_plan_if_and_only_if_there_is_one(seed, c
 
 @given(
     st.sampled_from([each for each in ASSISTS if each not in ("none", "fresh")]),
-    st.sampled_from(RECALLS),
+    st.sampled_from(STRATEGIES),
     st.integers(0, 10**6),
 )
 @settings(max_examples=30, deadline=None)

@@ -34,7 +34,7 @@ from threadpoolctl import threadpool_limits
 
 from planners.memory.memory import Memory
 from planners.memory.plans.free import free_plans
-from planners.memory.recall import RECALLS, default_recall, recall
+from planners.memory.recall import STRATEGIES, default_recall, recall
 from planners.world.arrays import Flags
 from planners.world.classes.problem_classes import problem_class
 from planners.world.geometry.collision import scene_of
@@ -85,15 +85,15 @@ def quantiles(seconds: Sequence[float]) -> tuple[str, str]:
 
 def add_recalls(rows: Table, memory: Memory, problems: list[Problem], free: Flags) -> None:
     """A row a strategy, those of one problem next to each other."""
-    seconds: dict[str, list[float]] = {name: [] for name in RECALLS}
-    hits = {(name, k): 0 for name in RECALLS for k in (1, K)}
+    seconds: dict[str, list[float]] = {name: [] for name in STRATEGIES}
+    hits = {(name, k): 0 for name in STRATEGIES for k in (1, K)}
     workspace = Workspace()
-    for name in RECALLS:  # compiled or loaded now
+    for name in STRATEGIES:  # compiled or loaded now
         recall(memory, View(problems[0]), name, K, generator(MEASURING))
     gc.collect()
     gc.disable()
     for number, problem in enumerate(track(problems, description="recall", transient=True)):
-        for name in RECALLS[number % len(RECALLS) :] + RECALLS[: number % len(RECALLS)]:
+        for name in STRATEGIES[number % len(STRATEGIES) :] + STRATEGIES[: number % len(STRATEGIES)]:
             rng = generator(MEASURING, problem.id)
             began = thread_time()
             recall(memory, View(problem, workspace), name, K, rng)
@@ -103,7 +103,7 @@ def add_recalls(rows: Table, memory: Memory, problems: list[Problem], free: Flag
                 hits[name, k] += any(free[number, i] for i in found.plans[:k])
     gc.enable()
     default = default_recall(memory)
-    for name in RECALLS:
+    for name in STRATEGIES:
         shares = [f"{100 * hits[name, k] / len(problems):.1f}" for k in (1, K)]
         shown = f"{name} (default)" if name == default else name
         oracle = f"{100 * free.any(1).mean():.1f}"

@@ -21,7 +21,7 @@ from rich.table import Table
 
 from planners.memory.memory import Memory
 from planners.memory.plans.free import free_plans
-from planners.memory.recall import RECALLS, recall
+from planners.memory.recall import STRATEGIES, recall
 from planners.solve import solve
 from planners.world.classes.problem_classes import CLASSES, problem_class
 from planners.world.geometry.collision import scene_of
@@ -55,12 +55,12 @@ def hits(memory: Memory, problems: list[Problem], strategy: str) -> list[tuple[b
 
 def latencies(memory: Memory, problems: list[Problem]) -> dict[str, list[dict[str, float]]]:
     """Seconds by part of each recall, "whole" the whole; strategies next to each other, in turn first."""
-    rows: dict[str, list[dict[str, float]]] = {strategy: [] for strategy in RECALLS}
+    rows: dict[str, list[dict[str, float]]] = {strategy: [] for strategy in STRATEGIES}
     gc.collect()
     gc.disable()
     for number, problem in enumerate(track(problems, description=memory.class_name, transient=True)):
-        first = number % len(RECALLS)
-        for strategy in RECALLS[first:] + RECALLS[:first]:
+        first = number % len(STRATEGIES)
+        for strategy in STRATEGIES[first:] + STRATEGIES[:first]:
             rng = generator(MEASURING, problem.id) if strategy == "random" else None
             view = View(problem, WORKSPACE)
             recall(memory, view, strategy, TOP_K, rng)
@@ -80,7 +80,7 @@ def report(console: Console) -> None:
         oracle = np.mean([free_plans(memory.sweeps, scene_of(problem)).any() for problem in problems])
         title = f"{name}, {COUNT} problems, oracle@{len(memory.plans)} {100 * oracle:.1f} %, µs"
         table = _table(title, "strategy", "hit@1", "hit@5", "median", "90 %", "99 %", "mean", *PARTS)
-        for strategy in RECALLS:
+        for strategy in STRATEGIES:
             one, five = np.mean(hits(memory, problems, strategy), axis=0)
             whole = 1e6 * np.array([row["whole"] for row in rows[strategy]])
             parts = [1e6 * np.median([row.get(part, 0.0) for row in rows[strategy]]) for part in PARTS]

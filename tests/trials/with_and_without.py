@@ -22,10 +22,10 @@ from rich.console import Console
 from dashboards.cells import markdown_table
 from dashboards.statistics.intervals import RESAMPLES, bootstrap, interval
 from dashboards.statistics.panels import Panel, panels
+from planners.attempt import WITHOUT_MEMORY
 from planners.search.outcome import EXPANSION
 from planners.world.arrays import Floats
 from storage.tables.attempts import read_attempts
-from storage.tables.configurations import WITHOUT_MEMORY
 
 WAYS: Final = {
     ("gust", "none"): "GUST alone",

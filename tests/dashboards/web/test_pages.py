@@ -20,6 +20,7 @@ from dashboards.web.attempt_rows import COLUMNS, attempts_of
 from dashboards.web.data_reader import DataReader
 from dashboards.web.memory_versions import MemoryVersion
 from dashboards.web.notices import MissingError, NoticeError
+from planners.attempt import WITHOUT_MEMORY
 from planners.memory.library.plan_library import PlanLibrary, gathered_library
 from planners.memory.memory import Memory
 from planners.world.problem import Plan
@@ -28,7 +29,6 @@ from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, state_size
 from storage.archives.libraries import save_library
 from storage.places.data_folder import DataFolder
 from storage.tables.attempts import readable_attempts
-from storage.tables.configurations import WITHOUT_MEMORY
 from storage.tables.watched import read_watched
 from tests.dashboards.web.conftest import LocalClient
 from tests.dashboards.web.server import served

@@ -15,7 +15,7 @@ from planners.memory.plans.free import ends_of, first_fitting, free_plans
 from planners.memory.recall import (
     LIKELY_CELLS,
     MOST_EXHAUSTIVE,
-    RECALLS,
+    STRATEGIES,
     WORTH_CELLS,
     by_encoder,
     default_recall,
@@ -58,7 +58,9 @@ def recalled_by(memory, problem, strategy, k, **options):
     return recall(memory, View(problem), strategy, k, generator(k, "blindly"), **options)
 
 
-@given(seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(RECALLS), off=st.sampled_from([0.0, 0.01]))
+@given(
+    seed=SEEDS, k=st.integers(1, 12), strategy=st.sampled_from(STRATEGIES), off=st.sampled_from([0.0, 0.01])
+)
 def test_recalled_plans_are_distinct_at_most_k_and_a_free_one_is_among_them(
     memory, problem_in, seed, k, strategy, off
 ):

@@ -10,7 +10,7 @@ import pytest
 
 from planners.memory.encoder.training import Checkpoint, Epoch, TrainedEncoder, TrainingSettings
 from planners.memory.ranking.inverted_lists import list_readout
-from planners.memory.recall import RECALLS, recall
+from planners.memory.recall import STRATEGIES, recall
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, VEHICLES
 from planners.world.view import View
 from storage.archives.checkpoints import epochs_kept, load_checkpoint, save_checkpoint
@@ -52,7 +52,7 @@ def test_a_memory_from_the_disk_answers_exactly_as_the_one_that_was_saved(tmp_pa
     assert all(np.array_equal(a, b) for a, b in zip(memory.lists, loaded.lists, strict=True))
     for seed in range(20):
         problem = strewn(seed, 20)
-        for strategy in RECALLS:
+        for strategy in STRATEGIES:
             ours, theirs = (
                 recall(each, View(problem), strategy, 3, np.random.default_rng(seed))
                 for each in (memory, loaded)

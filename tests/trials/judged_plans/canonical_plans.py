@@ -9,11 +9,12 @@ from functools import cache
 from itertools import product
 from typing import Final
 
+from planners.attempt import WITHOUT_MEMORY
 from planners.memory.memory import Memory
 from planners.optimisation.polish import polish
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS
-from planners.solve import ASSISTS, WITHOUT_MEMORY, improved, solve
+from planners.solve import ASSISTS, improved, solve
 from planners.world.classes.problem_classes import CLASSES, DIFFICULTIES, problem_class
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
