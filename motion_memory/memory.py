@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
+from motion_memory.array_problems import problem_of_arrays
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
@@ -18,14 +17,12 @@ from planners.solve import solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
-from planners.world.checked_problem import checked_problem
 from planners.world.problem import BOUNDS, GOAL_RADIUS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
 from storage.fields import parse_json
-from storage.vehicles.vehicle_files import scale_for_vehicle
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.settings.checks import is_whole
 
@@ -105,7 +102,7 @@ class Memory:
             points: ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after
                 another.
             polygon_starts: ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i +
-                1]]``.
+                1]]``; it begins with 0 and ends with m. Without obstacles both arrays may be empty.
             goal_radius: metres: how far from the goal the plan may end.
             bounds: x_min, y_min, x_max, y_max in metres.
             scale: metres of these lengths in one metre of the memory's problems; None: the scale of its
@@ -120,14 +117,9 @@ class Memory:
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()
-        points = np.asarray(points, float).reshape(-1, 2)
-        polygon_starts = np.asarray(polygon_starts, np.int64)
-        problem = checked_problem(
-            *(start, goal, goal_radius, bounds, points, polygon_starts),
+        problem = problem_of_arrays(
+            *(start, goal, points, polygon_starts, goal_radius, bounds, scale, start_motion, arrival),
             vehicle=self.vehicle,
-            scale=scale_for_vehicle(scale, self.vehicle),
-            start_motion=start_motion,
-            arrival=arrival,
         )
         return self._planned(problem, began)
 

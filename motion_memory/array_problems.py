@@ -1,0 +1,92 @@
+"""Makes a checked problem of a caller's own arrays, which may be anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
+from planners.world.checked_problem import checked_problem
+from planners.world.problem import Arrival, Problem
+from planners.world.vehicles.vehicle import Vehicle
+from storage.fields import short
+from storage.vehicles.vehicle_files import scale_for_vehicle
+
+
+def problem_of_arrays(
+    start: Pose,
+    goal: Point,
+    points: Floats,
+    polygon_starts: Indices | Integers,
+    goal_radius: float,
+    bounds: Bounds,
+    scale: float | None,
+    start_motion: tuple[float, ...],
+    arrival: Arrival | None,
+    vehicle: Vehicle,
+) -> Problem:
+    """Make a problem of what ``Memory.plan_arrays`` is given.
+
+    Args:
+        start: x, y in metres, heading in radians.
+        goal: x, y in metres.
+        points: ``[m, 2]`` metres: the corners of all obstacles, one after another.
+        polygon_starts: ``[n + 1]``: where each obstacle begins in ``points``, and at last ``m``.
+        goal_radius: metres: how far from the goal a plan may end.
+        bounds: x_min, y_min, x_max, y_max in metres.
+        scale: metres of these lengths in one metre of the memory's problems; None: that of the vehicle.
+        start_motion: the entries of the start state after the pose.
+        arrival: what the goal asks for besides the place.
+        vehicle: the vehicle that drives.
+
+    Raises:
+        ValueError: an array has another shape, or the problem is impossible.
+    """
+    corners = _points(points)
+    return checked_problem(
+        *(start, goal, goal_radius, bounds, corners, _starts(polygon_starts, len(corners))),
+        vehicle=vehicle,
+        scale=scale_for_vehicle(scale, vehicle),
+        start_motion=start_motion,
+        arrival=arrival,
+    )
+
+
+def _points(given: Floats | Sequence[Sequence[float]]) -> Floats:
+    """The corners ``[m, 2]``; of an empty list none. Raises ValueError if they have another shape."""
+    try:
+        points = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("points must be an array [m, 2] of numbers in metres; correct it") from None
+    if points.size == 0:
+        return np.empty((0, 2))
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"points has the shape {list(points.shape)}; expected [m, 2], x and y in metres")
+    return points
+
+
+def _starts(given: Indices | Integers | Sequence[int], count: int) -> Indices:
+    """Where obstacles begin and end among ``count`` corners; of an empty list none do.
+
+    Raises ValueError unless the first begins with the first corner, the last ends with the last one, and none
+    ends before it begins.
+    """
+    try:
+        starts = np.asarray(given)
+    except ValueError:  # lists of different lengths
+        starts = np.empty(0)
+    if starts.size == 0 and count == 0:
+        return np.zeros(1, np.int64)
+    if (
+        starts.ndim != 1
+        or not np.issubdtype(starts.dtype, np.integer)
+        or starts[0] != 0
+        or starts[-1] != count
+        or (starts[1:] < starts[:-1]).any()
+    ):
+        raise ValueError(
+            f"polygon_starts {short(starts.tolist())} must be whole numbers that begin with 0, do not "
+            f"decrease and end with {count}, the number of points"
+        )
+    return starts.astype(np.int64, copy=False)

@@ -1,0 +1,77 @@
+"""A problem in arrays is the problem that a file would hold, or is refused in one line."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from motion_memory.array_problems import problem_of_arrays
+from planners.world.problem import BOUNDS, GOAL_RADIUS, Problem
+from planners.world.vehicles.vehicle import CAR
+from storage.exchange.problems import problem_of
+from tests.worlds import box
+
+START, GOAL = (0.0, 0.0, 0.5), (40.0, 30.0)
+CENTRES = st.tuples(st.floats(5.0, 35.0), st.floats(-4.0, -2.5))
+OBSTACLES = st.lists(CENTRES, max_size=4).map(lambda centres: [box(x, y, 0.2, 1.0, 1.0) for x, y in centres])
+
+
+def in_arrays(points: Any, starts: Any, **more: Any) -> Problem:
+    asked = {"start": START, "goal": GOAL, "goal_radius": GOAL_RADIUS, "bounds": BOUNDS, "scale": None}
+    asked |= {"start_motion": (), "arrival": None, "vehicle": CAR}
+    return problem_of_arrays(points=points, polygon_starts=starts, **asked | more)
+
+
+def as_arrays(polygons: list[Any]) -> tuple[Any, Any]:
+    return [corner for polygon in polygons for corner in polygon.tolist()], np.cumsum(
+        [0, *map(len, polygons)]
+    )
+
+
+@given(OBSTACLES)
+def test_arrays_hold_what_a_file_holds(polygons: list[Any]) -> None:
+    fields = {"start": list(START), "goal": list(GOAL), "bounds": list(BOUNDS)}
+    filed = problem_of(fields | {"obstacles": [polygon.tolist() for polygon in polygons]}, "problem")
+    given = in_arrays(*as_arrays(polygons))
+    for one, other in zip(filed.obstacles, given.obstacles, strict=True):
+        assert np.array_equal(one, other)
+
+
+@given(OBSTACLES, st.data())
+def test_no_corner_is_left_out_in_silence(polygons: list[Any], data: st.DataObject) -> None:
+    points, starts = as_arrays(polygons)
+    other = data.draw(st.lists(st.integers(-2, len(points) + 2), max_size=len(starts) + 1))
+    owned = [i for begin, end in pairwise(other) for i in range(begin, end)]
+    assume(owned != list(range(len(points))))
+    with pytest.raises(ValueError, match=f"polygon_starts .* end with {len(points)}") as caught:
+        in_arrays(points, other)
+    assert "\n" not in str(caught.value)
+
+
+def test_empty_lists_are_no_obstacles() -> None:
+    for points in ([], np.empty((0, 2)), ()):
+        for starts in ([], [0], np.zeros(1, np.int32)):
+            assert len(in_arrays(points, starts).obstacles.vertices) == 0
+
+
+@pytest.mark.parametrize(
+    ("points", "starts"),
+    [
+        ([[1, 2, 3]] * 4, [0, 4]),
+        ([1, 2, 3, 4, 5, 6], [0, 3]),
+        ([[1, 2], [3]], [0, 2]),
+        (None, [0]),
+        (box(20.0, -3.0, 0.2, 1.0, 1.0), [0.0, 4.0]),
+        (box(20.0, -3.0, 0.2, 1.0, 1.0), [[0, 4], [4]]),
+        (box(20.0, -3.0, 0.2, 1.0, 1.0), None),
+    ],
+)
+def test_arrays_of_other_shapes_are_refused_in_one_line(points: Any, starts: Any) -> None:
+    with pytest.raises(ValueError, match=r"^(points|polygon_starts) ") as caught:
+        in_arrays(points, starts)
+    assert "\n" not in str(caught.value)
