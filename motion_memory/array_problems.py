@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -10,16 +11,17 @@ from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.checked_problem import checked_problem
 from planners.world.problem import Arrival, Problem
 from planners.world.vehicles.vehicle import Vehicle
+from storage.exchange.question_fields import Goal, goal_of, numbers_of
 from storage.fields import short
 from storage.vehicles.vehicle_files import scale_for_vehicle
 
 
 def problem_of_arrays(
     start: Pose,
-    goal: Point,
+    goal: Point | Pose,
     points: Floats,
     polygon_starts: Indices | Integers,
-    goal_radius: float,
+    goal_radius: float | None,
     bounds: Bounds,
     scale: float | None,
     start_motion: tuple[float, ...],
@@ -30,10 +32,10 @@ def problem_of_arrays(
 
     Args:
         start: x, y in metres, heading in radians.
-        goal: x, y in metres.
+        goal: x, y in metres: a place; or x, y, heading: a pose at rest.
         points: ``[m, 2]`` metres: the corners of all obstacles, one after another.
         polygon_starts: ``[n + 1]``: where each obstacle begins in ``points``, and at last ``m``.
-        goal_radius: metres: how far from the goal a plan may end.
+        goal_radius: metres: how far from the goal a plan may end; None: the usual, as in files.
         bounds: x_min, y_min, x_max, y_max in metres.
         scale: metres of these lengths in one metre of the memory's problems; None: that of the vehicle.
         start_motion: the entries of the start state after the pose.
@@ -41,16 +43,48 @@ def problem_of_arrays(
         vehicle: the vehicle that drives.
 
     Raises:
-        ValueError: an array has another shape, or the problem is impossible.
+        ValueError: an array has another shape, the goal is a pose and there is an arrival too, or the problem
+            is impossible.
     """
+    x, y, heading = _numbers("start", start, "x, y, heading")
+    x_min, y_min, x_max, y_max = _numbers("bounds", bounds, "x_min, y_min, x_max, y_max")
+    asked = _goal(goal, goal_radius, arrival)
     corners = _points(points)
     return checked_problem(
-        *(start, goal, goal_radius, bounds, corners, _starts(polygon_starts, len(corners))),
+        (x, y, heading),
+        *(asked.place, asked.radius, (x_min, y_min, x_max, y_max)),
+        *(corners, _starts(polygon_starts, len(corners))),
         vehicle=vehicle,
         scale=scale_for_vehicle(scale, vehicle),
-        start_motion=start_motion,
-        arrival=arrival,
+        start_motion=tuple(start_motion),
+        arrival=asked.arrival,
     )
+
+
+def _numbers(name: str, given: Sequence[float], *meanings: str) -> list[float]:
+    """The numbers that a caller gave, as many as one of the ``meanings`` lists, such as "x, y".
+
+    Raises ValueError if there are more or fewer, or something else is given.
+    """
+    for meaning in meanings:
+        with suppress(ValueError):
+            return numbers_of({name: np.asarray(given).tolist()}, name, meaning.count(",") + 1)
+    raise ValueError(f"{name} is {short(given)}; expected {' or '.join(meanings)}")
+
+
+def _goal(given: Point | Pose, radius: float | None, arrival: Arrival | None) -> Goal:
+    """What is asked at the goal: of three numbers what a file with them asks, a pose at rest.
+
+    Raises ValueError if there are fewer or more, or three and an ``arrival``.
+    """
+    numbers = _numbers("goal", given, "x, y", "x, y, heading")
+    usual = goal_of({"goal": numbers})
+    if len(numbers) == 3 and arrival is not None:
+        raise ValueError(
+            f"goal {short(numbers)} is a pose at rest, and there is an arrival too; give a goal of x, y, and "
+            "the heading in the arrival"
+        )
+    return Goal(usual.place, usual.radius if radius is None else radius, arrival or usual.arrival)
 
 
 def _points(given: Floats | Sequence[Sequence[float]]) -> Floats:

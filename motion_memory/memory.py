@@ -17,7 +17,7 @@ from planners.solve import solve
 from planners.world.alignment import from_canonical, scaled, shifted, to_canonical
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
 from planners.world.authority.authority import faults
-from planners.world.problem import BOUNDS, GOAL_RADIUS, Arrival, Plan, Problem
+from planners.world.problem import BOUNDS, Arrival, Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
@@ -85,10 +85,10 @@ class Memory:
     def plan_arrays(
         self,
         start: Pose,
-        goal: Point,
+        goal: Point | Pose,
         points: Floats,
         polygon_starts: Indices | Integers,
-        goal_radius: float = GOAL_RADIUS,
+        goal_radius: float | None = None,
         bounds: Bounds = BOUNDS,
         scale: float | None = None,
         start_motion: tuple[float, ...] = (),
@@ -98,22 +98,24 @@ class Memory:
 
         Args:
             start: x, y in metres, heading in radians.
-            goal: x, y in metres.
+            goal: x, y in metres: a place; or x, y, heading: a pose at rest, within 0.05 rad, as in files.
             points: ``[m, 2]`` metres: the corners of all obstacles, which are simple polygons, one after
                 another.
             polygon_starts: ``[n + 1]``: obstacle i owns ``points[polygon_starts[i] : polygon_starts[i +
                 1]]``; it begins with 0 and ends with m. Without obstacles both arrays may be empty.
-            goal_radius: metres: how far from the goal the plan may end.
+            goal_radius: metres: how far from the goal the plan may end; None: 2 from a place, 0.1 from a pose
+                of three numbers.
             bounds: x_min, y_min, x_max, y_max in metres.
             scale: metres of these lengths in one metre of the memory's problems; None: the scale of its
                 vehicle.
             start_motion: the entries of the start state after the pose: speed (m/s), steering angle (rad)
                 or turn rate (rad/s), hitch angles (rad). Missing entries are 0.
-            arrival: what the goal asks for besides the place: heading, speeds, hitch angles, with
-                tolerances.
+            arrival: what a goal of two numbers asks for besides the place: heading, speeds, hitch angles,
+                with tolerances.
 
         Raises:
-            ValueError: the obstacles are malformed, or the problem is impossible.
+            ValueError: an array has another shape, the goal is a pose and there is an arrival too, or the
+                problem is impossible.
             PlanFaultError: the independent judge refuses the plan.
         """
         began = perf_counter()

@@ -127,7 +127,7 @@ def text_of(value: object, name: str) -> str:
 
 def short(value: object) -> str:
     """A ``value`` as quoted in a message, on one line."""
-    text = repr(value)
+    text = repr(value).replace("\n", " ")  # as of arrays
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 

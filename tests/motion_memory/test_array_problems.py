@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from motion_memory.array_problems import problem_of_arrays
-from planners.world.problem import BOUNDS, GOAL_RADIUS, Problem
+from planners.world.problem import BOUNDS, Arrival, Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.exchange.problems import problem_of
 from tests.worlds import box
@@ -22,7 +22,7 @@ OBSTACLES = st.lists(CENTRES, max_size=4).map(lambda centres: [box(x, y, 0.2, 1.
 
 
 def in_arrays(points: Any, starts: Any, **more: Any) -> Problem:
-    asked = {"start": START, "goal": GOAL, "goal_radius": GOAL_RADIUS, "bounds": BOUNDS, "scale": None}
+    asked = {"start": START, "goal": GOAL, "goal_radius": None, "bounds": BOUNDS, "scale": None}
     asked |= {"start_motion": (), "arrival": None, "vehicle": CAR}
     return problem_of_arrays(points=points, polygon_starts=starts, **asked | more)
 
@@ -74,4 +74,31 @@ def test_empty_lists_are_no_obstacles() -> None:
 def test_arrays_of_other_shapes_are_refused_in_one_line(points: Any, starts: Any) -> None:
     with pytest.raises(ValueError, match=r"^(points|polygon_starts) ") as caught:
         in_arrays(points, starts)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.tuples(st.floats(20.0, 40.0), st.floats(20.0, 40.0), st.floats(-6.0, 6.0)))
+def test_a_goal_of_three_numbers_is_the_pose_that_it_is_in_a_file(goal: tuple[float, float, float]) -> None:
+    fields = {"start": list(START), "bounds": list(BOUNDS), "obstacles": []}
+    for asked in (goal, goal[:2]):
+        filed = problem_of(fields | {"goal": list(asked)}, "problem")
+        for either in (asked, list(asked), np.array(asked)):
+            arrays = in_arrays([], [], goal=either)
+            assert (arrays.goal, arrays.goal_radius) == (filed.goal, filed.goal_radius)
+            assert arrays.arrival == filed.arrival
+
+
+def test_a_pose_is_asked_for_in_one_way() -> None:
+    with pytest.raises(ValueError, match=r"goal .* is a pose at rest, and there is an arrival too"):
+        in_arrays([], [], goal=(40.0, 30.0, 0.5), arrival=Arrival(0.5, 0.1))
+    assert in_arrays([], [], goal=(40.0, 30.0, 0.5), goal_radius=0.3).goal_radius == 0.3
+
+
+@pytest.mark.parametrize("name", ["start", "goal", "bounds"])
+@pytest.mark.parametrize(
+    "value", [None, 3.0, (), (1.0,), (1.0, "2", 3.0), np.zeros(5), np.zeros((3, 3)), [[1], [2, 3]]]
+)
+def test_other_numbers_than_are_expected_are_refused_in_one_line(name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"^{name} is .*; expected ") as caught:
+        in_arrays([], [], **{name: value})
     assert "\n" not in str(caught.value)
