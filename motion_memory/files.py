@@ -9,7 +9,9 @@ from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.errors import StorageError
 from storage.exchange import problems as problem_files
+from storage.fields import number_of
 from storage.vehicles.vehicle_files import said_vehicle, scale_for_vehicle
+from tasks.settings.checks import check_path, check_seed, check_whole, checked_vehicle
 
 
 def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Problem]:
@@ -21,10 +23,13 @@ def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Probl
             the one that the file states, else the car.
 
     Raises:
+        UsageError: There is no such vehicle, or the path is none.
         StorageError: The file is missing, or a problem is malformed or impossible; names line and id.
     """
+    check_path("path", path)
     file = Path(path)
-    driver = (problem_files.vehicle_of_problems(file) or CAR) if vehicle is None else said_vehicle(vehicle)
+    stated = problem_files.vehicle_of_problems(file) if vehicle is None else None
+    driver = stated or (CAR if vehicle is None else said_vehicle(checked_vehicle(vehicle)))
     return problem_files.read_problems(file, driver)
 
 
@@ -50,18 +55,26 @@ def read_worlds(
         seed: decides where problems are cut from a map.
 
     Raises:
-        StorageError: Nothing can be read, or no world that is there can be used.
+        UsageError: There is no such vehicle, or ``count`` or ``seed`` is no number as it should be.
+        ValueError: The resolution is no number; or the scale is none, is out of its range, or is not that of
+            a vehicle from a file.
+        StorageError: Nothing can be read, the resolution is out of its range, or no world that is there can
+            be used.
     """
     from storage.worlds.importing import ImportSettings, import_part  # late: a robot may not have SciPy
     from storage.worlds.sources import source_at
 
-    driven = said_vehicle(vehicle)
+    check_path("path", path)
+    if count is not None:
+        check_whole("count", count)
+    check_seed(seed)
+    driven = said_vehicle(checked_vehicle(vehicle))
     settings = ImportSettings(
         vehicle=driven,
         count=count,
         seed=seed,
         scale=scale_for_vehicle(scale, driven),
-        resolution=resolution,
+        resolution=None if resolution is None else number_of(resolution, "resolution"),
     )
     imported = import_part(source_at(Path(path)), part, settings)
     if imported.skipped and not imported.problems:
@@ -108,7 +121,6 @@ def solve_many(
     from tasks.registry.settled_vehicle import settled_vehicle  # late: a robot may not have pyarrow
     from tasks.requests.assistant import AssistantSettings
     from tasks.requests.solve_many import solve_many as solve_file
-    from tasks.settings.checks import check_path
 
     for name, value in (("problems", problems), ("out", out), ("plans", plans or "")):
         check_path(name, value)

@@ -9,6 +9,7 @@ import sys
 import typing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -152,6 +153,27 @@ def test_problems_are_cut_from_a_map(tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", np.zeros((220, 220), bool))
     cut = motion_memory.read_worlds(tmp_path / "map.npy", count=2, resolution=1.0)
     assert len(cut) == 2
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"count": 0}, {"count": -1}, {"count": 2.5}, {"count": True}, {"count": "2"}, {"seed": -1},
+     {"seed": 1.5}, {"seed": "1"}, {"vehicle": "tram"}, {"vehicle": None}, {"path": 3}],
+)  # fmt: skip
+def test_wrong_numbers_and_names_are_refused_before_a_map_is_read(
+    wrong: dict[str, Any], tmp_path: Path
+) -> None:
+    np.save(tmp_path / "map.npy", np.zeros((220, 220), bool))
+    asked = {"path": tmp_path / "map.npy", "count": 2, "resolution": 1.0}
+    with pytest.raises(motion_memory.UsageError):
+        motion_memory.read_worlds(**asked | wrong)
+
+
+@pytest.mark.parametrize("resolution", [0, -1.0, float("nan"), float("inf"), "1"])
+def test_a_resolution_that_is_no_length_is_refused(resolution: Any, tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.zeros((220, 220), bool))
+    with pytest.raises((ValueError, motion_memory.StorageError), match="resolution"):
+        motion_memory.read_worlds(tmp_path / "map.npy", count=2, resolution=resolution)
 
 
 def test_a_file_of_which_nothing_can_be_used_is_an_error(tmp_path: Path) -> None:
