@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import MapOptions, SolveOptions
-from flows.cli.terminal import SHORT, write, write_answer, write_files
+from flows.cli.terminal import SHORT, write, write_answer, write_files, write_for_people
 
 if TYPE_CHECKING:
     from tasks.requests.adapt_pieces import AdaptRequest, Driven
@@ -195,6 +195,7 @@ def route(
     assistant = Assistant(options.settings(assist, without_memory="fresh"))
     settings = import_settings(assistant.settings.vehicle, options.seed, **asdict(reading))
     driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
+    write_for_people(options.vehicle_line(assistant.settings))
     write(driven.legs)
     write_answer(*driven.summary, **driven.answer)
     write_files(plan=out, picture=picture)

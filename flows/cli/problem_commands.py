@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from flows.cli.choices import AssistName, Difficulty, PlannerName, SourceName
 from flows.cli.run_options import worker_count
 from flows.cli.solve_options import SolveOptions
-from flows.cli.terminal import write, write_answer, write_files
+from flows.cli.terminal import write, write_answer, write_files, write_for_people
 
 if TYPE_CHECKING:
     from tasks.requests.problem_parts import PartResult, SolveRequest
@@ -82,6 +82,7 @@ def plan(
     attempt, found, answer, failure, written = plan_one(
         assistant, problem, out, picture, explain, learn, pick
     )
+    write_for_people(options.vehicle_line(assistant.settings, problem))
     lines = []
     if found is not None:
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
@@ -124,11 +125,13 @@ def optimise(
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw the guess and the plan, .png, .svg or .pdf.
     """
-    from tasks.registry.settled_vehicle import settled_vehicle
+    from tasks.registry.settled_vehicle import settled_vehicle, vehicle_line
     from tasks.requests.optimise_one import initial_guess, optimise_one
 
-    initial = initial_guess(plan, planner, straight, settled_vehicle(vehicle, problem), seed)
+    driver = settled_vehicle(vehicle, problem)
+    initial = initial_guess(plan, planner, straight, driver, seed)
     found = optimise_one(initial, problem, clearance_weight, out, picture, pick)
+    write_for_people(vehicle_line(driver, vehicle, problem))
     write_answer(
         f"{found.summary}, {found.length_m:.1f} m, {found.duration_s:.1f} s"
         f" (guess: {found.guess_duration_s:.1f} s), {found.clearance_m:.2f} m clear",
@@ -165,6 +168,7 @@ def solve(
 
     settings = options.settings(assist, improve_seconds, problems)
     solved = solve_many(settings, problems, out, plans, learn, worker_count(workers), _solve_parts)
+    write_for_people(options.vehicle_line(settings, problems))
     _write_summary(solved)
     write_files(rows=out, plans=plans)
     _write_learned(learn)

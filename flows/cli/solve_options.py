@@ -70,6 +70,12 @@ class SolveOptions:
             not self.unpolished,
         )
 
+    def vehicle_line(self, settings: AssistantSettings, problems: Path | None = None) -> str:
+        """The line that tells people which vehicle drives; ``settings`` are what ``settings`` returned."""
+        from tasks.registry.settled_vehicle import vehicle_line
+
+        return vehicle_line(settings.vehicle, self.vehicle, problems, self.memory)
+
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)

@@ -71,6 +71,12 @@ def write_answer(*lines: str, **answer: object) -> None:
     write(*lines)
 
 
+def write_for_people(line: str) -> None:
+    """Write a line that programs have in the answer, and that the quiet do not want."""
+    if _telling.document is None and not _telling.quiet:
+        write(line)
+
+
 def write_files(**paths: object) -> None:
     """Write a line for each of ``paths`` that is not None: the name of the argument, then the path."""
     written = {name: str(path) for name, path in paths.items() if path is not None}

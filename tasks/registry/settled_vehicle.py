@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.archives.libraries import HEADERS, vehicle_of
 from storage.exchange.problem_files import FORMATS
 from storage.exchange.problems import vehicle_of_problems
@@ -30,8 +30,7 @@ def settled_vehicle(given: str | None, problems: Path | None = None, memory: str
         StorageError: the problems are damaged, or the memory is missing or damaged.
         RunError: MLflow does not have the memory.
     """
-    is_file = problems is not None and problems.suffix in FORMATS and problems.is_file()
-    stated = vehicle_of_problems(problems) if problems is not None and is_file else None
+    stated = _vehicle_of_problems(problems)
     if stated is None:
         stored = _vehicle_of_memory(memory) if given is None else None
         return checked_vehicle(given or (DEFAULT_VEHICLE if stored is None else text_of(stored)))
@@ -42,6 +41,28 @@ def settled_vehicle(given: str | None, problems: Path | None = None, memory: str
     except ValueError as error:
         raise UsageError(f"{problems} {error}.") from None
     return driver
+
+
+def vehicle_line(
+    driver: str, given: str | None, problems: Path | None = None, memory: str | None = None
+) -> str:
+    """The line that tells people which vehicle drives, and that it is the default if nothing names one.
+
+    Args:
+        driver: what ``settled_vehicle`` returned.
+        given: the name or file that the user gave, or None.
+        problems: a file of problems, whose first may state its vehicle, or None.
+        memory: the address of a memory, which is for one vehicle, or None.
+    """
+    is_named = given is not None or memory is not None or _vehicle_of_problems(problems) is not None
+    default = "" if is_named else ", the default; --vehicle names another"
+    return f"vehicle  {name_of(said_vehicle(driver))}{default}"
+
+
+def _vehicle_of_problems(problems: Path | None) -> Vehicle | None:
+    """The vehicle that the first problem of a file states; None if it states none, or is no such file."""
+    is_file = problems is not None and problems.suffix in FORMATS and problems.is_file()
+    return vehicle_of_problems(problems) if problems is not None and is_file else None
 
 
 def _vehicle_of_memory(memory: str | None) -> Vehicle | None:

@@ -189,3 +189,31 @@ def test_the_tables_of_runs_are_documented(
     (documented,) = [told for known, of, told in TABLES if known == name and command in of]
     assert tuple(each for each in documented if each != "panel") == fields
     assert len(headings) == len(fields)
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["plan one.json", "solve few.jsonl --out rows.parquet", "optimise empty.parquet --straight",
+     "route town.npy --from 20,20,0 --to 120,120"],
+)  # fmt: skip
+def test_people_are_told_the_vehicle_and_where_it_is_the_default(
+    words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(place)
+    assumed = "vehicle  car, the default; --vehicle names another"
+    with_memory = [] if words.startswith("optimise") else [(["--memory", "memory"], "vehicle  car")]
+    for more, line in [([], assumed), (["--vehicle", "car"], "vehicle  car"), *with_memory]:
+        assert call([*words.split(), *more]) == 0
+        assert line in capsys.readouterr().out.splitlines()
+    for more in (["--json"], ["--quiet"]):
+        assert call([*words.split(), *more]) == 0
+        assert "--vehicle names" not in capsys.readouterr().out
+
+
+def test_the_vehicle_that_a_problem_states_is_no_default(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(place)
+    (place / "stated.json").write_text(json.dumps(fields_of(problem(0)) | {"vehicle": "car"}))
+    assert call(["plan", "stated.json"]) == 0
+    assert "vehicle  car" in capsys.readouterr().out.splitlines()
