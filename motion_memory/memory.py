@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
 from motion_memory.array_problems import problem_of_arrays
+from motion_memory.plain import plain
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory as StoredMemory
 from planners.memory.memory import scale_fault
@@ -22,9 +23,10 @@ from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace
 from storage.errors import StorageError
 from storage.exchange.problems import problem_of
-from storage.fields import parse_json
+from storage.fields import parse_json, short
 from tasks.attempts.judged_attempts import check_attempt
 from tasks.settings.checks import is_whole
+from tasks.settings.errors import UsageError
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,8 @@ class Memory:
 
         Args:
             problem: a ``Problem``, which is not checked again, or a problem in the exchange format
-                (docs/problem-files.md) as a mapping or JSON text.
+                (docs/problem-files.md) as a mapping or JSON text. A mapping may hold tuples, and NumPy's
+                arrays and numbers.
 
         Raises:
             ValueError: the problem is malformed or impossible, or the memory is not made for its scale.
@@ -160,17 +163,25 @@ class Memory:
             One line for each fault; an empty list if the plan solves the problem.
 
         Raises:
+            UsageError: What is given is no plan.
             ValueError: The problem is malformed or impossible.
         """
+        if not isinstance(plan, Plan):
+            raise UsageError(
+                f"plan is {short(plan)}: give the plan of an answer, which has one if it is solved."
+            )
         read = self._read(problem)
         near = shifted(plan, (-read.offset[0], -read.offset[1]))
         return faults(read, scaled(near, 1.0 / read.scale), self.vehicle)
 
     def _read(self, given: Problem | Mapping[str, Any] | str) -> Problem:
         """Read and check a problem in any form that ``plan`` takes. Raises ValueError if it is malformed."""
-        if isinstance(given, str):
-            given = _parsed(given)
-        return given if isinstance(given, Problem) else problem_of(given, "problem", self.vehicle)
+        if isinstance(given, Problem):
+            return given
+        fields = _parsed(given) if isinstance(given, str) else given
+        with suppress(ValueError):  # most hold what JSON holds, and need no second look
+            return problem_of(fields, "problem", self.vehicle)
+        return problem_of(plain(fields), "problem", self.vehicle)
 
     def _planned(self, problem: Problem, began: float) -> Answer:
         canonical, alignment = to_canonical(problem)
