@@ -15,7 +15,7 @@ STARTS: Final = {"start_speed": "speed", "start_steering": "steering", "start_tu
 ENDS: Final = ("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance")
 QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
 POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
-_NAME_IT: Final = "name the vehicle that the problem is for (--vehicle)"
+_NAME_IT: Final = "name the vehicle that the problem is for (--vehicle, in Python vehicle=)"
 ANY_HEADING: Final = 3.15  # rad; half a turn, rounded up, allows any heading
 ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
 

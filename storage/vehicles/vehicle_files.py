@@ -50,7 +50,8 @@ def scale_for_vehicle(stated: object, vehicle: Vehicle) -> float:
     if scale != vehicle.scale and not is_built_in(vehicle):
         raise ValueError(
             f"scale is {scale:g}, but the scale of {name_of(vehicle)} is {vehicle.scale:g}, which follows "
-            "from its size; leave the field out, or name the vehicle that the problem is for (--vehicle)"
+            "from its size; leave the scale out, or name the vehicle that the problem is for (--vehicle, in "
+            "Python vehicle=)"
         )
     return scale
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,10 @@ from motion_memory.array_problems import problem_of_arrays
 from planners.world.problem import BOUNDS, Arrival, Problem
 from planners.world.vehicles.vehicle import CAR
 from storage.exchange.problems import problem_of
+from storage.vehicles.vehicle_files import said_vehicle
 from tests.worlds import box
 
+ROOT = Path(__file__).parents[2]
 START, GOAL = (0.0, 0.0, 0.5), (40.0, 30.0)
 CENTRES = st.tuples(st.floats(5.0, 35.0), st.floats(-4.0, -2.5))
 OBSTACLES = st.lists(CENTRES, max_size=4).map(lambda centres: [box(x, y, 0.2, 1.0, 1.0) for x, y in centres])
@@ -102,3 +105,9 @@ def test_other_numbers_than_are_expected_are_refused_in_one_line(name: str, valu
     with pytest.raises(ValueError, match=rf"^{name} is .*; expected ") as caught:
         in_arrays([], [], **{name: value})
     assert "\n" not in str(caught.value)
+
+
+def test_of_another_scale_than_the_vehicle_s_it_is_told_what_to_do_in_python() -> None:
+    robot = said_vehicle(str(ROOT / "docs" / "vehicles" / "turtlebot.yaml"))
+    with pytest.raises(ValueError, match=r"scale is 1, but .*leave the scale out.*in Python vehicle="):
+        in_arrays([], [], scale=1.0, vehicle=robot)
