@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Indices, Integers, Point, Pose
+from planners.world.frame_faults import frame_fault
 from planners.world.geometry.polygons import cut_polygons
-from planners.world.problem import Arrival, Problem
+from planners.world.problem import Arrival, Problem, obstacles_of
 from planners.world.problem_faults import problem_fault
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
+NO_OBSTACLES: Final = obstacles_of([])
 FAR_M: Final = 1_000.0  # from here on frames are moved to the start: obstacles are kept in float32
 FARTHEST_M: Final = 1e10  # up to here float64 is exact to a micrometre, as plans are
 
@@ -63,12 +66,6 @@ def checked_problem(
         points = points - offset
     else:
         offset = (0.0, 0.0)
-    with np.errstate(over="ignore"):  # what becomes infinite is refused with its polygon
-        scaled = points if scale == 1.0 else points / scale
-    obstacles = cut_polygons(scaled, polygon_starts)
-    if groups is not None:
-        ends = np.cumsum([0, *groups])
-        obstacles = obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
     problem = Problem(
         problem_id,
         class_name,
@@ -76,13 +73,23 @@ def checked_problem(
         (goal[0] / scale, goal[1] / scale),
         goal_radius / scale,
         (bounds[0] / scale, bounds[1] / scale, bounds[2] / scale, bounds[3] / scale),
-        obstacles,
+        NO_OBSTACLES,
         scale,
         (start_motion[0] / scale, *start_motion[1:]) if start_motion else (),
         arrival
         and arrival._replace(least_speed=arrival.least_speed / scale, most_speed=arrival.most_speed / scale),
         offset,
     )
+    fault = frame_fault(problem)  # else obstacles in other units would be blamed first
+    if fault is not None:
+        raise ValueError(fault)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused with its polygon
+        scaled = points if scale == 1.0 else points / scale
+    obstacles = cut_polygons(scaled, polygon_starts)
+    if groups is not None:
+        ends = np.cumsum([0, *groups])
+        obstacles = obstacles._replace(obstacle_starts=obstacles.obstacle_starts[ends])
+    problem = replace(problem, obstacles=obstacles)
     fault = problem_fault(problem, vehicle)
     if fault is not None:
         raise ValueError(fault)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import numpy as np
 
 from planners.world.arrays import Bounds, Floats, Integers, Point
+from planners.world.frame_faults import frame_fault, point_outside
 from planners.world.geometry.collision import (
     CELL_M,
     box_is_inside,
@@ -15,48 +15,27 @@ from planners.world.geometry.collision import (
     make_edges,
     piece_extent,
 )
-from planners.world.geometry.polygons import LARGEST_COORDINATE_M
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
 from planners.world.vehicles.dynamics import load, swept_bodies, turn_limit
 from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names, trailers_of
 
-WIDEST_BOUNDS_M: Final = 1_000.0  # the cell lists of a scene grow with the area of the bounds
-LARGEST_HEADING: Final = 10_000.0  # radians; of more turns the last digits are lost
 MOST_LISTED: Final = 4_000_000  # entries of these lists, 64 MB; a city map has some thousand
 
 
 def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     """Return what is wrong with a problem and what to do about it, or None if it makes sense.
 
-    The obstacles must be well formed. Checked are, in this order: the numbers are finite and not too large,
-    the bounds, the goal radius, how the drive begins and is to end, and whether the footprint at the start
-    and the goal's centre are free. Lengths are told as they are outside, in real metres.
+    The obstacles must be well formed. Checked are, in this order: the numbers (``frame_fault``), how the
+    drive begins and is to end, and whether the footprint at the start and the goal's centre are free. Lengths
+    are told as they are outside, in real metres.
     """
-    scale = problem.scale
-    heading = None if problem.arrival is None else problem.arrival.heading
-    headings = {"start": problem.start[2], "goal": heading or 0.0}
-    numbers = (*problem.start[:2], *problem.goal, problem.goal_radius, *problem.bounds)
-    if not all(math.isfinite(number) for number in (*numbers, *headings.values())):
-        return "start, goal, goal_radius and bounds must be finite numbers; correct them"
-    if max(abs(number) for number in numbers) > LARGEST_COORDINATE_M:
-        farthest = scale * LARGEST_COORDINATE_M
-        return f"lies farther than {farthest:.0f} m from the origin; move the origin near the start"
-    for end, angle in headings.items():
-        if abs(angle) > LARGEST_HEADING:
-            return f"{end} heading is {angle:g} rad; expected an angle of -pi to pi, turns may be added"
-    x_min, y_min, x_max, y_max = problem.bounds
-    if not (x_min < x_max and y_min < y_max):
-        return f"bounds {_bounds(problem)} are inverted; expected [x_min, y_min, x_max, y_max] in metres"
-    if max(x_max - x_min, y_max - y_min) > WIDEST_BOUNDS_M:
-        return (
-            f"bounds {_bounds(problem)} are wider than {scale * WIDEST_BOUNDS_M:.0f} m; are they in metres?"
-        )
-    if problem.goal_radius <= 0.0:
-        name = "goal_radius" if heading is None else "goal_tolerance"
-        return f"{name} is {scale * problem.goal_radius:g}; expected a length above 0 m"
-    fault = _start_fault(problem, vehicle) or _arrival_fault(problem.arrival, scale, vehicle)
+    fault = (
+        frame_fault(problem)
+        or _start_fault(problem, vehicle)
+        or _arrival_fault(problem.arrival, problem.scale, vehicle)
+    )
     if fault is not None:
         return fault
     entries, start_is_free, goal_is_free = _room(
@@ -70,15 +49,15 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     if entries > MOST_LISTED:
         return "obstacles cover the bounds too many times over; leave out those that others cover"
     if not start_is_free:
-        size = "" if scale == 1.0 else f" (scale {scale:g})"
+        size = "" if problem.scale == 1.0 else f" (scale {problem.scale:g})"
+        at = point_outside(problem, problem.start)
         return (
-            f"start footprint of {name_of(vehicle)}{size} at {_point(problem, problem.start)} is not free or "
-            "leaves the bounds; move the start, or name the vehicle that the problem is for"
+            f"start footprint of {name_of(vehicle)}{size} at {at} is not free or leaves the bounds; move the "
+            "start, or name the vehicle that the problem is for"
         )
     if not goal_is_free:
-        return (
-            f"goal centre {_point(problem, problem.goal)} lies in an obstacle or out of bounds; move the goal"
-        )
+        at = point_outside(problem, problem.goal)
+        return f"goal centre {at} lies in an obstacle or out of bounds; move the goal"
     return None
 
 
@@ -174,19 +153,3 @@ def _room(
                 make_edges(vertices, first, last, edges, 0)
             goal_is_free &= not box_meets_piece(goal_box, 0, last - first, edges)
     return entries, start_is_free, goal_is_free
-
-
-def _outside(problem: Problem, x: float, y: float) -> Point:
-    """A point of the problem in real metres, where the problem comes from."""
-    return problem.scale * x + problem.offset[0], problem.scale * y + problem.offset[1]
-
-
-def _bounds(problem: Problem) -> list[float]:
-    x_min, y_min, x_max, y_max = problem.bounds
-    return [*_outside(problem, x_min, y_min), *_outside(problem, x_max, y_max)]
-
-
-def _point(problem: Problem, place: tuple[float, ...]) -> str:
-    """A place in words: x, y in real metres, and the heading if it has one."""
-    told = (*_outside(problem, *place[:2]), *place[2:])
-    return f"({', '.join(f'{coordinate:.10g}' for coordinate in told)})"

@@ -170,8 +170,8 @@ def _corners(polygon: Floats) -> Floats:
         raise PolygonError("has a coordinate that is not a finite number; correct it")
     if farthest > LARGEST_COORDINATE_M:
         raise PolygonError(
-            f"reaches farther from the origin than {LARGEST_COORDINATE_M:.0f} m times the scale; "
-            "move the origin near the start"
+            f"reaches farther from the start than {LARGEST_COORDINATE_M:.0f} m times the scale; is it in "
+            "metres? What lies outside the bounds may be left out"
         )
     rounded = polygon.astype(np.float32).astype(np.float64)
     corners: Floats = rounded[(rounded != _after(rounded)).any(axis=1)]

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,3 +62,30 @@ def test_a_corner_that_overflows_is_refused_without_a_warning(scale: float) -> N
     with pytest.raises(ValueError) as caught:  # noqa: PT011 the words do not matter
         checked_problem((0, 0, 0), (5, 5), 1.0, (-9, -9, 9, 9), points, np.array([0, 3]), scale=scale)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 2.0])
+@given(k=st.floats(20.0, 1e4))
+def test_of_a_problem_in_millimetres_the_bounds_are_told_not_the_origin(scale: float, k: float) -> None:
+    large = k * scale
+    goal, bounds = (30.0 * large, 25.0 * large), (-10.0 * large, -10.0 * large, 90.0 * large, 90.0 * large)
+    with pytest.raises(ValueError, match=rf"^bounds .* than {1000.0 * scale:g} m; are they in metres\?$"):
+        checked_problem((0.0, 0.0, 0.5), goal, 2.0, bounds, large * POINTS, STARTS, scale=scale)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"goal": (2e4, 0.0)}, "goal (20000, 0) lies more than 10000 m from the start"),
+        ({"bounds": (2e4, 0.0, 2e4 + 50.0, 9.0)}, "lie more than 10000 m from the start; are they in its"),
+        ({"goal_radius": 2e4}, "goal_radius is 20000; expected a length above 0 m, up to 10000 m"),
+        ({"points": POINTS + 2e4}, "obstacle 1 reaches farther from the start than 10000 m times the scale"),
+    ],
+)
+def test_what_lies_far_from_a_start_near_the_origin_is_named(wrong: dict[str, Any], told: str) -> None:
+    sound = {"start": (0.0, 0.0, 0.5), "goal": (30.0, 25.0), "goal_radius": 2.0, "points": POINTS}
+    sound |= {"bounds": (-10.0, -10.0, 60.0, 60.0), "polygon_starts": STARTS}
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 the line is compared below
+        checked_problem(**sound | wrong)
+    assert told in str(caught.value)
+    assert "origin" not in str(caught.value)
