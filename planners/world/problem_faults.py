@@ -81,7 +81,10 @@ def _arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> s
     if arrival is None:
         return None
     if arrival.heading is not None and not arrival.heading_tolerance > 0.0:
-        return f"goal_tolerance is {arrival.heading_tolerance:g} rad; expected an angle above 0"
+        return (
+            f"goal_tolerance (of an Arrival: heading_tolerance) is {arrival.heading_tolerance:g} rad; "
+            "expected an angle above 0"
+        )
     asked = f"goal_speed [{scale * arrival.least_speed:g}, {scale * arrival.most_speed:g}]"
     if not arrival.least_speed <= arrival.most_speed:
         return f"{asked} is inverted; expected the least and the most m/s"

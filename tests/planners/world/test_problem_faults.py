@@ -63,3 +63,10 @@ def test_lengths_are_told_in_real_metres(field: str, value: object, told: str) -
     fault = problem_fault(replace(problem, **{field: value}))  # type: ignore[arg-type]
     assert fault is not None
     assert told in fault
+
+
+def test_a_heading_without_a_tolerance_is_told_by_both_its_names() -> None:
+    fault = problem_fault(replace(problem_of([]), arrival=Arrival(heading=0.0)))
+    assert fault is not None
+    assert "goal_tolerance" in fault
+    assert "heading_tolerance" in fault
