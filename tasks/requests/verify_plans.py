@@ -24,6 +24,10 @@ from tasks.settings.errors import RunError, tell_faults
 _ROOM_M: Final = 1e6  # around a plan that is judged by itself
 _BY_ITSELF: Final = "plans driven again by their controls, within their vehicle's limits"
 _IN_PROBLEM: Final = "plans driven again by their controls, from start to goal of their problems, and swept"
+_LOOKED_AT_LESS: Final = (
+    "Obstacles and goals were not looked at: for plans of problems, name the file of these with --problems. "
+    "A route was judged on its map when it was made; its file does not name the map."
+)
 _NO_PLAN: Final = "files that hold no plan, but say why there is none"
 
 _LOG = logging.getLogger(__name__)
@@ -107,7 +111,7 @@ def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
                 show(done)
     _refuse(wrong, f" in {count} files of plans")
     if problems is None:
-        _LOG.info("Obstacles and goals were not looked at: name the file of the problems with --problems.")
+        _LOG.info(_LOOKED_AT_LESS)
     return counts
 
 

@@ -108,3 +108,13 @@ def test_problems_are_refused_beside_what_holds_no_plan_files(
     assert call(["verify", str(tmp_path / "memory"), "--problems", str(tmp_path / "room.json")]) == 2
     assert call(["verify", str(tmp_path / "room.json")]) == 1
     assert capsys.readouterr().err.count("\n") == 2
+
+
+def test_of_a_route_it_is_told_that_its_map_is_not_looked_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    town, drive = str(tmp_path / "town.npy"), str(tmp_path / "drive.json")
+    np.save(town, np.zeros((160, 160), np.uint8))
+    assert call(["route", town, "--from", "20,20,0", "--to", "120,120", "--out", drive]) == 0
+    assert call(["verify", drive]) == 0
+    assert "A route was judged on its map when it was made" in capsys.readouterr().out
