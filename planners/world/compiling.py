@@ -10,6 +10,7 @@ from collections.abc import Callable
 from numba.core import event
 
 TOLD_AFTER: float = 2.0  # seconds of compiling, from which on it is worth a line
+TOLD_EVERY: float = 10.0  # seconds of compiling, after each of which another line says that it goes on
 Predicate = Callable[[event.Event], bool]  # whether what is compiled is a kernel of ours
 _LOG = logging.getLogger(__name__)
 
@@ -43,7 +44,7 @@ class _NoCollection(_Listener):
 
 
 class _Told(_Listener):
-    """Logs a line, once a process, when kernels have been compiled for ``TOLD_AFTER`` seconds in all.
+    """Logs a line when kernels have been compiled for ``TOLD_AFTER`` seconds in all, and later ones.
 
     A large kernel calls many others, each of which is compiled first and shows that time has passed.
     """
@@ -53,7 +54,7 @@ class _Told(_Listener):
         self._depth = 0  # kernels that wait for those that they call
         self.seconds = 0.0  # of kernels that are done
         self._began = 0.0
-        self._is_told = False
+        self._lines = 0  # that were logged
 
     def on_start(self, event: event.Event) -> None:
         if self._is_kernel(event):
@@ -70,9 +71,16 @@ class _Told(_Listener):
                 self.seconds += time.monotonic() - self._began
 
     def _tell(self) -> None:
-        if not self._is_told and self.seconds + time.monotonic() - self._began >= TOLD_AFTER:
-            self._is_told = True
-            _LOG.info("Compiling what this needs for this kind of vehicle, once: may take some 30 s.")
+        seconds = self.seconds + time.monotonic() - self._began
+        if self._lines == 0 and seconds >= TOLD_AFTER:
+            self._lines = 1
+            _LOG.info(
+                "Compiling what this needs for this kind of vehicle, once: takes about a minute, more if the "
+                "computer is busy."
+            )
+        elif self._lines > 0 and seconds >= TOLD_EVERY * self._lines:
+            self._lines = 1 + int(seconds / TOLD_EVERY)
+            _LOG.info("Still compiling, after %.0f s.", seconds)
 
 
 _told: list[_Told] = []
