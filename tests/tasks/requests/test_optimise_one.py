@@ -29,9 +29,10 @@ def test_a_straight_line_becomes_a_plan_and_its_plan_a_beginning(
     first, second, drawing = (tmp_path / name for name in ("first.json", "second.json", "plan.png"))
     told = ["--out", str(first), "--picture", str(drawing)]
     assert call(["optimise", str(problem), "--straight", *told]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("converged, ")
-    assert lines[1:] == [f"plan     {first}", f"picture  {drawing}"]
+    driver, answer, *lines = capsys.readouterr().out.splitlines()
+    assert driver.startswith("vehicle  car, ")
+    assert answer.startswith("converged, ")
+    assert lines == [f"plan     {first}", f"picture  {drawing}"]
     assert drawing.stat().st_size > 10_000
     record = read_plan(first)
     assert (record.status, record.source, record.planner) == ("solved", "optimised", "straight-line")
