@@ -56,7 +56,7 @@ def problem_of_arrays(
         *(corners, _starts(polygon_starts, len(corners))),
         vehicle=vehicle,
         scale=scale_for_vehicle(scale, vehicle),
-        start_motion=tuple(start_motion),
+        start_motion=_motion(start_motion),
         arrival=asked.arrival,
     )
 
@@ -70,6 +70,17 @@ def _numbers(name: str, given: Sequence[float], *meanings: str) -> list[float]:
         with suppress(ValueError):
             return numbers_of({name: np.asarray(given).tolist()}, name, meaning.count(",") + 1)
     raise ValueError(f"{name} is {short(given)}; expected {' or '.join(meanings)}")
+
+
+def _motion(given: Sequence[float]) -> tuple[float, ...]:
+    """The motion at the start. Raises ValueError if it is no list of numbers."""
+    try:
+        return tuple(float(number) for number in given)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"start_motion is {short(given)}; expected a list of numbers: speed, steering or turn rate, "
+            "hitch angles"
+        ) from None
 
 
 def _goal(given: Point | Pose, radius: float | None, arrival: Arrival | None) -> Goal:

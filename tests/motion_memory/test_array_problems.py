@@ -107,6 +107,13 @@ def test_other_numbers_than_are_expected_are_refused_in_one_line(name: str, valu
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("value", [0.5, None, "fast", [[1.0, 0.0]], ["fast"]])
+def test_a_motion_that_is_no_list_of_numbers_is_refused_in_one_line(value: Any) -> None:
+    with pytest.raises(ValueError, match="start_motion") as refused:
+        in_arrays([], [], start_motion=value)
+    assert "\n" not in str(refused.value)
+
+
 def test_of_another_scale_than_the_vehicle_s_it_is_told_what_to_do_in_python() -> None:
     robot = said_vehicle(str(ROOT / "docs" / "vehicles" / "turtlebot.yaml"))
     with pytest.raises(ValueError, match=r"scale is 1, but .*leave the scale out.*in Python vehicle="):
