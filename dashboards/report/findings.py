@@ -112,12 +112,16 @@ def _arrival(row: Row) -> str:
     low, high = row["sooner_low_s"], row["sooner_high_s"]
     if math.isnan(row["sooner_s"]):
         return "has no drive to compare"
-    ends = f"(95 %: {_sooner(low)} to {_sooner(high)})"
     if low <= 0.0 <= high:
-        return f"arrives at the same time, as far as this shows {ends}"
-    return f"arrives {_sooner(row['sooner_s'])} {ends}"
+        ends = f"{_sooner(low)} to {_sooner(high)}"
+        return f"arrives at the same time, as far as this shows (95 %: {ends})"
+    least, most = sorted((abs(low), abs(high)))
+    return f"arrives {_sooner(row['sooner_s'])} (95 %: {_amount(least)} to {_amount(most)})"
 
 
 def _sooner(seconds: float) -> str:
-    amount = f"{abs(seconds):.2f} s" if abs(seconds) >= 0.01 else f"{1e3 * abs(seconds):.1f} ms"
-    return f"{amount} {'sooner' if seconds >= 0.0 else 'later'}"
+    return f"{_amount(abs(seconds))} {'sooner' if seconds >= 0.0 else 'later'}"
+
+
+def _amount(seconds: float) -> str:
+    return f"{seconds:.2f} s" if seconds >= 0.01 else f"{1e3 * seconds:.1f} ms"
