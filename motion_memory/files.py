@@ -28,8 +28,10 @@ def read_problems(path: str | Path, *, vehicle: str | None = None) -> list[Probl
     """
     check_path("path", path)
     file = Path(path)
-    stated = problem_files.vehicle_of_problems(file) if vehicle is None else None
-    driver = stated or (CAR if vehicle is None else said_vehicle(checked_vehicle(vehicle)))
+    if vehicle is None:
+        driver = problem_files.vehicle_of_problems(file) or CAR
+    else:
+        driver = said_vehicle(checked_vehicle(vehicle))
     return problem_files.read_problems(file, driver)
 
 

@@ -18,7 +18,7 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.optimisation.descent import arrives
 from planners.optimisation.polish import polish_guesses
 from planners.search.connection.pose_table import seconds_from, seconds_to_pose
-from planners.search.manoeuvres.manoeuvring import is_tight
+from planners.search.manoeuvres.suitability import is_tight
 from planners.search.manoeuvres.variants import without_trailers
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock

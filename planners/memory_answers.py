@@ -17,7 +17,7 @@ from planners.memory.plans.free import START_TOLERANCE, turned
 from planners.memory.recall import default_recall, recall
 from planners.search.guides.detour import is_detour, is_detour_from_motion
 from planners.search.help import PATIENCE, Help
-from planners.search.manoeuvres.manoeuvring import suits
+from planners.search.manoeuvres.suitability import suits
 from planners.search.query import Endings, Query
 from planners.sub_plan_answers import sub_plan_answer
 from planners.world.goal import goal_of

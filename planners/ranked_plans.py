@@ -10,7 +10,7 @@ from planners.memory.memory import Memory
 from planners.memory.plans.free import ends_of, plan_fits, turned
 from planners.memory.ranking.scores import best_plans
 from planners.search.free_goal import aimed_view
-from planners.search.manoeuvres.manoeuvring import suits
+from planners.search.manoeuvres.suitability import suits
 from planners.search.query import usual_limits
 from planners.sub_plan_answers import sub_plan_answer
 from planners.world.alignment import Alignment, from_canonical, scaled, shifted, to_canonical

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 from planners.optimisation.polish import most_iterations, polish, polish_quickest
 from planners.search.guides.guidance import guidance
-from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND, is_tight, meets, suits
+from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
+from planners.search.manoeuvres.suitability import is_tight, meets, suits
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits, Query
 from planners.search.registry import PLANNERS

@@ -10,8 +10,9 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
-from planners.search.manoeuvres.manoeuvring import Manoeuvring, suits
+from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.manoeuvres.squeezing import squeeze
+from planners.search.manoeuvres.suitability import suits
 from planners.search.outcome import Other, Outcome
 from planners.search.primitives import Lattice, begin_lattice, grow_lattice, paced, varied
 from planners.search.query import Query

@@ -12,10 +12,11 @@ from planners.search.connection.pose_table import seconds_to_pose
 from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
-from planners.search.manoeuvres.levels import LEVELS, suited
+from planners.search.manoeuvres.levels import FINE, LEVELS, suited
 from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
+from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
 from planners.search.manoeuvres.variants import (
     at_its_slowest,
     less_folded,
@@ -31,59 +32,19 @@ from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go,
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
-from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits, window_of
-from planners.world.goal import HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, SLACK
+from planners.world.goal import LEAST_SPEED, MOST_SPEED, SLACK
 from planners.world.problem import Plan, start_state
-from planners.world.vehicles.vehicle import (
-    Vehicle,
-    state_size,
-    trailers_of,
-)
+from planners.world.vehicles.vehicle import state_size
 
 MEETING: Final = 3  # times as many with trailers: trees meet where they are wide
 FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: greed makes drives longer
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
-FINE: Final = 5  # the level from which on cells are fine ...
-STUCK: Final = 1000  # ... and after how many expansions there the search is stuck
-TIGHT: Final = 0.6  # a goal with less room around it is tight
+STUCK: Final = 1000  # expansions where cells are fine, after which the search is stuck
 PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
 PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
-
-
-def suits(goal: Floats, vehicle: Vehicle) -> bool:
-    """Whether a goal, that of ``goal_of``, may be reached by manoeuvres: a pose, at rest.
-
-    Who cannot stand has to change speed and turn at once, and may arrive at any speed that is asked.
-    """
-    if vehicle.min_speed > 0.0 and not vehicle.first_order:
-        return False
-    slowest = max(vehicle.min_speed, 0.0)
-    return bool(
-        goal[HEADING_TOLERANCE] < np.inf
-        and goal[LEAST_SPEED] <= at_its_slowest(vehicle).max_speed
-        and goal[MOST_SPEED] >= slowest
-        and (slowest > 0.0 or goal[LEAST_SPEED] <= 0.0)
-    )
-
-
-def is_tight(goal: Floats, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether there is so little room around a goal that suits that other searches have small hopes.
-
-    Who cannot stand has no room to try again.
-    """
-    root = pose_of(goal, state_size(vehicle))[np.newaxis]
-    return bool(vehicle.min_speed > 0.0 or room_around(root, time_reversed(vehicle), vehicle, scene) < TIGHT)
-
-
-def meets(start: Floats, vehicle: Vehicle) -> bool:
-    """Whether a tree grows out of a start ``[S]`` too: what is hard from one end is easy from the other.
-
-    With trailers it does, if the vehicle stands, or can at once.
-    """
-    return bool(trailers_of(vehicle)) and bool(vehicle.first_order or start[3] == 0.0)
 
 
 def allocate_way_from_start() -> CostToGo:
@@ -176,8 +137,8 @@ class Manoeuvring:
     @property
     def is_stuck(self) -> bool:
         """Whether no drive was found where cells are coarse, nor soon where they are fine."""
-        soon = self.expansions - self._before_fine < STUCK and not self.is_over
-        return self._level >= FINE and not soon and not self.kept
+        spent = self.expansions - self._before_fine
+        return self._level >= FINE and not self.kept and (spent >= STUCK or self.is_over)
 
     @property
     def _expansions(self) -> int:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planners.search.manoeuvres.manoeuvring import suits
+from planners.search.manoeuvres.suitability import suits
 from planners.search.manoeuvres.variants import word_radius
 from planners.solve import solve
 from planners.world.authority.authority import faults

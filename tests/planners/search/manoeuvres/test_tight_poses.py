@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from planners.search.manoeuvres import manoeuvring
+from planners.search.manoeuvres import suitability
 from planners.search.query import Limits
 from planners.search.registry import plan
 from planners.solve import solve
@@ -99,7 +99,7 @@ def test_manoeuvres_solve_what_the_lattice_does_not(monkeypatch: pytest.MonkeyPa
     ask = partial(plan, "lattice", limits=Limits(expansions=500), vehicle=CAR)
     monkeypatch.setattr("planners.search.lattice.suits", lambda _goal, _vehicle: False)
     alone = sum(ask(problem, generator(0)).plan is not None for problem in problems)
-    monkeypatch.setattr("planners.search.lattice.suits", manoeuvring.suits)
+    monkeypatch.setattr("planners.search.lattice.suits", suitability.suits)
     together = sum(ask(problem, generator(0)).plan is not None for problem in problems)
     assert together >= 8 > 4 >= alone
 
