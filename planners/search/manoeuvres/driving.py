@@ -12,6 +12,7 @@ from planners.search.connection.connection import Connection, allocate_connectio
 from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of, top_speed
 from planners.search.manoeuvres.joining import Join, allocate_join
+from planners.search.manoeuvres.near_meetings import NearMeetings, allocate_near_meetings
 from planners.search.manoeuvres.pace import fill_pace
 from planners.search.manoeuvres.ways import Ways, allocate_ways
 from planners.world.arrays import Floats, Indices
@@ -52,6 +53,7 @@ class Drive(NamedTuple):
     connection: Connection
     join: Join
     ways: Ways
+    near: NearMeetings
 
 
 def allocate_drive(state_size: int) -> Drive:
@@ -66,6 +68,7 @@ def allocate_drive(state_size: int) -> Drive:
         allocate_connection(state_size),
         allocate_join(state_size),
         allocate_ways(),
+        allocate_near_meetings(),
     )
 
 

@@ -13,6 +13,8 @@ from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.levels import FINE, LEVELS, suited
+from planners.search.manoeuvres.mending import mend
+from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
 from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, allocate_pose_tree, plant_root, pose_of
 from planners.search.manoeuvres.shots import FromStart
@@ -42,7 +44,9 @@ FIRST_MEETING: Final = 4000  # of the first level then, whatever the trailers: g
 BOTH_FROM: Final = (1, 4)  # the level from which on trees grow out of both ends; of tight goals
 STUCK: Final = 1000  # expansions where cells are fine, after which the search is stuck
 PER_SQUARE_SECOND: Final = 10  # of the quickest drive known: expansions that looking for others is worth ...
-PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer
+PER_SQUARE_SECOND_MEETING: Final = 2  # ... and with trailers, where each takes longer ...
+PER_SQUARE_SECOND_MENDED: Final = 5  # ... unless it was mended: then there mostly is a quicker kind
+MEND_AT: Final = 1000  # expansions after which near meetings are mended, and again after twice as many
 SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
@@ -98,6 +102,8 @@ class Manoeuvring:
         self._from_start = (
             self._stands and not self.is_tight and room_around(start, vehicle, vehicle, query.scene) < TIGHT
         )
+        self._query, self._until = query, working_clock() + query.limits.seconds
+        self._may_mend = self.meets and self._stands
         self._level = self._spent = self._before_fine = self.expansions = 0
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
@@ -125,8 +131,9 @@ class Manoeuvring:
         """A search of another ``number`` than this one, which still has to begin."""
         other = copy.copy(self)
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
-        other._drive = other._drive._replace(ways=allocate_ways())
+        other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings())
         other._kept, other._soon = [None] * KEPT, []
+        other._may_mend = False
         return other
 
     @property
@@ -188,6 +195,7 @@ class Manoeuvring:
         if not self.kept:
             return 0
         per, least = (PER_SQUARE_SECOND_MEETING, 0) if self.meets else (PER_SQUARE_SECOND, least)
+        per = PER_SQUARE_SECOND_MENDED if self._is_mended else per
         seconds = float(self._drive.ways.seconds.min())
         return int(max(min(per * seconds * seconds, longest), least))
 
@@ -202,13 +210,26 @@ class Manoeuvring:
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:
                 return True
+            is_over = used in (0, level_ends)
+            if (is_over or self.expansions >= self._mend_at) and self._mends():
+                return True
             ended = self._ended and self._level + 1 < len(LEVELS)  # nothing is left to open at the start
-            if used == 0 or used == level_ends or ended:
+            if is_over or ended:
                 self._level, self._spent = self._level + 1, 0
                 if self._level == FINE:
                     self._before_fine = self.expansions
                 self._begin()
         return False
+
+    def _mends(self) -> bool:
+        """While nothing was found, mend places where the trees all but met; whether that gave a drive."""
+        while self._mend_at <= self.expansions:
+            self._mend_at *= 2
+        if not self._may_mend or self.kept:
+            return False
+        trees = self._other, self._tree
+        self._is_mended = mend(self._query, self._drive, *trees, self._vehicle, self._until)
+        return self._is_mended
 
     @property
     def kept(self) -> list[Other]:
@@ -229,6 +250,7 @@ class Manoeuvring:
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
+        self._mend_at, self._is_mended = MEND_AT, False
         self._checks_before = int(self._tree.counts[CHECKS] + self._other.counts[CHECKS])
         self._begin()
 
@@ -239,6 +261,7 @@ class Manoeuvring:
             plant_root(self._other, self._known.start[0])
             level = suited(self._level, self._vehicle)
             begin_outward(self._tree, self._known, self._nodes, level, self._vehicle, self._scene)
+            forget_near(self._drive.near)
 
     def _grow(self, most: int) -> tuple[bool, int]:
         """Grow the trees by some expansions at most; whether there is a drive, and how many they were.

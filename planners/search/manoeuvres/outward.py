@@ -13,6 +13,7 @@ from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along,
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
+from planners.search.manoeuvres.near_meetings import note_near
 from planners.search.manoeuvres.pose_tree import (
     CHECKS,
     LAST,
@@ -276,10 +277,14 @@ def grow_outward(
             if known.outward:
                 if near >= 0 and meet(other, near, tree, node, known.endings, goal, drive, vehicle, scene):
                     return True, expansions
+                if near >= 0:
+                    note_near(drive.near, other, near, tree, node, vehicle)
                 if shoot(other, 0, tree, node, known, goal, drive, vehicle, scene):
                     return True, expansions
-            elif near >= 0 and meet(tree, node, other, near, known.endings, goal, drive, vehicle, scene):
-                return True, expansions
+            elif near >= 0:
+                if meet(tree, node, other, near, known.endings, goal, drive, vehicle, scene):
+                    return True, expansions
+                note_near(drive.near, tree, node, other, near, vehicle)
         elif shoot_between(tree, node, other, known, goal, drive, vehicle, scene):
             return True, expansions
         open_node(tree, other, node, longest == 1, known, settings, outgoing, vehicle, scene)

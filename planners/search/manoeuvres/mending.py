@@ -1,0 +1,59 @@
+"""Makes drives of ways over places where two trees all but meet: optimisation closes the gaps."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planners.optimisation.interior.retiming import retimed
+from planners.optimisation.polish import polish_guesses
+from planners.search.manoeuvres.driving import Drive
+from planners.search.manoeuvres.near_meetings import SIZE, lay_way
+from planners.search.manoeuvres.pose_tree import PoseTree
+from planners.search.manoeuvres.ways import meeting_is_worth
+from planners.search.query import Query
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import Vehicle
+
+TRIES: Final = 4  # ways at a time
+
+
+def mend(
+    query: Query, drive: Drive, before: PoseTree, tree: PoseTree, vehicle: Vehicle, until: float
+) -> bool:
+    """Try the best of ``drive.near`` that were not tried yet; whether ``drive`` leads to the goal now.
+
+    Args:
+        query: the problem, and the buffers.
+        drive: to be filled in.
+        before: the tree out of the start.
+        tree: the tree out of the goal.
+        vehicle: what is driven.
+        until: when to end, by ``working_clock``.
+    """
+    near = drive.near
+    left = np.flatnonzero(near.tried[: near.counts[SIZE]] == 0)
+    pairs: list[tuple[PoseTree, int, PoseTree, int]] = []
+    guesses: list[Plan] = []
+    for k in left[np.argsort(near.off[left], kind="stable")]:
+        if len(guesses) == TRIES:
+            break
+        near.tried[k] = 1
+        pair = before, int(near.lasts[k]), tree, int(near.nodes[k])
+        rows = lay_way(drive.states, drive.join.chain, *pair, vehicle)
+        if rows > 1 and meeting_is_worth(drive.ways, *pair, vehicle):
+            pairs.append(pair)
+            guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
+    if not guesses:
+        return False
+    number, found = polish_guesses(query.problem, guesses, vehicle, query.scene, query.workspace, until)
+    plan = found.plan
+    if plan is None or len(plan.controls) > len(drive.controls):
+        return False
+    meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
+    drive.ways.last_seconds[0] = plan.duration_s
+    steps = len(plan.controls)
+    drive.states[: steps + 1], drive.controls[:steps] = plan.states, plan.controls
+    drive.counts[:] = steps, 0, 0
+    return True

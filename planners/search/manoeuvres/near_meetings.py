@@ -1,0 +1,151 @@
+"""Places where two trees all but meet: what the arcs there cannot close, optimisation may.
+
+With trailers there are many more states than nodes, so trees seldom have the same one. Where their first
+bodies stand alike and their hitches differ, a few corrected arcs mostly do not lead from one to the other, or
+hit something. Moved as a whole, the way over such a place is often a drive.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from planners.search.manoeuvres.arcs import at_pace, stride_of
+from planners.search.manoeuvres.pose_tree import PLACE, PoseTree
+from planners.world.arrays import Floats, Indices
+from planners.world.jit import inlined, lean
+from planners.world.vehicles.dynamics import State, load, step, store
+from planners.world.vehicles.vehicle import Vehicle
+
+MOST: Final = 64  # of them are remembered
+APART: Final = PLACE  # lengths of the first body: of those that are nearer to each other one is
+COARSE: Final = 4.0  # strides of a step of a way: nothing is looked at
+SIZE: Final = 0  # index into NearMeetings.counts
+
+
+class NearMeetings(NamedTuple):
+    """Where trees all but met, since they began."""
+
+    lasts: Indices  # [MOST] the node of the tree out of the start
+    nodes: Indices  # [MOST] the node of the tree out of the goal
+    off: Floats  # [MOST] by how much hitches differ in all, in radians
+    tried: Indices  # [MOST] 1 if optimisation has had its try, else 0
+    counts: Indices  # [1] how many there are
+
+
+def allocate_near_meetings() -> NearMeetings:
+    """Buffers; there are none yet."""
+    whole = [np.zeros(MOST, np.int64) for _ in range(3)]
+    return NearMeetings(whole[0], whole[1], np.zeros(MOST), whole[2], np.zeros(1, np.int64))
+
+
+def forget_near(near: NearMeetings) -> None:
+    """There are none: the trees begin anew."""
+    near.counts.fill(0)
+
+
+@lean
+def note_near(
+    near: NearMeetings, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
+) -> None:
+    """Remember that node ``last`` of a tree out of the start is near a ``node`` of one out of the goal.
+
+    Of several in about the same place the one is kept whose hitches differ least, if none was tried there.
+    """
+    here = load(before.states, last, vehicle)
+    there = load(tree.states, node, vehicle)
+    off = 0.0
+    for k in range(5, len(here)):
+        off += abs(here[k] - there[k])
+    apart = APART * (vehicle.front + vehicle.rear)
+    at = -1
+    for i in range(near.counts[SIZE]):
+        state = load(before.states, near.lasts[i], vehicle)
+        if math.hypot(state[0] - here[0], state[1] - here[1]) < apart:
+            if near.tried[i] == 1 or near.off[i] <= off:
+                return
+            at = i
+            break
+    if at < 0:
+        if near.counts[SIZE] == MOST:
+            return
+        at = near.counts[SIZE]
+        near.counts[SIZE] += 1
+    near.lasts[at] = last
+    near.nodes[at] = node
+    near.off[at] = off
+    near.tried[at] = 0
+
+
+@inlined
+def _lay_arc(
+    way: Floats, at: int, state: State, gear: float, bend: float, metres: float, turn: float, vehicle: Vehicle
+) -> int:
+    """Lay an arc from a state into ``way`` from row ``at`` on; returns the next row, -1 without room."""
+    count = max(math.ceil(metres / (COARSE * stride_of(gear, vehicle))), 1)
+    if at + count >= way.shape[0]:
+        return -1
+    speed = gear * metres / (count * vehicle.dt)
+    state = at_pace(state, speed, bend, vehicle)
+    for i in range(count + 1):
+        store(way, at + i, state)
+        way[at + i, 2] += turn
+        way[at + i, 3] = gear  # retimed later
+        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    return at + count + 1
+
+
+@lean
+def lay_way(
+    way: Floats, chain: Indices, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
+) -> int:
+    """Lay the way from the start to node ``last``, and on from ``node`` to the goal.
+
+    Args:
+        way: ``[N, S]`` to be filled in with states, whose speeds only say in which gear they are driven.
+        chain: ``[L]`` scratch.
+        before: the tree out of the start.
+        last: its node.
+        tree: the tree out of the goal.
+        node: its node, near ``last``.
+        vehicle: what is driven.
+
+    Returns:
+        How many states there are; 0 if there is no room, or the way is not all arcs.
+    """
+    links = 0
+    each = last
+    while each > 0:
+        if links == chain.shape[0] or before.known[each] >= 0:
+            return 0
+        chain[links] = each
+        links += 1
+        each = before.parents[each]
+    at = 0
+    for k in range(links - 1, -1, -1):
+        link = chain[k]
+        state = load(before.states, before.parents[link], vehicle)
+        gear = 1.0 if before.metres[link] > 0.0 else -1.0
+        at = _lay_arc(way, at, state, gear, before.bends[link], abs(before.metres[link]), 0.0, vehicle)
+        if at < 0:
+            return 0
+    turn = 0.0
+    if at > 0:
+        off = (way[at - 1, 2] - tree.states[node, 2]) / (2.0 * math.pi)
+        turn = 2.0 * math.pi * math.floor(off + 0.5)
+    while node > 0:
+        if tree.known[node] >= 0:
+            return 0
+        state = load(tree.states, node, vehicle)
+        gear = 1.0 if tree.metres[node] < 0.0 else -1.0
+        at = _lay_arc(way, at, state, gear, tree.bends[node], abs(tree.metres[node]), turn, vehicle)
+        if at < 0:
+            return 0
+        node = tree.parents[node]
+    if at == 0:
+        return 0
+    store(way, 0, load(before.states, 0, vehicle))
+    way[at - 1, 3] = 0.0
+    return at
