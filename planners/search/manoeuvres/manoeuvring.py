@@ -104,6 +104,7 @@ class Manoeuvring:
         )
         self._query, self._until = query, working_clock() + query.limits.seconds
         self._may_mend = self.meets and self._stands
+        self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
         self._begin_at_coarsest()
         self.is_hard = self.is_tight or self.meets or self._from_start
@@ -209,9 +210,10 @@ class Manoeuvring:
             level_ends = self._expansions - self._spent
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
             if found:
+                self._is_mended = self._is_mended and bool(self.kept)
                 return True
             is_over = used in (0, level_ends)
-            if (is_over or self.expansions >= self._mend_at) and self._mends():
+            if (is_over or self.expansions >= self._mend_at) and self._mends(until):
                 return True
             ended = self._ended and self._level + 1 < len(LEVELS)  # nothing is left to open at the start
             if is_over or ended:
@@ -221,14 +223,15 @@ class Manoeuvring:
                 self._begin()
         return False
 
-    def _mends(self) -> bool:
+    def _mends(self, until: float) -> bool:
         """While nothing was found, mend places where the trees all but met; whether that gave a drive."""
+        if not self._may_mend or self.kept or self._mended_at == self.expansions:
+            return False
+        self._mended_at = self.expansions
         while self._mend_at <= self.expansions:
             self._mend_at *= 2
-        if not self._may_mend or self.kept:
-            return False
         trees = self._other, self._tree
-        self._is_mended = mend(self._query, self._drive, *trees, self._vehicle, self._until)
+        self._is_mended = mend(self._query, self._drive, *trees, self._vehicle, min(until, self._until))
         return self._is_mended
 
     @property
@@ -250,7 +253,7 @@ class Manoeuvring:
     def _begin_at_coarsest(self) -> None:
         self._nodes = np.empty(len(self._known.endings.follows), np.int32)
         self._level = self._spent = self.expansions = 0
-        self._mend_at, self._is_mended = MEND_AT, False
+        self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._checks_before = int(self._tree.counts[CHECKS] + self._other.counts[CHECKS])
         self._begin()
 

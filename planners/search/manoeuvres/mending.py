@@ -47,7 +47,8 @@ def mend(
             guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
     if not guesses:
         return False
-    number, found = polish_guesses(query.problem, guesses, vehicle, query.scene, query.workspace, until)
+    around = vehicle, query.scene, query.workspace
+    number, found = polish_guesses(query.problem, guesses, *around, until, query.limits.bound_s)
     plan = found.plan
     if plan is None or len(plan.controls) > len(drive.controls):
         return False

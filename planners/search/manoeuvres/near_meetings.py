@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.manoeuvres.arcs import at_pace, stride_of
+from planners.search.manoeuvres.joining import COARSE
 from planners.search.manoeuvres.pose_tree import PLACE, PoseTree
 from planners.world.arrays import Floats, Indices
 from planners.world.jit import inlined, lean
@@ -21,7 +22,6 @@ from planners.world.vehicles.vehicle import Vehicle
 
 MOST: Final = 64  # of them are remembered
 APART: Final = PLACE  # lengths of the first body: of those that are nearer to each other one is
-COARSE: Final = 4.0  # strides of a step of a way: nothing is looked at
 SIZE: Final = 0  # index into NearMeetings.counts
 
 
@@ -52,7 +52,8 @@ def note_near(
 ) -> None:
     """Remember that node ``last`` of a tree out of the start is near a ``node`` of one out of the goal.
 
-    Of several in about the same place the one is kept whose hitches differ least, if none was tried there.
+    Of several in about the same place, whatever their headings, the one is kept whose hitches differ least,
+    unless one was tried there.
     """
     here = load(before.states, last, vehicle)
     there = load(tree.states, node, vehicle)
@@ -106,19 +107,19 @@ def lay_way(
     Args:
         way: ``[N, S]`` to be filled in with states, whose speeds only say in which gear they are driven.
         chain: ``[L]`` scratch.
-        before: the tree out of the start.
+        before: the tree out of the start; neither has known endings.
         last: its node.
         tree: the tree out of the goal.
         node: its node, near ``last``.
         vehicle: what is driven.
 
     Returns:
-        How many states there are; 0 if there is no room, or the way is not all arcs.
+        How many states there are; 0 if there is no room.
     """
     links = 0
     each = last
     while each > 0:
-        if links == chain.shape[0] or before.known[each] >= 0:
+        if links == chain.shape[0]:
             return 0
         chain[links] = each
         links += 1
@@ -136,8 +137,6 @@ def lay_way(
         off = (way[at - 1, 2] - tree.states[node, 2]) / (2.0 * math.pi)
         turn = 2.0 * math.pi * math.floor(off + 0.5)
     while node > 0:
-        if tree.known[node] >= 0:
-            return 0
         state = load(tree.states, node, vehicle)
         gear = 1.0 if tree.metres[node] < 0.0 else -1.0
         at = _lay_arc(way, at, state, gear, tree.bends[node], abs(tree.metres[node]), turn, vehicle)

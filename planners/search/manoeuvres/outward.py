@@ -274,17 +274,14 @@ def grow_outward(
         tree.opened[region] += 1
         if len(state) > 5:  # decided when compiling
             near = node_near(other, state, known.origin, vehicle)
-            if known.outward:
-                if near >= 0 and meet(other, near, tree, node, known.endings, goal, drive, vehicle, scene):
+            if near >= 0:
+                last, first = (near, node) if known.outward else (node, near)
+                before, after = (other, tree) if known.outward else (tree, other)
+                if meet(before, last, after, first, known.endings, goal, drive, vehicle, scene):
                     return True, expansions
-                if near >= 0:
-                    note_near(drive.near, other, near, tree, node, vehicle)
-                if shoot(other, 0, tree, node, known, goal, drive, vehicle, scene):
-                    return True, expansions
-            elif near >= 0:
-                if meet(tree, node, other, near, known.endings, goal, drive, vehicle, scene):
-                    return True, expansions
-                note_near(drive.near, tree, node, other, near, vehicle)
+                note_near(drive.near, before, last, after, first, vehicle)
+            if known.outward and shoot(other, 0, tree, node, known, goal, drive, vehicle, scene):
+                return True, expansions
         elif shoot_between(tree, node, other, known, goal, drive, vehicle, scene):
             return True, expansions
         open_node(tree, other, node, longest == 1, known, settings, outgoing, vehicle, scene)

@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.search.manoeuvres import mending
+from planners.search.manoeuvres import manoeuvring, mending
 from planners.search.manoeuvres.arcs import stride_of
 from planners.search.manoeuvres.driving import Drive, allocate_drive
+from planners.search.manoeuvres.joining import COARSE
 from planners.search.manoeuvres.manoeuvring import allocate_trees
-from planners.search.manoeuvres.near_meetings import COARSE, SIZE, allocate_near_meetings, lay_way, note_near
+from planners.search.manoeuvres.near_meetings import SIZE, allocate_near_meetings, lay_way, note_near
 from planners.search.manoeuvres.pose_tree import PLACE, PoseTree
 from planners.search.outcome import Outcome
 from planners.search.query import Limits
@@ -58,7 +59,7 @@ def test_what_is_mended_is_a_plan_and_the_same_again(number: int) -> None:
 
 @pytest.mark.usefixtures("unmended")
 @pytest.mark.parametrize("number", HARD)
-def test_without_it_that_work_is_not_enough(number: int) -> None:
+def test_arcs_alone_need_more_work(number: int) -> None:
     assert turned_round(yard(number), HARD[number], Workspace()).plan is None
 
 
@@ -102,7 +103,7 @@ def test_ways_lead_from_start_to_goal_with_one_gap(trees: tuple[Problem, PoseTre
         st.tuples(st.floats(0.0, 5.0), st.floats(0.0, 5.0), st.floats(0.0, 0.5)), min_size=1, max_size=40
     )
 )
-def test_where_hitches_differ_least_is_always_remembered(places: list[tuple[float, float, float]]) -> None:
+def test_where_hitches_differ_least_is_remembered(places: list[tuple[float, float, float]]) -> None:
     size = state_size(TRAIN)
     before, tree = allocate_trees(size, 0)
     near = allocate_near_meetings()
@@ -115,8 +116,21 @@ def test_where_hitches_differ_least_is_always_remembered(places: list[tuple[floa
     assert len({tuple(place) for place in first.tolist()}) == count
 
 
-def test_all_work_counts() -> None:
+def test_limits_hold_and_a_drive_beyond_the_bound_is_no_answer() -> None:
     problem = yard(7)
     whole = turned_round(problem, 2000, Workspace())
     assert whole.plan is not None
     assert turned_round(problem, whole.expansions // 2, Workspace()).expansions <= whole.expansions // 2
+    for share in (0.5, 0.999):
+        bound_s = share * whole.plan.duration_s
+        limits = Limits(expansions=2000, bound_s=bound_s)
+        quicker = plan("lattice", problem, generator(0), limits=limits, vehicle=TRAIN).plan
+        assert quicker is None or quicker.duration_s < bound_s
+
+
+def test_no_place_is_mended_twice_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+    monkeypatch.setattr(manoeuvring, "mend", lambda query, *_: bool(tried.append(query)))
+    monkeypatch.setattr(manoeuvring, "add_to_tree", lambda *_: False)
+    turned_round(yard(7), 3000, Workspace())
+    assert 1 <= len(tried) <= 2
