@@ -42,7 +42,9 @@ def yaml_fields(file: Path, what: str, names: Sequence[str], most_brackets: int)
         node, fields = (None, None) if alias else (yaml.compose(text, yaml.SafeLoader), yaml.safe_load(text))
     except _BROKEN as error:
         reason = str(error).partition("\n")[0][:100]
-        raise ValueError(f"is not YAML ({reason})") from None
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark is not None else ""
+        raise ValueError(f"is not YAML ({reason}{line})") from None
     if alias:
         raise ValueError(f"uses the alias {short('*' + alias)}; write out what it stands for")
     if not isinstance(fields, Mapping) or not isinstance(node, yaml.MappingNode):

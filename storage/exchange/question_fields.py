@@ -60,10 +60,11 @@ def _refuse_other_hitches(fields: Mapping[str, Any], trailers: int, vehicle: Veh
         given = fields.get(name)
         asks_nothing = name == "goal_hitch" and given == []
         if isinstance(given, list) and len(given) != trailers and not asks_nothing:
-            has = f"{trailers} trailers" if trailers else "no trailer"
+            has = {0: "no trailer", 1: "1 trailer"}.get(trailers, f"{trailers} trailers")
+            wanted = f"list {trailers} or " if trailers else ""
             raise ValueError(
                 f"{name} lists {short(given)}, one angle per trailer, but {short(name_of(vehicle))} has "
-                f"{has}; {_NAME_IT}"
+                f"{has}; {wanted}{_NAME_IT}"
             )
 
 

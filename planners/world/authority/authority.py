@@ -64,7 +64,8 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
         ]
     if beyond:  # how far a step may bend is known within the limits only
         return found + beyond
-    found += _dynamics_faults(*(each.astype(np.float64).tobytes() for each in (states, controls)), vehicle)
+    raw = (each.astype(np.float64).tobytes() for each in (states, controls))
+    found += _dynamics_faults(*raw, problem.scale, vehicle)
     miss = math.dist(states[-1, :2], problem.goal)
     if miss > problem.goal_radius + ROUNDING:
         radius = problem.scale * problem.goal_radius
@@ -78,11 +79,16 @@ def faults(problem: Problem, plan: Plan, vehicle: Vehicle = CAR) -> list[str]:
 
 def _start_fault(off: Floats, scale: float, vehicle: Vehicle) -> str:
     """By how much the first state is ``off [S]`` the start: the variable that is off by most."""
+    return f"Start: {_worst(off, 0, scale, vehicle)} off the problem's start."
+
+
+def _worst(off: Floats, number: int, scale: float, vehicle: Vehicle) -> str:
+    """The variable of state ``number`` that is ``off [S]`` by most, and by how much."""
     worst = int(np.argmax(off))
     name = state_names(vehicle)[worst]
     unit = {"x": "m", "y": "m", "speed": "m/s", "turn_rate": "rad/s"}.get(name, "rad")
     value = off[worst] * (scale if unit.startswith("m") else 1.0)
-    return f"Start: {name} of state 0 is {value:.3g} {unit} off the problem's start."
+    return f"{name} of state {number} is {value:.3g} {unit}"
 
 
 def _arrival_faults(last: list[float], arrival: Arrival, scale: float, vehicle: Vehicle) -> list[str]:
@@ -124,12 +130,12 @@ def _limit_faults(states: Floats, controls: Floats, scale: float, vehicle: Vehic
 
 
 @functools.lru_cache(maxsize=1_000)  # a stored plan is judged in many problems
-def _dynamics_faults(states: bytes, controls: bytes, vehicle: Vehicle) -> tuple[str, ...]:
+def _dynamics_faults(states: bytes, controls: bytes, scale: float, vehicle: Vehicle) -> tuple[str, ...]:
     """The first state that is not where controls lead, of ``states [T, S]`` and ``controls [T - 1, 2]``."""
     claimed = np.frombuffer(states).reshape(-1, state_size(vehicle))
     led = simulate_again(claimed[0], np.frombuffer(controls).reshape(-1, 2), vehicle)
-    error = np.abs(led - claimed).max(axis=1)
-    if error.max() <= TOLERANCE:
+    off = np.abs(led - claimed)
+    if off.max() <= TOLERANCE:
         return ()
-    first = int(np.argmax(error > TOLERANCE))
-    return (f"Dynamics: state {first} is {error[first]:.3g} off where the controls lead.",)
+    first = int(np.argmax(off.max(axis=1) > TOLERANCE))
+    return (f"Dynamics: {_worst(off[first], first, scale, vehicle)} off where the controls lead.",)

@@ -114,6 +114,7 @@ def test_a_field_that_is_there_twice_is_refused(tmp_path: Path, name: str) -> No
         ("", "not the YAML of a map"),
         ("[1, 2]", "not the YAML of a map"),
         ("image: [", "is not YAML"),
+        ("image: a.png\n- b", "line 2"),
         ("a: !!python/object/apply:os.system [ls]", "is not YAML"),
         ("a: &a [1, 1]\nb: &b [*a, *a]\nc: [*b, *b]", "alias"),
         ("[" * 10_000, "more brackets"),

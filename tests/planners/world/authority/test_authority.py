@@ -69,6 +69,13 @@ def test_a_teleport_is_found() -> None:
     assert kinds(faults(EMPTY, plan_)) == ["Dynamics"]
 
 
+def test_how_far_a_state_is_off_is_told_in_real_metres() -> None:
+    plan_ = good_plan()
+    plan_.states[100:, 0] += 0.01
+    (told,) = faults(replace(EMPTY, scale=2.0), plan_)
+    assert "x of state 100 is 0.02 m" in told
+
+
 def test_too_fast_a_car_is_found() -> None:
     assert kinds(faults(EMPTY, straight(CAR._replace(max_speed=4.5), 170))) == ["Speed"]
 
