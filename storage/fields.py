@@ -72,17 +72,19 @@ def nearest(given: str, names: Iterable[str]) -> str:
     return f" (nearest is {near[0]!r})" if near else ""
 
 
-def check_fields(fields: Sequence[object], names: Sequence[str]) -> None:
+def check_fields(fields: Sequence[object], names: Sequence[str], where: str = "") -> None:
     """Raise ValueError if one of ``fields`` is not among the supported ``names``, or occurs twice.
 
     Args:
         fields: names of the fields of an object, or of the columns of a table.
         names: the supported names, which the message lists.
+        where: what has the fields if the whole file does not, with a space behind it.
     """
     for field in fields:
         if field not in names:
             near = nearest(str(field), names)
-            raise ValueError(f"has the unknown field {short(field)}{near}; supported are {', '.join(names)}")
+            known = ", ".join(names)
+            raise ValueError(f"has the unknown field {where}{short(field)}{near}; supported are {known}")
     if len(set(fields)) < len(fields):
         raise ValueError(_repeated(fields))
 

@@ -84,7 +84,8 @@ def improve(
     """Improve a plan, or find a first one, until a limit is reached.
 
     A limit in expansions gives the same result for the same seed on any machine; a limit in seconds does not.
-    An iteration of a polish counts as ``EXPANSIONS_AN_ITERATION``.
+    An iteration of a polish counts as ``EXPANSIONS_AN_ITERATION``, but for those by which a search for
+    manoeuvres squeezes and mends.
     Every second search is guided along the best plan.
 
     Args:

@@ -227,7 +227,7 @@ def _trailer(fields: object, number: int) -> Trailer:
     where = f"trailer {number} "
     if not isinstance(fields, Mapping):
         raise ValueError(f"has {where}{short(fields)}; expected fields {', '.join(_TRAILER)}")
-    check_fields(list(fields), _TRAILER)
+    check_fields(list(fields), _TRAILER, where)
     _check_complete(fields, _TRAILER, where)
     outline, box = outline_of(fields["body"], where + "body")
     length, fold = (_ranged(fields[name], name, where) for name in ("hitch_length", "max_hitch"))

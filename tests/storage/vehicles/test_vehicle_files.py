@@ -117,6 +117,7 @@ def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
         ("body", [[[-900, -1], [900, -1], [2, 1]]], "in metres?"),
         ("trailers", [], "list of 1 to 3"),
         ("trailers", [{"hitch_length": 1.9, "max_hitch": 1}], "lacks the field trailer 1 body"),
+        ("trailers", [{"hitch_offset": 1.9}], "the unknown field trailer 1 'hitch_offset'"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_its_field(tmp_path: Path, path: str, value: Any, told: str) -> None:
