@@ -64,9 +64,9 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
         disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
         axes.add_patch(disc).set_zorder(0.5)  # below obstacles, which it may meet
     else:
-        _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=5)
+        _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=6)
     standing = start_state(problem, vehicle)[np.newaxis]
-    _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=6)
+    _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=5)
     start = problem.start[:2]
     shown = [(x_min, y_min), (x_max, y_max)]
     for root, tip, colour, width in (
