@@ -12,7 +12,7 @@ from planners.search.manoeuvres.driving import (
     drive_word,
     turn_wheels,
 )
-from planners.search.manoeuvres.pose_tree import PoseTree
+from planners.search.manoeuvres.pose_tree import PoseTree, list_links
 from planners.search.query import Endings
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
@@ -51,21 +51,17 @@ def drive_to_goal(
 def _drive_out(drive: Drive, before: PoseTree, last: int, vehicle: Vehicle, scene: Scene) -> bool:
     """Drive over the arcs of the tree out of the start to a node."""
     chain = drive.join.chain
-    links = 0
-    while last > 0:
-        if links == chain.shape[0]:
-            return False
-        chain[links] = last
-        links += 1
-        last = before.parents[last]
+    links = list_links(before, last, chain)
+    if links < 0:
+        return False
     metres = 0.0
-    for k in range(links - 1, -1, -1):
+    for k in range(links):
         link = chain[k]
         metres += before.metres[link]
         if (
-            k > 0
-            and before.bends[chain[k - 1]] == before.bends[link]
-            and before.metres[chain[k - 1]] * metres > 0.0
+            k + 1 < links
+            and before.bends[chain[k + 1]] == before.bends[link]
+            and before.metres[chain[k + 1]] * metres > 0.0
         ):
             continue  # the next arc goes on
         gear = 1.0 if metres > 0.0 else -1.0

@@ -129,12 +129,11 @@ class Manoeuvring:
         return other
 
     def _another(self, query: Query, number: int) -> Manoeuvring:
-        """A search of another ``number`` than this one, which still has to begin."""
+        """A search of another ``number`` than this one, which still has to begin, and does not mend."""
         other = copy.copy(self)
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
-        other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings())
+        other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
         other._kept, other._soon = [None] * KEPT, []
-        other._may_mend = False
         return other
 
     @property

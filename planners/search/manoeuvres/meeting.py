@@ -7,7 +7,7 @@ from typing import Final
 from planners.search.manoeuvres.arriving import drive_arcs_to_goal
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.joining import ARCS, BEFORE, MOST_ARCS, arcs_are_free, close
-from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree
+from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, list_links
 from planners.search.manoeuvres.ways import meeting_is_worth
 from planners.search.query import Endings
 from planners.world.arrays import Floats
@@ -49,17 +49,9 @@ def meet(
     if not meeting_is_worth(drive.ways, before, last, tree, node, vehicle):
         return False
     join = drive.join
-    links = 0
-    each = last
-    while each > 0:
-        if links == join.chain.shape[0]:
-            return False
-        links += 1
-        each = before.parents[each]
-    each = last
-    for k in range(links - 1, -1, -1):
-        join.chain[k] = each
-        each = before.parents[each]
+    links = list_links(before, last, join.chain)
+    if links < 0:
+        return False
     straight = max(links - BENT, 0)
     base = join.chain[straight - 1] if straight > 0 else 0
     for k in range(join.base.shape[1]):

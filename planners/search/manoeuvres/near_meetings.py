@@ -14,13 +14,13 @@ import numpy as np
 
 from planners.search.manoeuvres.arcs import at_pace, stride_of
 from planners.search.manoeuvres.joining import COARSE
-from planners.search.manoeuvres.pose_tree import PLACE, PoseTree
+from planners.search.manoeuvres.pose_tree import PLACE, PoseTree, list_links
 from planners.world.arrays import Floats, Indices
 from planners.world.jit import inlined, lean
 from planners.world.vehicles.dynamics import State, load, step, store
 from planners.world.vehicles.vehicle import Vehicle
 
-MOST: Final = 64  # of them are remembered
+MOST: Final = 64  # of them are remembered, by a search that mends
 APART: Final = PLACE  # lengths of the first body: of those that are nearer to each other one is
 SIZE: Final = 0  # index into NearMeetings.counts
 
@@ -28,17 +28,17 @@ SIZE: Final = 0  # index into NearMeetings.counts
 class NearMeetings(NamedTuple):
     """Where trees all but met, since they began."""
 
-    lasts: Indices  # [MOST] the node of the tree out of the start
-    nodes: Indices  # [MOST] the node of the tree out of the goal
-    off: Floats  # [MOST] by how much hitches differ in all, in radians
-    tried: Indices  # [MOST] 1 if optimisation has had its try, else 0
+    lasts: Indices  # [N] the node of the tree out of the start
+    nodes: Indices  # [N] the node of the tree out of the goal
+    off: Floats  # [N] by how much hitches differ in all, in radians
+    tried: Indices  # [N] 1 if optimisation has had its try, else 0
     counts: Indices  # [1] how many there are
 
 
-def allocate_near_meetings() -> NearMeetings:
-    """Buffers; there are none yet."""
-    whole = [np.zeros(MOST, np.int64) for _ in range(3)]
-    return NearMeetings(whole[0], whole[1], np.zeros(MOST), whole[2], np.zeros(1, np.int64))
+def allocate_near_meetings(most: int = MOST) -> NearMeetings:
+    """Buffers for ``most``; there are none yet."""
+    whole = [np.zeros(most, np.int64) for _ in range(3)]
+    return NearMeetings(whole[0], whole[1], np.zeros(most), whole[2], np.zeros(1, np.int64))
 
 
 def forget_near(near: NearMeetings) -> None:
@@ -70,7 +70,7 @@ def note_near(
             at = i
             break
     if at < 0:
-        if near.counts[SIZE] == MOST:
+        if near.counts[SIZE] == near.lasts.shape[0]:
             return
         at = near.counts[SIZE]
         near.counts[SIZE] += 1
@@ -116,16 +116,11 @@ def lay_way(
     Returns:
         How many states there are; 0 if there is no room.
     """
-    links = 0
-    each = last
-    while each > 0:
-        if links == chain.shape[0]:
-            return 0
-        chain[links] = each
-        links += 1
-        each = before.parents[each]
+    links = list_links(before, last, chain)
+    if links < 0:
+        return 0
     at = 0
-    for k in range(links - 1, -1, -1):
+    for k in range(links):
         link = chain[k]
         state = load(before.states, before.parents[link], vehicle)
         gear = 1.0 if before.metres[link] > 0.0 else -1.0

@@ -96,6 +96,23 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
 
 
 @inlined
+def list_links(tree: PoseTree, node: int, chain: Indices) -> int:
+    """List the nodes from behind the root to ``node`` in ``chain``; returns their number, -1 without room."""
+    links = 0
+    each = node
+    while each > 0:
+        links += 1
+        each = tree.parents[each]
+    if links > chain.shape[0]:
+        return -1
+    each = node
+    for k in range(links - 1, -1, -1):
+        chain[k] = each
+        each = tree.parents[each]
+    return links
+
+
+@inlined
 def seconds_of_run(metres: float, top: float, vehicle: Vehicle) -> float:
     """The time to drive some metres from rest to rest, no faster than ``top`` (m/s), in seconds."""
     return run_seconds(metres, 0.0, 0.0, top, control_limits(vehicle)[0])
