@@ -5,7 +5,8 @@ places drives of several kinds are found at once, elsewhere one after another, e
 more time (``improve``), each search has a bound on driving time and random numbers of its own (AO-x, Hauser
 and Zhou, T-RO 2016, with any of the planners as x). A plan within the bound is polished. The bound is a
 little above the best driving time at first, because a plan as a search finds it takes longer, and falls with
-each search in vain.
+each search in vain. In narrow places each search looks for drives of other kinds instead, each for twice as
+long as the one before.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from planners.optimisation.polish import most_iterations, polish, polish_quickest
+from planners.optimisation.polish import most_iterations, polish_quickest
 from planners.search.guides.guidance import guidance
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.suitability import is_tight, meets, suits
 from planners.search.outcome import Outcome, Status
-from planners.search.query import Limits, Query
+from planners.search.query import POSE_EXPANSIONS, Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, scene_of
@@ -31,6 +32,9 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
 FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner mostly needs
+FURTHER = (
+    2000  # expansions for drives of other kinds in narrow places, of the first search; then twice as many
+)
 GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer ...
 MOST_EXPANSIONS = 10_000_000  # ... up to this, which no search reaches in its time: it holds too few nodes
 LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when all slack is used up
@@ -67,6 +71,16 @@ class Improved:
 def _is_there(plan: Plan | None) -> bool:
     """Whether a plan takes no time: the start is what is asked for, and nothing is quicker."""
     return plan is not None and len(plan.controls) == 0
+
+
+def asking_for_kinds(planner: str, query: Query) -> Query:
+    """Ask for drives of other kinds, too, where it is narrow and the planner finds such."""
+    goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
+    if planner != "lattice" or not suits(goal, vehicle):
+        return query
+    tight = is_tight(goal, vehicle, query.scene)
+    varies = tight or meets(start_state(query.problem, vehicle), vehicle)
+    return replace(query, is_tight=tight, others=varies)
 
 
 def improve(
@@ -123,32 +137,49 @@ def improve(
         history.append(Improvement(working_clock() - began, spent, plan.duration_s))
         return True
 
-    def consider(plan: Plan) -> bool:
+    def consider(plan: Plan, below_s: float = math.inf) -> bool:
         """Keep a plan if it is the best, as it is or polished; say whether it is."""
         nonlocal spent
         kept = keep(plan)  # at once: polishing takes milliseconds
         iterations = int(min((most - spent) / EXPANSIONS_AN_ITERATION, most_iterations(problem)))
         left = seconds - (working_clock() - began)
-        better = polish(problem, plan, vehicle, scene, workspace, iterations, seconds=left)
+        around = vehicle, scene, workspace
+        _, better = polish_quickest(problem, [plan], *around, iterations, seconds=left, below_s=below_s)
         spent += EXPANSIONS_AN_ITERATION * better.iterations
         return keep(better.plan or plan) or kept
 
     if given is not None:
         consider(given)
+    kinds = asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
+    seen: set[bytes] = set()  # drives into narrow places that were polished
     while spent < most and not _is_there(best) and (left := seconds - (working_clock() - began)) > 0.0:
-        limits = Limits(
-            expansions=int(min(budget, most - spent)),
-            seconds=min(left, Limits.seconds),
-            bound_s=math.inf if best is None else (1.0 - LEAST_GAIN + slack) * best.duration_s,
-        )
+        if kinds.others:
+            wide = min(FURTHER * 2**searches, MOST_EXPANSIONS)
+            limits = Limits(
+                expansions=int(min(POSE_EXPANSIONS + wide, most - spent)),
+                seconds=min(left, Limits.seconds),
+                further=wide,
+            )
+        else:
+            limits = Limits(
+                expansions=int(min(budget, most - spent)),
+                seconds=min(left, Limits.seconds),
+                bound_s=math.inf if best is None else (1.0 - LEAST_GAIN + slack) * best.duration_s,
+            )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
-        outcome = PLANNERS[name](Query(problem, rng, scene, workspace, guide, limits, vehicle))
+        outcome = PLANNERS[name](replace(kinds, rng=rng, guide=guide, limits=limits))
         searches += 1
         checks += outcome.collision_checks
         nodes += outcome.nodes
         spent += max(outcome.expansions, 1)  # a search from a blocked start costs none, and must end as well
-        if outcome.plan is not None and consider(outcome.plan):
+        gained = False
+        for plan in (outcome.plan, *(other.plan for other in outcome.others)):
+            if plan is not None and plan.controls.tobytes() not in seen:
+                below_s = best.duration_s if kinds.others and best is not None else math.inf
+                seen.add(plan.controls.tobytes())
+                gained = consider(plan, below_s) or gained
+        if gained:
             is_given = False
         else:
             budget = min(budget * GROWTH, MOST_EXPANSIONS)
@@ -178,13 +209,8 @@ def search_and_polish(
         with the work and the time of all; and what that plan was before it was polished.
     """
     until = working_clock() + query.limits.seconds
-    goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
-    if planner == "lattice" and suits(goal, vehicle):
-        query = replace(query, is_tight=is_tight(goal, vehicle, query.scene))
-    varies = query.is_tight is not None and (
-        query.is_tight or meets(start_state(query.problem, vehicle), vehicle)
-    )
-    query = replace(query, others=varies)
+    query, vehicle = asking_for_kinds(planner, query), query.vehicle
+    varies = query.others
     if math.isfinite(below_s):
         worth = int(PER_SQUARE_SECOND * below_s * below_s)
         query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))

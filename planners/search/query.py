@@ -52,9 +52,7 @@ class Limits:
     nodes: int = 400_000  # tree vertices at once
     seconds: float = 30.0
     bound_s: float = math.inf  # only plans that take less time than this count as solutions
-    further: int = (
-        0  # expansions at least for drives of other kinds after a first to a pose; not with trailers
-    )
+    further: int = 0  # expansions at least for drives of other kinds after a first to a pose
 
 
 def usual_limits(problem: Problem) -> Limits:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -17,7 +17,7 @@ from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, trailers_of
 from planners.world.workspace import Workspace
 from storage.tables.experiences import write_experiences
 from storage.vehicles.definitions import definition_of
@@ -172,7 +172,8 @@ def stored_variants(question: Problem, vehicle: Vehicle, seed: int, workspace: W
     if question.arrival is None:
         best = polish(question, found, vehicle, scene_of(question), workspace, margin_m=MARGIN_M).plan
     else:  # it may be in a tight slot: no margin
-        best = ask(limits=EFFORT).plan
+        further = 0 if trailers_of(vehicle) else EFFORT.further  # with trailers an expansion takes longer
+        best = ask(limits=replace(EFFORT, further=further)).plan
     variants = worth_storing(found, best, vehicle)
     for plan in variants:
         check_plan(question, plan, COLLECTOR, vehicle)

@@ -170,8 +170,7 @@ class Manoeuvring:
 
         Args:
             most: expansions.
-            longer: at most so many while all that was found takes long, and without trailers at least so many
-                in any case.
+            longer: at most so many while all that was found takes long, and at least so many in any case.
             for_one: expansions before that, for a first drive, if there is none yet.
             within: expansions in all.
             until: when to end, by ``working_clock``.
@@ -194,7 +193,7 @@ class Manoeuvring:
         """How many expansions the quickest drive is worth that was found, if there is one."""
         if not self.kept:
             return 0
-        per, least = (PER_SQUARE_SECOND_MEETING, 0) if self.meets else (PER_SQUARE_SECOND, least)
+        per = PER_SQUARE_SECOND_MEETING if self.meets else PER_SQUARE_SECOND
         per = PER_SQUARE_SECOND_MENDED if self._is_mended else per
         seconds = float(self._drive.ways.seconds.min())
         return int(max(min(per * seconds * seconds, longest), least))

@@ -6,12 +6,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planners.optimisation.polish import Polished
 from planners.search import anytime
 from planners.search.anytime import improve
 from planners.search.outcome import Outcome, Status
 from planners.search.query import Limits
 from planners.search.registry import PLANNERS, plan
+from planners.solve import solve
+from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
+from planners.world.classes.families import family
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
 from tests.planners.clock import ticks
@@ -101,6 +105,38 @@ def test_thousands_of_searches_in_vain_end_with_the_time(monkeypatch):
     assert len(asked) > 2_000
     assert asked == sorted(asked)
     assert asked[-1] == anytime.MOST_EXPANSIONS
+
+
+def test_into_a_narrow_slot_longer_searches_find_a_quicker_drive():
+    problem = to_canonical(family("perpendicular", "hard", CAR).draw(6, 10))[0]
+    answer = solve(problem, "lattice").plan
+    first, again = (improve("lattice", problem, answer, expansions=50_000) for _ in range(2))
+    assert first.plan.duration_s < answer.duration_s
+    assert not first.is_given
+    assert faults(problem, first.plan) == []
+    assert first.expansions <= 50_000
+    np.testing.assert_array_equal(first.plan.controls, again.plan.controls)
+    assert [each[1:] for each in first.history] == [each[1:] for each in again.history]
+
+
+def test_each_search_of_a_narrow_place_is_longer_and_no_drive_is_polished_twice(monkeypatch):
+    problem = to_canonical(family("perpendicular", "hard", CAR).draw(6, 10))[0]
+    answer = solve(problem, "lattice").plan
+    further, polished = [], []
+
+    def search(query):
+        further.append(query.limits.further)
+        return Outcome(Status.SOLVED, answer, 0, 100, 0, 0.0, 0.0)
+
+    def polish(asked, plans, *_, **__):
+        polished.extend(plans)
+        return 0, Polished(None, 0)
+
+    monkeypatch.setitem(anytime.PLANNERS, "lattice", search)
+    monkeypatch.setattr(anytime, "polish_quickest", polish)
+    improve("lattice", problem, expansions=1_000)
+    assert further == [anytime.FURTHER * 2**k for k in range(10)]
+    assert len(polished) == 1
 
 
 def test_without_a_limit_nothing_is_begun():
