@@ -59,21 +59,32 @@ def word_seconds(
     return seconds
 
 
+@inlined
+def _in_radii(start: Pose, end: Pose, radius: float) -> Pose:
+    """A pose as it is seen from another one, in radii of turning."""
+    dx = (end[0] - start[0]) / radius
+    dy = (end[1] - start[1]) / radius
+    sin, cos = sincos(start[2])
+    return dx * cos + dy * sin, dy * cos - dx * sin, wrapped(end[2] - start[2])
+
+
 @lean
 def list_words_between(start: Pose, end: Pose, radius: float, words: Floats, vehicle: Vehicle) -> int:
     """List the words from a pose to another one that a vehicle can drive with this radius (m).
 
     Returns how many there are in ``words [MOST_WORDS, 2 PARTS]``.
     """
-    dx = (end[0] - start[0]) / radius
-    dy = (end[1] - start[1]) / radius
-    sin, cos = sincos(start[2])
-    x = dx * cos + dy * sin
-    y = dy * cos - dx * sin
-    turn = wrapped(end[2] - start[2])
+    x, y, turn = _in_radii(start, end, radius)
     if vehicle.min_speed >= 0.0:
         return list_forward_words(x, y, turn, words)
     return list_words(x, y, turn, words)
+
+
+@lean
+def list_forward_words_between(start: Pose, end: Pose, radius: float, words: Floats) -> int:
+    """As ``list_words_between``, forwards only, in three arcs each."""
+    x, y, turn = _in_radii(start, end, radius)
+    return list_forward_words(x, y, turn, words)
 
 
 @lean

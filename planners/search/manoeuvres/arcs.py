@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
+from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
-from planners.world.vehicles.dynamics import State, curvature_of, step, turn_in, turn_limit
+from planners.world.vehicles.dynamics import State, curvature_of, step, store, turn_in, turn_limit
 from planners.world.vehicles.vehicle import Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
+COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
 FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
 
 
@@ -71,3 +74,21 @@ def stride_along(
             return state, k * metres / FINE, k + 2
         state = after
     return state, metres, FINE + 1
+
+
+@inlined
+def lay_arc(
+    way: Floats, at: int, state: State, gear: float, bend: float, metres: float, turn: float, vehicle: Vehicle
+) -> int:
+    """Lay an arc from a state into ``way`` from row ``at`` on; returns the next row, -1 without room."""
+    count = max(math.ceil(metres / (COARSE * stride_of(gear, vehicle))), 1)
+    if at + count >= way.shape[0]:
+        return -1
+    speed = gear * metres / (count * vehicle.dt)
+    state = at_pace(state, speed, bend, vehicle)
+    for i in range(count + 1):
+        store(way, at + i, state)
+        way[at + i, 2] += turn
+        way[at + i, 3] = gear  # retimed later
+        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
+    return at + count + 1

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import at_pace, stride_along, stride_of
+from planners.search.manoeuvres.arcs import COARSE, at_pace, stride_along, stride_of
 from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
@@ -29,7 +29,6 @@ LENGTH_SHARE: Final = 0.2  # ... its length does, by this share of the first bod
 LARGEST: Final = 1.0  # change of a round, in these shares
 NUDGE: Final = 1e-5  # of a bend (rad) and of a length (m), to see what they do
 DAMPING: Final = 1e-7
-COARSE: Final = 4.0  # strides of a step here: nothing is looked at
 EXACT: Final = 1e-5  # metres and radians
 WIDEST: Final = 0.5  # radians or metres: what is farther off is not corrected
 # indices into Join.counts

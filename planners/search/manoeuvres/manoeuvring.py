@@ -13,6 +13,7 @@ from planners.search.manoeuvres.arriving import add_to_tree
 from planners.search.manoeuvres.driving import allocate_drive
 from planners.search.manoeuvres.endings import no_endings
 from planners.search.manoeuvres.levels import FINE, LEVELS, suited
+from planners.search.manoeuvres.loops import loop
 from planners.search.manoeuvres.mending import mend
 from planners.search.manoeuvres.near_meetings import allocate_near_meetings, forget_near
 from planners.search.manoeuvres.outward import begin_outward, grow_outward, room_around
@@ -104,6 +105,7 @@ class Manoeuvring:
         )
         self._query, self._until = query, working_clock() + query.limits.seconds
         self._may_mend = self.meets and self._stands
+        self._may_loop = self._may_mend
         self._mend_at, self._mended_at, self._is_mended = MEND_AT, 0, False
         self._level = self._spent = self._before_fine = self.expansions = 0
         self._begin_at_coarsest()
@@ -133,7 +135,7 @@ class Manoeuvring:
         other = copy.copy(self)
         other._tree, other._other = query.workspace.buffers(allocate_trees, state_size(query.vehicle), number)
         other._drive = other._drive._replace(ways=allocate_ways(), near=allocate_near_meetings(0))
-        other._kept, other._soon = [None] * KEPT, []
+        other._kept, other._soon, other._may_loop = [None] * KEPT, [], False
         return other
 
     @property
@@ -202,8 +204,10 @@ class Manoeuvring:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
 
         A level ends when it has had all its expansions, or nothing is left to open. Where only the start is
-        too narrow for it, too, but for the last.
+        too narrow for it, too, but for the last. Trains may turn round in a loop, which is tried before.
         """
+        if self._loops(until):
+            return True
         while self.expansions < end and not self.is_over and working_clock() < until:
             level_ends = self._expansions - self._spent
             found, used = self._grow(min(end - self.expansions, level_ends, SLICE))
@@ -220,6 +224,16 @@ class Manoeuvring:
                     self._before_fine = self.expansions
                 self._begin()
         return False
+
+    def _loops(self, until: float) -> bool:
+        """Turn round in a loop, once; whether that gave a drive."""
+        if not self._may_loop:
+            return False
+        self._may_loop = False
+        ends = self._known.start, self._known_there.start
+        return loop(
+            self._query, self._drive, *ends, self._known.radius, self._vehicle, min(until, self._until)
+        )
 
     def _mends(self, until: float) -> bool:
         """While nothing was found, mend places where the trees all but met; whether that gave a drive."""

@@ -45,16 +45,27 @@ def mend(
         if rows > 1 and meeting_is_worth(drive.ways, *pair, vehicle):
             pairs.append(pair)
             guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
-    if not guesses:
+    number = drive_guess(query, drive, guesses, vehicle, until)
+    if number < 0:
         return False
+    meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
+    drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
+    return True
+
+
+def drive_guess(query: Query, drive: Drive, guesses: list[Plan], vehicle: Vehicle, until: float) -> int:
+    """Make a drive of the one of several guesses that gets quickest, in ``drive``.
+
+    Returns the number of the guess; -1 if none becomes a drive.
+    """
+    if not guesses:
+        return -1
     around = vehicle, query.scene, query.workspace
     number, found = polish_guesses(query.problem, guesses, *around, until, query.limits.bound_s)
     plan = found.plan
     if plan is None or len(plan.controls) > len(drive.controls):
-        return False
-    meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
-    drive.ways.last_seconds[0] = plan.duration_s
+        return -1
     steps = len(plan.controls)
     drive.states[: steps + 1], drive.controls[:steps] = plan.states, plan.controls
     drive.counts[:] = steps, 0, 0
-    return True
+    return number

@@ -12,12 +12,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.search.manoeuvres.arcs import at_pace, stride_of
-from planners.search.manoeuvres.joining import COARSE
+from planners.search.manoeuvres.arcs import lay_arc
 from planners.search.manoeuvres.pose_tree import PLACE, PoseTree, list_links
 from planners.world.arrays import Floats, Indices
-from planners.world.jit import inlined, lean
-from planners.world.vehicles.dynamics import State, load, step, store
+from planners.world.jit import lean
+from planners.world.vehicles.dynamics import load, store
 from planners.world.vehicles.vehicle import Vehicle
 
 MOST: Final = 64  # of them are remembered, by a search that mends
@@ -80,24 +79,6 @@ def note_near(
     near.tried[at] = 0
 
 
-@inlined
-def _lay_arc(
-    way: Floats, at: int, state: State, gear: float, bend: float, metres: float, turn: float, vehicle: Vehicle
-) -> int:
-    """Lay an arc from a state into ``way`` from row ``at`` on; returns the next row, -1 without room."""
-    count = max(math.ceil(metres / (COARSE * stride_of(gear, vehicle))), 1)
-    if at + count >= way.shape[0]:
-        return -1
-    speed = gear * metres / (count * vehicle.dt)
-    state = at_pace(state, speed, bend, vehicle)
-    for i in range(count + 1):
-        store(way, at + i, state)
-        way[at + i, 2] += turn
-        way[at + i, 3] = gear  # retimed later
-        state = step(at_pace(state, speed, bend, vehicle), 0.0, 0.0, vehicle)
-    return at + count + 1
-
-
 @lean
 def lay_way(
     way: Floats, chain: Indices, before: PoseTree, last: int, tree: PoseTree, node: int, vehicle: Vehicle
@@ -124,7 +105,7 @@ def lay_way(
         link = chain[k]
         state = load(before.states, before.parents[link], vehicle)
         gear = 1.0 if before.metres[link] > 0.0 else -1.0
-        at = _lay_arc(way, at, state, gear, before.bends[link], abs(before.metres[link]), 0.0, vehicle)
+        at = lay_arc(way, at, state, gear, before.bends[link], abs(before.metres[link]), 0.0, vehicle)
         if at < 0:
             return 0
     turn = 0.0
@@ -134,7 +115,7 @@ def lay_way(
     while node > 0:
         state = load(tree.states, node, vehicle)
         gear = 1.0 if tree.metres[node] < 0.0 else -1.0
-        at = _lay_arc(way, at, state, gear, tree.bends[node], abs(tree.metres[node]), turn, vehicle)
+        at = lay_arc(way, at, state, gear, tree.bends[node], abs(tree.metres[node]), turn, vehicle)
         if at < 0:
             return 0
         node = tree.parents[node]

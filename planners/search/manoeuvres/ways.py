@@ -195,3 +195,12 @@ def meeting_is_worth(
     _list_legs_from_root(ways, before, last)
     _add_legs_to_root(ways, tree, node, -1.0)
     return _is_worth(ways, seconds)
+
+
+@lean
+def take_arcs(ways: Ways, arcs: Floats, bends: Floats) -> None:
+    """Look at a way of its own: ``arcs [K]`` in metres, negative backwards, and by how much each turns."""
+    ways.counts[0] = 0
+    for k in range(arcs.shape[0]):
+        _add_leg(ways, arcs[k], bends[k])
+    ways.last_kind[0] = _kind(ways)

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.search.manoeuvres import manoeuvring, mending
-from planners.search.manoeuvres.arcs import stride_of
+from planners.search.manoeuvres.arcs import COARSE, stride_of
 from planners.search.manoeuvres.driving import Drive, allocate_drive
-from planners.search.manoeuvres.joining import COARSE
 from planners.search.manoeuvres.manoeuvring import allocate_trees
 from planners.search.manoeuvres.near_meetings import SIZE, allocate_near_meetings, lay_way, note_near
 from planners.search.manoeuvres.pose_tree import PLACE, PoseTree
