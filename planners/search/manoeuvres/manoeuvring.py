@@ -237,7 +237,8 @@ class Manoeuvring:
 
     def _mends(self, until: float) -> bool:
         """While nothing was found, mend places where the trees all but met; whether that gave a drive."""
-        if not self._may_mend or self.kept or self._mended_at == self.expansions:
+        goes_on = self._query.limits.further > 0
+        if not self._may_mend or (self.kept and not goes_on) or self._mended_at == self.expansions:
             return False
         self._mended_at = self.expansions
         while self._mend_at <= self.expansions:
