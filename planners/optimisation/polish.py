@@ -28,6 +28,7 @@ from planners.world.workspace import Workspace
 ITERATIONS: Final = 60  # of one polish; some 20 suffice mostly
 ARRIVING_ITERATIONS: Final = 1000  # where a drive must arrive as asked; some 60 suffice mostly
 GUESS_ITERATIONS: Final = 120  # of a guess that is nearly optimal; some 35 suffice mostly
+NEAR_ITERATIONS: Final = 30  # of these while time counts: if that does not suffice, it mostly is in vain
 SLICE: Final = 8  # iterations between two looks at the clock
 MUCH: Final = 0.97  # of its steps: a drive that is pressed to so few may get quicker from there
 ROOM: Final = 256  # steps, in which buffers grow
@@ -173,6 +174,7 @@ def polish_guesses(
     workspace: Workspace,
     until: float,
     below_s: float = math.inf,
+    near: int = NEAR_ITERATIONS,
 ) -> tuple[int, Polished]:
     """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
 
@@ -184,6 +186,7 @@ def polish_guesses(
         workspace: the caller's buffers.
         until: when to end, by ``working_clock``.
         below_s: only a drive that takes less time is wanted.
+        near: how many iterations each may take while time counts; what is blocked then is given up.
 
     Returns:
         The number of the guess, and the free drive near it that arrives as asked; or no plan.
@@ -193,7 +196,7 @@ def polish_guesses(
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
     around = goal, vehicle, scene, barrier
     most = GUESS_ITERATIONS, until, _steps_below(below_s, vehicle)
-    number, plan, used = quickest(guesses, model, interior, *around, *most, is_near=True)
+    number, plan, used = quickest(guesses, model, interior, *around, *most, near=near)
     return number, Polished(plan, used)
 
 

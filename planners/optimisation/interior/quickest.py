@@ -61,7 +61,7 @@ class Effort(NamedTuple):
 
 
 WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
-NEAR: Final = Effort(ATTEMPTS[:1], 30, 1, (), 0.25)  # of what is nearly optimal: more is mostly in vain
+NEAR: Final = Effort(ATTEMPTS[:1], 0, 1, (), 0.25)  # of what is nearly optimal: more is mostly in vain
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
@@ -81,7 +81,7 @@ def quickest(
     until: float,
     below: int,
     *,
-    is_near: bool = False,
+    near: int = 0,
 ) -> tuple[int, Plan | None, int]:
     """Find the quickest drive near the way of another one, or of several.
 
@@ -97,7 +97,8 @@ def quickest(
         iterations: at most, for each way.
         until: when to end, by ``working_clock``.
         below: only a drive of less steps is wanted.
-        is_near: whether they are nearly optimal: then it begins with their speeds, and there is one attempt.
+        near: 0, or for guesses that are nearly optimal how many iterations each may take while time counts:
+            then it begins with their speeds, and there is one attempt.
 
     Returns:
         The number of the one to which it belongs, a free drive that arrives as asked, if one was found, and
@@ -108,8 +109,8 @@ def quickest(
     soft, hold = Hold(firm, USUAL, 1.0), Hold(firm, FIRM_INSIDE, FIRM_PULL)
     drive = Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
-    if is_near:
-        number, best, used = _found(given, drive, vehicle, NEAR, most, below)
+    if near > 0:
+        number, best, used = _found(given, drive, vehicle, NEAR._replace(first=near), most, below)
     else:
         guesses = [_guess(plan.states, vehicle) for plan in given]
         number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below)

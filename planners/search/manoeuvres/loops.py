@@ -37,8 +37,8 @@ WIDTHS: Final = (0.0, 0.5)  # of loops: 0 is the tightest, 1 where trailers keep
 TIGHTEST: Final = 1.05  # times the least radius: what is left corrects
 LEGS: Final = 6  # arcs of a loop: back, three of a word, straight, back
 FORWARD: Final = 3  # arcs of a word that leads forwards only
-TRIES: Final = 8  # loops that are optimised, those that are least blocked ...
-AT_ONCE: Final = 4  # ... so many at a time
+TRIES: Final = 4  # loops that are optimised, those that are least blocked ...
+ITERATIONS: Final = 60  # ... with so many iterations each while time counts
 MOST_BLOCKED: Final = 0.5  # share of a loop that meets obstacles or folds trailers too far, ...
 MOST_MEETS: Final = 0.3  # ... and that meets obstacles
 
@@ -204,20 +204,18 @@ def loop(
     loops = query.workspace.buffers(allocate_loops)
     train = sum(each.hitch_length for each in trailers_of(vehicle))
     list_loops(loops, start, end, radius, train, vehicle, query.scene)
-    free = int(np.count_nonzero(loops.blocked < 1.0))
-    for first in range(0, free, AT_ONCE):
-        guesses: list[Plan] = []
-        numbers: list[int] = []
-        for k in range(first, min(first + AT_ONCE, free)):
-            rows = lay_loop(drive.states, loops, k, start, vehicle)
-            if rows > 1:
-                guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
-                numbers.append(k)
-        number = drive_guess(query, drive, guesses, vehicle, until)
-        if number >= 0:
-            k = numbers[number]
-            curvatures = np.array([curvature_of(bend, vehicle) for bend in loops.bends[k]])
-            take_arcs(drive.ways, loops.metres[k], loops.metres[k] * curvatures)
-            drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
-            return True
-    return False
+    guesses: list[Plan] = []
+    numbers: list[int] = []
+    for k in np.flatnonzero(loops.blocked < 1.0).tolist():
+        rows = lay_loop(drive.states, loops, k, start, vehicle)
+        if rows > 1:
+            guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
+            numbers.append(k)
+    number = drive_guess(query, drive, guesses, vehicle, until, ITERATIONS)
+    if number < 0:
+        return False
+    k = numbers[number]
+    curvatures = np.array([curvature_of(bend, vehicle) for bend in loops.bends[k]])
+    take_arcs(drive.ways, loops.metres[k], loops.metres[k] * curvatures)
+    drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
+    return True

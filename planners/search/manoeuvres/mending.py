@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from planners.optimisation.interior.retiming import retimed
-from planners.optimisation.polish import polish_guesses
+from planners.optimisation.polish import NEAR_ITERATIONS, polish_guesses
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.near_meetings import SIZE, lay_way
 from planners.search.manoeuvres.pose_tree import PoseTree
@@ -53,15 +53,24 @@ def mend(
     return True
 
 
-def drive_guess(query: Query, drive: Drive, guesses: list[Plan], vehicle: Vehicle, until: float) -> int:
-    """Make a drive of the one of several guesses that gets quickest, in ``drive``.
+def drive_guess(
+    query: Query,
+    drive: Drive,
+    guesses: list[Plan],
+    vehicle: Vehicle,
+    until: float,
+    near: int = NEAR_ITERATIONS,
+) -> int:
+    """Make a drive of the one of several guesses that gets quickest, in ``drive``; arguments as of ``mend``.
+
+    ``near`` is that of ``polish_guesses``.
 
     Returns the number of the guess; -1 if none becomes a drive.
     """
     if not guesses:
         return -1
     around = vehicle, query.scene, query.workspace
-    number, found = polish_guesses(query.problem, guesses, *around, until, query.limits.bound_s)
+    number, found = polish_guesses(query.problem, guesses, *around, until, query.limits.bound_s, near)
     plan = found.plan
     if plan is None or len(plan.controls) > len(drive.controls):
         return -1
