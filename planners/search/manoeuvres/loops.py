@@ -29,6 +29,7 @@ from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import bend_with, curvature_of, load, step, store, tightest_bend
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
 
+NEAR_BY: Final = 1.5  # lengths of the whole train: if the goal is farther away, the way there turns anyway
 # lengths are in those of all trailers
 BACKS: Final = (0.0, 0.5)  # how far a train backs up before its loop,
 RUN_INS: Final = (0.5, 1.0, 1.5)  # drives straight at last, so that it straightens,
@@ -190,7 +191,7 @@ def lay_loop(way: Floats, loops: Loops, number: int, start: Floats, vehicle: Veh
 def loop(
     query: Query, drive: Drive, start: Floats, end: Floats, radius: float, vehicle: Vehicle, until: float
 ) -> bool:
-    """Make a drive of a loop; whether ``drive`` leads to the goal now.
+    """Make a drive of a loop, if the goal is near; whether ``drive`` leads there now.
 
     Args:
         query: the problem, and the buffers.
@@ -201,8 +202,10 @@ def loop(
         vehicle: what is driven.
         until: when to end, by ``working_clock``.
     """
-    loops = query.workspace.buffers(allocate_loops)
     train = sum(each.hitch_length for each in trailers_of(vehicle))
+    if math.dist(start[0, :2], end[0, :2]) > NEAR_BY * (vehicle.front + vehicle.rear + train):
+        return False
+    loops = query.workspace.buffers(allocate_loops)
     list_loops(loops, start, end, radius, train, vehicle, query.scene)
     guesses: list[Plan] = []
     numbers: list[int] = []
