@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tasks.requests.solve_many import SolvedMany
 
 _USUAL: Final = SolveOptions()
+_LEAST_LATERAL: Final = 0.05  # m/s²: what is told of the acceleration to the side
 
 
 def draw(
@@ -88,7 +89,9 @@ def plan(
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
         gears = answer["gear_changes"]
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
-        lines.append(f"{attempt.source}, {times}{changes}")
+        lateral = answer["lateral_acceleration"]
+        sideways = f", up to {lateral:.1f} m/s² sideways" if lateral >= _LEAST_LATERAL else ""
+        lines.append(f"{attempt.source}, {times}{changes}{sideways}")
     write_answer(*lines, **answer)
     write_files(plan=written, picture=picture)
     _write_learned(learn)

@@ -85,6 +85,13 @@ class Plan:
         """Driving time in seconds."""
         return self.dt * len(self.controls)
 
+    @property
+    def lateral_acceleration(self) -> float:
+        """The largest acceleration to the side, in m/s²: speed times turn rate, by mean over each step."""
+        turned = np.abs(np.diff(np.unwrap(self.states[:, 2])))
+        metres = np.hypot(*np.diff(self.states[:, :2], axis=0).T)
+        return float(np.max(metres * turned, initial=0.0)) / self.dt**2
+
 
 @lean
 def _path_length(states: Floats) -> float:

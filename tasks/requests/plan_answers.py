@@ -50,6 +50,12 @@ def plan_answer(record: PlanRecord, out: Path | None, verified: bool | None) -> 
     """
     fields = plan_fields(record)
     where = {} if out is None else {"states": None, "controls": None}
-    gear_changes = None if record.plan is None else len(cusps_of(record.plan, record.vehicle))
-    waypoints = len(fields["states"])
-    return fields | where | {"waypoints": waypoints, "gear_changes": gear_changes, "verified": verified}
+    plan = record.plan
+    return {
+        **fields,
+        **where,
+        "waypoints": len(fields["states"]),
+        "gear_changes": None if plan is None else len(cusps_of(plan, record.vehicle)),
+        "lateral_acceleration": None if plan is None else record.scale * plan.lateral_acceleration,
+        "verified": verified,
+    }

@@ -109,6 +109,10 @@ def test_the_parts_of_a_plan_are_numbers_and_its_states_are_there_once(
     assert sum(answer["parts_seconds"].values()) <= answer["planning_seconds"]
     assert len(answer["states"]) == answer["waypoints"] == len(answer["controls"]) + 1
     assert answer["duration_s"] == pytest.approx(answer["dt"] * len(answer["controls"]))
+    states = np.array(answer["states"])
+    turns = np.abs(np.diff(np.unwrap(states[:, 2]))) / answer["dt"]
+    fastest = np.maximum(np.abs(states[:-1, 3]), np.abs(states[1:, 3]))
+    assert 0.0 < answer["lateral_acceleration"] <= np.max(turns * fastest) + 1e-9
     told = _told("plan one.json --out kept.json", place, monkeypatch, capsys)
     assert told["answer"]["states"] is None
     kept = json.loads(Path(told["files"]["plan"]).read_text())
