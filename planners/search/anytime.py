@@ -6,7 +6,7 @@ more time (``improve``), each search has a bound on driving time and random numb
 and Zhou, T-RO 2016, with any of the planners as x). A plan within the bound is polished. The bound is a
 little above the best driving time at first, because a plan as a search finds it takes longer, and falls with
 each search in vain. In narrow places each search looks for drives of other kinds instead, each for twice as
-long as the one before.
+long as the one before, as long as there is time for that.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner 
 FURTHER = (
     2000  # expansions for drives of other kinds in narrow places, of the first search; then twice as many
 )
+TIMES_AS_LONG = 4.0  # the next search: twice as many expansions, in half of the time that is left
 GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer ...
 MOST_EXPANSIONS = 10_000_000  # ... up to this, which no search reaches in its time: it holds too few nodes
 LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when all slack is used up
@@ -99,7 +100,7 @@ def improve(
 
     A limit in expansions gives the same result for the same seed on any machine; a limit in seconds does not.
     An iteration of a polish counts as ``EXPANSIONS_AN_ITERATION``, but for those by which a search for
-    manoeuvres squeezes and mends.
+    manoeuvres squeezes, mends and turns trains round in loops.
     Every second search is guided along the best plan.
 
     Args:
@@ -151,10 +152,12 @@ def improve(
     if given is not None:
         consider(given)
     kinds = asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
-    seen: set[bytes] = set()  # drives into narrow places that were polished
+    looks_for_kinds, took = kinds.others, 0.0
+    seen: set[bytes] = set()  # drives that were polished
     while spent < most and not _is_there(best) and (left := seconds - (working_clock() - began)) > 0.0:
-        if kinds.others:
-            wide = min(FURTHER * 2**searches, MOST_EXPANSIONS)
+        looks_for_kinds = looks_for_kinds and left >= TIMES_AS_LONG * took
+        if looks_for_kinds:
+            wide = FURTHER * 2**searches
             limits = Limits(
                 expansions=int(min(POSE_EXPANSIONS + wide, most - spent)),
                 seconds=min(left, Limits.seconds),
@@ -168,7 +171,11 @@ def improve(
             )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
-        outcome = PLANNERS[name](replace(kinds, rng=rng, guide=guide, limits=limits))
+        query = replace(kinds, rng=rng, guide=guide, limits=limits, others=looks_for_kinds)
+        outcome = PLANNERS[name](query)
+        took = outcome.roadmap_seconds + outcome.search_seconds
+        if looks_for_kinds and outcome.expansions < limits.further:
+            looks_for_kinds = False  # there are no others, or the time was up
         searches += 1
         checks += outcome.collision_checks
         nodes += outcome.nodes
@@ -176,7 +183,7 @@ def improve(
         gained = False
         for plan in (outcome.plan, *(other.plan for other in outcome.others)):
             if plan is not None and plan.controls.tobytes() not in seen:
-                below_s = best.duration_s if kinds.others and best is not None else math.inf
+                below_s = best.duration_s if query.others and best is not None else math.inf
                 seen.add(plan.controls.tobytes())
                 gained = consider(plan, below_s) or gained
         if gained:
