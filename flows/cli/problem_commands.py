@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tasks.requests.solve_many import SolvedMany
 
 _USUAL: Final = SolveOptions()
-_LEAST_LATERAL: Final = 0.05  # m/s²: what is told of the acceleration to the side
+_LEAST_LATERAL: Final = 0.05  # m/s²: a smaller acceleration to the side is not told
 
 
 def draw(

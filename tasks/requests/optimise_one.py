@@ -21,6 +21,7 @@ from storage.exchange.plans import PlanRecord, read_plan
 from storage.exchange.problems import read_problem
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.requests.plan_answers import no_plan, plan_answer, write_answer_file
+from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_known, check_plan_outputs, check_seed, checked_vehicle
 from tasks.settings.errors import RunError, UsageError
 
@@ -137,7 +138,8 @@ def optimise_one(
     initial.guess(problem)  # compiles and fills caches before timing starts
     start = perf_counter()
     guess, planner = initial.guess(problem)
-    optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)
+    with told_meanwhile("optimising"):
+        optimised = optimise(problem, guess, DEFAULT_SETTINGS._replace(weights=weights), initial.vehicle)
     seconds = perf_counter() - start
     record = _record(problem, optimised, planner, seconds, initial.vehicle)
     written = write_answer_file(out, record)

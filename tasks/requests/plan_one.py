@@ -16,6 +16,7 @@ from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import meaning_of, no_plan, plan_answer, write_answer_file
+from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_plan_outputs
 from tasks.settings.run_settings import UNASSISTED
 
@@ -61,7 +62,8 @@ def plan_one(
     problem = read_problem(file, assistant.vehicle, pick)
     with no_garbage_collection():
         assistant.warm_up(problem)
-        attempt, plan = assistant(problem)
+        with told_meanwhile("planning"):
+            attempt, plan = assistant(problem)
     record = assistant.record(problem, attempt, plan)
     written = write_answer_file(out, record)
     if learn is not None:
