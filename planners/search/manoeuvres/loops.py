@@ -22,6 +22,7 @@ from planners.search.manoeuvres.mending import drive_guess
 from planners.search.manoeuvres.ways import take_arcs
 from planners.search.query import Query
 from planners.world.arrays import Floats, Pose
+from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, bodies_are_free, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
@@ -40,6 +41,7 @@ LEGS: Final = 6  # arcs of a loop: back, three of a word, straight, back
 FORWARD: Final = 3  # arcs of a word that leads forwards only
 TRIES: Final = 4  # loops that are optimised, those that are least blocked ...
 ITERATIONS: Final = 60  # ... with so many iterations each while time counts
+TIME_SHARE: Final = 0.25  # of the time left, at most: a search may find a drive in the rest
 MOST_BLOCKED: Final = 0.5  # share of a loop that meets obstacles or folds trailers too far, ...
 MOST_MEETS: Final = 0.3  # ... and that meets obstacles
 
@@ -129,9 +131,13 @@ def _list_between(
     metres, bends = loops.trial[0], loops.trial[1]
     for i in range(count):
         metres[0], metres[LEGS - 2], metres[LEGS - 1] = -back, run_in, -past
+        forwards = run_in
         for k in range(FORWARD):
             metres[1 + k] = radius * loops.words[i, PARTS + k]
             bends[1 + k] = bend * loops.words[i, k]
+            forwards += metres[1 + k]
+        if (back + past) * vehicle.max_speed > -forwards * vehicle.min_speed:
+            continue  # it would take longer backwards than forwards
         most = min(loops.blocked[-1], MOST_BLOCKED)
         blocked = _blocked_share(loops, start, most, vehicle, scene)
         if blocked < most:
@@ -193,6 +199,8 @@ def loop(
 ) -> bool:
     """Make a drive of a loop, if the goal is near; whether ``drive`` leads there now.
 
+    A train that is quicker backwards mostly has quicker ways to turn round.
+
     Args:
         query: the problem, and the buffers.
         drive: to be filled in.
@@ -203,8 +211,11 @@ def loop(
         until: when to end, by ``working_clock``.
     """
     train = sum(each.hitch_length for each in trailers_of(vehicle))
-    if math.dist(start[0, :2], end[0, :2]) > NEAR_BY * (vehicle.front + vehicle.rear + train):
+    is_far = math.dist(start[0, :2], end[0, :2]) > NEAR_BY * (vehicle.front + vehicle.rear + train)
+    if is_far or vehicle.max_speed < -vehicle.min_speed:
         return False
+    now = working_clock()
+    until = now + TIME_SHARE * (until - now)
     loops = query.workspace.buffers(allocate_loops)
     list_loops(loops, start, end, radius, train, vehicle, query.scene)
     guesses: list[Plan] = []

@@ -204,7 +204,7 @@ class Manoeuvring:
         """Search until there is a drive, ``end`` expansions or the clock ends it; whether there is one.
 
         A level ends when it has had all its expansions, or nothing is left to open. Where only the start is
-        too narrow for it, too, but for the last. Trains may turn round in a loop, which is tried before.
+        too narrow for it, too, but for the last. Before the first level trains try to turn round in a loop.
         """
         if self._loops(until):
             return True
@@ -244,8 +244,9 @@ class Manoeuvring:
         while self._mend_at <= self.expansions:
             self._mend_at *= 2
         trees = self._other, self._tree
-        self._is_mended = mend(self._query, self._drive, *trees, self._vehicle, min(until, self._until))
-        return self._is_mended
+        mended = mend(self._query, self._drive, *trees, self._vehicle, min(until, self._until))
+        self._is_mended = self._is_mended or mended
+        return mended
 
     @property
     def kept(self) -> list[Other]:

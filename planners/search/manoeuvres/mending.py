@@ -11,7 +11,7 @@ from planners.optimisation.polish import NEAR_ITERATIONS, polish_guesses
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.near_meetings import SIZE, lay_way
 from planners.search.manoeuvres.pose_tree import PoseTree
-from planners.search.manoeuvres.ways import meeting_is_worth
+from planners.search.manoeuvres.ways import last_is_worth, meeting_is_worth
 from planners.search.query import Query
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
@@ -50,7 +50,7 @@ def mend(
         return False
     meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
     drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
-    return True
+    return last_is_worth(drive.ways)
 
 
 def drive_guess(

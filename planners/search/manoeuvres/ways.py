@@ -145,6 +145,12 @@ def _is_worth(ways: Ways, seconds: float) -> bool:
     return True
 
 
+def last_is_worth(ways: Ways) -> bool:
+    """Whether the way that was looked at last is worth keeping, now that its time is known."""
+    same = ways.seconds[ways.kinds == ways.last_kind[0]]
+    return bool(ways.last_seconds[0] < (same.min() if len(same) else ways.seconds.max()))
+
+
 @lean
 def word_is_worth(
     ways: Ways,

@@ -87,15 +87,28 @@ def test_trees_alone_drive_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sum(here) < sum(alone) - 1.0
 
 
-def test_loops_are_for_goals_that_are_near(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loops_are_for_goals_that_are_near_and_trains_that_are_quick_forwards(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     laid = []
     monkeypatch.setattr(loops, "list_loops", lambda found, *_: laid.append(found.blocked.fill(1.0)))
     near, far = yard(WITH_ROOM), problem_of([])
     far = replace(far, start=(5.0, 5.0, 0.0), goal=(40.0, 40.0), arrival=near.arrival)
-    for problem, times in ((far, 0), (near, 1)):
+    backwards = TRAIN._replace(max_speed=0.5 * -TRAIN.min_speed)
+    for problem, vehicle, times in ((far, TRAIN, 0), (near, TRAIN, 1), (near, backwards, 0)):
         laid.clear()
-        plan("lattice", problem, generator(0), limits=Limits(expansions=400), vehicle=TRAIN)
+        plan("lattice", problem, generator(0), limits=Limits(expansions=400), vehicle=vehicle)
         assert len(laid) == times
+
+
+def test_who_hardly_moves_backwards_turns_round_forwards() -> None:
+    crawling = TRAIN._replace(min_speed=-0.001)
+    found = plan(
+        "lattice", yard(WITH_ROOM), generator(0), limits=Limits(expansions=300), vehicle=crawling
+    ).plan
+    assert found is not None
+    assert found.states[:, 3].min() >= -0.001
+    assert found.duration_s < 30.0
 
 
 def test_a_loop_beyond_the_bound_is_no_answer() -> None:
