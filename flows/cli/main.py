@@ -31,6 +31,7 @@ FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
 SERVERS: Final = {"dashboard", "serve", "serve-memory", "servers"}  # commands that run until Ctrl-C
+STARTING_OVER: Final = {"optimise", "plan", "route"}  # that have one answer
 GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and stop the workers
 
 
@@ -171,8 +172,12 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     forced_exit = threading.Timer(GRACE_SECONDS, os._exit, [INTERRUPTED])
     forced_exit.daemon = True
     forced_exit.start()
-    told = "Interrupted. Repeat the command to continue where it stopped (`plan` and `route` start over)."
-    print("Stopped." if SERVERS.intersection(sys.argv[1:2]) else told, file=sys.stderr)
+    command, told = set(sys.argv[1:2]), "Interrupted. Repeat the command to continue where it stopped."
+    if command & SERVERS:
+        told = "Stopped."
+    elif command & STARTING_OVER:
+        told = "Interrupted. Nothing was kept: repeat the command to start over."
+    print(told, file=sys.stderr)
     raise KeyboardInterrupt
 
 

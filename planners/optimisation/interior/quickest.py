@@ -61,7 +61,7 @@ class Effort(NamedTuple):
 
 
 WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
-NEAR: Final = Effort(ATTEMPTS[:1], 0, 1, (), 0.25)  # of what is nearly optimal: more is mostly in vain
+NEAR: Final = Effort(ATTEMPTS[:1], 0, 1, (), 0.25)  # of what is nearly optimal, but for ``first``
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
