@@ -31,7 +31,7 @@ FAILURE: Final = 1
 WRONG_USE: Final = 2
 INTERRUPTED: Final = 130
 SERVERS: Final = {"dashboard", "serve", "serve-memory", "servers"}  # commands that run until Ctrl-C
-STARTING_OVER: Final = {"optimise", "plan", "route"}  # that have one answer
+STARTING_OVER: Final = {"optimise", "plan", "route"}  # commands with a single answer
 GRACE_SECONDS: Final = 2.0  # after Ctrl-C, to inform the server and stop the workers
 
 

@@ -32,9 +32,7 @@ from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
 FIRST_EXPANSIONS = 250  # of the first search: a few times as many as a planner mostly needs
-FURTHER = (
-    2000  # expansions for drives of other kinds in narrow places, of the first search; then twice as many
-)
+FURTHER = 2000  # expansions of the first search for other kinds of drives; the next has twice as many
 TIMES_AS_LONG = 4.0  # the next search: twice as many expansions, in half of the time that is left
 GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer ...
 MOST_EXPANSIONS = 10_000_000  # ... up to this, which no search reaches in its time: it holds too few nodes
@@ -74,7 +72,7 @@ def _is_there(plan: Plan | None) -> bool:
     return plan is not None and len(plan.controls) == 0
 
 
-def asking_for_kinds(planner: str, query: Query) -> Query:
+def _asking_for_kinds(planner: str, query: Query) -> Query:
     """Ask for drives of other kinds, too, where it is narrow and the planner finds such."""
     goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
     if planner != "lattice" or not suits(goal, vehicle):
@@ -151,7 +149,7 @@ def improve(
 
     if given is not None:
         consider(given)
-    kinds = asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
+    kinds = _asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
     looks_for_kinds, took = kinds.others, 0.0
     seen: set[bytes] = set()  # drives that were polished
     while spent < most and not _is_there(best) and (left := seconds - (working_clock() - began)) > 0.0:
@@ -216,7 +214,7 @@ def search_and_polish(
         with the work and the time of all; and what that plan was before it was polished.
     """
     until = working_clock() + query.limits.seconds
-    query, vehicle = asking_for_kinds(planner, query), query.vehicle
+    query, vehicle = _asking_for_kinds(planner, query), query.vehicle
     varies = query.others
     if math.isfinite(below_s):
         worth = int(PER_SQUARE_SECOND * below_s * below_s)

@@ -1,4 +1,4 @@
-"""Says from time to time that a search goes on, for who waits for one answer."""
+"""Tells a user who waits for a single answer, from time to time, that the work goes on."""
 
 from __future__ import annotations
 

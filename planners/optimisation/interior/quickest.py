@@ -61,12 +61,16 @@ class Effort(NamedTuple):
 
 
 WHOLE: Final = Effort(ATTEMPTS, 60, 3, (1.07, 1.15, 1.3, 1.6), 1.0)
-NEAR: Final = Effort(ATTEMPTS[:1], 0, 1, (), 0.25)  # of what is nearly optimal, but for ``first``
 PROMISING: Final = 0.95  # of its time: what may get a drive below that is tried in all attempts
 FIRM_STRENGTH: Final = 0.003  # of obstacles in the end: less, so that they keep a drive off only ...
 FIRM_CONTACT_M: Final = 0.00015  # ... close to them, but hard; both times ``WEAKER`` where it goes on
 FIRM_INSIDE: Final = 0.15  # as of ``Hold``: nearly all that is tolerated at the goal is used ...
 FIRM_PULL: Final = 30.0  # ... and no more
+
+
+def _near(first: int) -> Effort:
+    """What is done for a guess that is nearly optimal: more is mostly in vain."""
+    return Effort(ATTEMPTS[:1], first, 1, (), 0.25)
 
 
 def quickest(
@@ -110,23 +114,19 @@ def quickest(
     drive = Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if near > 0:
-        number, best, used = _found(given, drive, vehicle, NEAR._replace(first=near), most, below)
+        number, best, used = _found(given, drive, vehicle, _near(near), most, below)
     else:
-        guesses = [_guess(plan.states, vehicle) for plan in given]
+        guesses = [retimed(plan.states, vehicle) for plan in given]
         number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below)
     drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
-        again, below = [_guess(best.states, vehicle)], len(best.controls)
+        again, below = [retimed(best.states, vehicle)], len(best.controls)
         _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below)
         used += more
         if quicker is None:
             break
         best = quicker
     return number, best, used
-
-
-def _guess(way: Floats, vehicle: Vehicle) -> Plan:
-    return Plan(*retimed(way, vehicle), vehicle.dt)
 
 
 def _found(

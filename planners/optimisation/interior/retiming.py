@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from planners.world.arrays import Floats
+from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -19,8 +20,8 @@ FINE: Final = 200  # pieces of a run for which its time is summed up
 LEAST_STEPS: Final = 2  # of a run
 
 
-def retimed(states: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
-    """The way of ``states [T, S]`` without standing still: states and controls that do not quite fit.
+def retimed(states: Floats, vehicle: Vehicle) -> Plan:
+    """The way of ``states [T, S]`` without standing still, as a plan whose controls do not quite fit.
 
     Each run in one gear begins and ends at rest, but for the speeds at the drive's ends. The wheels are where
     the drive had them at each place, even if they cannot turn so quickly.
@@ -40,7 +41,8 @@ def retimed(states: Floats, vehicle: Vehicle) -> tuple[Floats, Floats]:
         guess.append(_run(way, metres[steps], bool(backwards[begin]), speeds, vehicle))
     found = np.concatenate(guess)
     limits = np.array(control_limits(vehicle))
-    return found, np.clip(np.diff(found[:, 3:5], axis=0) / vehicle.dt, -limits, limits)
+    controls = np.clip(np.diff(found[:, 3:5], axis=0) / vehicle.dt, -limits, limits)
+    return Plan(found, controls, vehicle.dt)
 
 
 def _run(

@@ -1,4 +1,4 @@
-"""Turns trains round forwards, in loops: what they cannot drive there as it is, optimisation makes a drive.
+"""Turns trains round forwards, in loops: optimisation makes drives of ways that are blocked as they are laid.
 
 Trailers straighten behind a car that drives forwards, however they were folded. So a train may turn round in
 a loop, as long as there is room to drive straight at last. Trees find such drives late, or never: they step
@@ -13,19 +13,17 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.optimisation.interior.retiming import retimed
 from planners.search.connection.candidates import list_forward_words_between
 from planners.search.connection.words import MOST_WORDS, PARTS
 from planners.search.manoeuvres.arcs import COARSE, at_pace, lay_arc, stride_of
 from planners.search.manoeuvres.driving import Drive
-from planners.search.manoeuvres.mending import drive_guess
+from planners.search.manoeuvres.mending import drive_one_of
 from planners.search.manoeuvres.ways import take_arcs
 from planners.search.query import Query
 from planners.world.arrays import Floats, Pose
 from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, bodies_are_free, state_is_free
 from planners.world.jit import inlined, lean
-from planners.world.problem import Plan
 from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import bend_with, curvature_of, load, step, store, tightest_bend
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
@@ -123,7 +121,10 @@ def _ahead(pose: Pose, metres: float) -> Pose:
 def _list_between(
     loops: Loops, start: Floats, end: Pose, radius: float, straight: Pose, vehicle: Vehicle, scene: Scene
 ) -> None:
-    """List loops of a radius; ``straight``: metres back before, ahead after the loop, and back at last."""
+    """List loops of a radius; ``straight``: metres back before, ahead after the loop, and back at last.
+
+    Those that would be driven for longer backwards than forwards are left out.
+    """
     back, run_in, past = straight
     here = _ahead((start[0, 0], start[0, 1], start[0, 2]), -back)
     count = list_forward_words_between(here, _ahead(end, past - run_in), radius, loops.words)
@@ -137,7 +138,7 @@ def _list_between(
             bends[1 + k] = bend * loops.words[i, k]
             forwards += metres[1 + k]
         if (back + past) * vehicle.max_speed > -forwards * vehicle.min_speed:
-            continue  # it would take longer backwards than forwards
+            continue
         most = min(loops.blocked[-1], MOST_BLOCKED)
         blocked = _blocked_share(loops, start, most, vehicle, scene)
         if blocked < most:
@@ -167,8 +168,6 @@ def list_loops(
         radius = tight + width * max(wide - tight, 0.0)
         for back in BACKS:
             for past in PASTS:
-                if back + past > 0.0 and vehicle.min_speed >= 0.0:
-                    continue
                 for run_in in RUN_INS:
                     straight = (back * train, run_in * train, past * train)
                     _list_between(loops, start, goal, radius, straight, vehicle, scene)
@@ -218,14 +217,14 @@ def loop(
     until = now + TIME_SHARE * (until - now)
     loops = query.workspace.buffers(allocate_loops)
     list_loops(loops, start, end, radius, train, vehicle, query.scene)
-    guesses: list[Plan] = []
+    ways: list[Floats] = []
     numbers: list[int] = []
     for k in np.flatnonzero(loops.blocked < 1.0).tolist():
         rows = lay_loop(drive.states, loops, k, start, vehicle)
         if rows > 1:
-            guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
+            ways.append(drive.states[:rows].copy())
             numbers.append(k)
-    number = drive_guess(query, drive, guesses, vehicle, until, ITERATIONS)
+    number = drive_one_of(ways, query, drive, vehicle, until, ITERATIONS)
     if number < 0:
         return False
     k = numbers[number]

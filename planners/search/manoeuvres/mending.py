@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -13,7 +14,7 @@ from planners.search.manoeuvres.near_meetings import SIZE, lay_way
 from planners.search.manoeuvres.pose_tree import PoseTree
 from planners.search.manoeuvres.ways import last_is_worth, meeting_is_worth
 from planners.search.query import Query
-from planners.world.problem import Plan
+from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import Vehicle
 
 TRIES: Final = 4  # ways at a time
@@ -35,17 +36,17 @@ def mend(
     near = drive.near
     left = np.flatnonzero(near.tried[: near.counts[SIZE]] == 0)
     pairs: list[tuple[PoseTree, int, PoseTree, int]] = []
-    guesses: list[Plan] = []
+    ways: list[Floats] = []
     for k in left[np.argsort(near.off[left], kind="stable")]:
-        if len(guesses) == TRIES:
+        if len(ways) == TRIES:
             break
         near.tried[k] = 1
         pair = before, int(near.lasts[k]), tree, int(near.nodes[k])
         rows = lay_way(drive.states, drive.join.chain, *pair, vehicle)
         if rows > 1 and meeting_is_worth(drive.ways, *pair, vehicle):
             pairs.append(pair)
-            guesses.append(Plan(*retimed(drive.states[:rows].copy(), vehicle), vehicle.dt))
-    number = drive_guess(query, drive, guesses, vehicle, until)
+            ways.append(drive.states[:rows].copy())
+    number = drive_one_of(ways, query, drive, vehicle, until)
     if number < 0:
         return False
     meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
@@ -53,22 +54,30 @@ def mend(
     return last_is_worth(drive.ways)
 
 
-def drive_guess(
+def drive_one_of(
+    ways: Sequence[Floats],
     query: Query,
     drive: Drive,
-    guesses: list[Plan],
     vehicle: Vehicle,
     until: float,
     near: int = NEAR_ITERATIONS,
 ) -> int:
-    """Make a drive of the one of several guesses that gets quickest, in ``drive``; arguments as of ``mend``.
+    """Make a drive of the one of several ways that gets quickest by optimisation.
 
-    ``near`` is that of ``polish_guesses``.
+    Args:
+        ways: each ``[T, S]``, from the start to the goal; speeds only say in which gear it is driven.
+        query: the problem, and the buffers.
+        drive: to be filled in.
+        vehicle: what is driven.
+        until: when to end, by ``working_clock``.
+        near: that of ``polish_guesses``.
 
-    Returns the number of the guess; -1 if none becomes a drive.
+    Returns:
+        The number of the way; -1 if none becomes a drive.
     """
-    if not guesses:
+    if not ways:
         return -1
+    guesses = [retimed(way, vehicle) for way in ways]
     around = vehicle, query.scene, query.workspace
     number, found = polish_guesses(query.problem, guesses, *around, until, query.limits.bound_s, near)
     plan = found.plan

@@ -204,9 +204,9 @@ def meeting_is_worth(
 
 
 @lean
-def take_arcs(ways: Ways, arcs: Floats, bends: Floats) -> None:
-    """Look at a way of its own: ``arcs [K]`` in metres, negative backwards, and by how much each turns."""
+def take_arcs(ways: Ways, metres: Floats, turns: Floats) -> None:
+    """Look at a way of arcs: ``metres [K]`` long, negative backwards, that turn by ``turns [K]`` radians."""
     ways.counts[0] = 0
-    for k in range(arcs.shape[0]):
-        _add_leg(ways, arcs[k], bends[k])
+    for k in range(metres.shape[0]):
+        _add_leg(ways, metres[k], turns[k])
     ways.last_kind[0] = _kind(ways)

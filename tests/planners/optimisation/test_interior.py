@@ -118,7 +118,8 @@ def test_a_mirrored_drive_becomes_as_quick(turns: int) -> None:
 def test_a_retimed_drive_goes_the_same_way_within_all_limits(turns: int, waits: int, backwards: bool) -> None:
     controls = np.concatenate([manoeuvre(turns), np.zeros((waits, 2)), manoeuvre(turns)])
     _, plan = driven(controls * np.array([0.5 if backwards else 1.0, 1.0]))
-    states, guess = retimed(plan.states, CAR)
+    found = retimed(plan.states, CAR)
+    states, guess = found.states, found.controls
     assert len(guess) <= len(plan.controls)
     np.testing.assert_array_equal(states[0], plan.states[0])
     np.testing.assert_allclose(states[-1, :3], plan.states[-1, :3], atol=1e-5)

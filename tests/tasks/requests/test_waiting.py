@@ -1,4 +1,4 @@
-"""Who waits for a plan is told that the search goes on."""
+"""A user who waits for a plan is told that the work goes on."""
 
 from __future__ import annotations
 
