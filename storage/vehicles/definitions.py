@@ -6,6 +6,7 @@ vehicle's scale, a power of two, so that no digit is lost in converting there an
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
@@ -36,10 +37,15 @@ _LIMITS: Final = {  # of each kind
     "differential-drive": ("speed", "acceleration", "turn_rate", "turn_acceleration"),
     "unicycle-first-order": ("speed", "turn_rate"),
 }
-ALL_LIMITS: Final = ("speed", "acceleration", "steering", "steering_rate", "turn_rate", "turn_acceleration")
+_MAY_HAVE: Final = ("lateral_acceleration",)  # each kind
+ALL_LIMITS: Final = (
+    *("speed", "acceleration", "steering", "steering_rate", "turn_rate", "turn_acceleration"),
+    *_MAY_HAVE,
+)
 _LEAST: Final = 0.001  # of every number: far less, and planning never ends
 _RANGES: Final = {  # up to, unit
     "acceleration": (100.0, "m/s^2"),
+    "lateral_acceleration": (100.0, "m/s^2"),
     "steering": (1.4, "rad"),
     "steering_rate": (100.0, "rad/s"),
     "turn_rate": (50.0, "rad/s"),
@@ -85,6 +91,7 @@ def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
     real: dict[str, Any] = {  # lengths are still real metres
         "front": box.front, "rear": box.rear, "width": box.width, "min_speed": least, "max_speed": most,
         "max_acceleration": limits.get("acceleration", (most - least) / step),
+        "max_lateral_acceleration": limits.get("lateral_acceleration", math.inf),
     }  # fmt: skip
     same: dict[str, Any] = {"dt": step, "first_order": first_order}
     if is_car:
@@ -104,6 +111,8 @@ def definition_of(vehicle: Vehicle) -> dict[str, Any]:
     limits: dict[str, Any] = {"speed": [scale * vehicle.min_speed, scale * vehicle.max_speed]}
     if not vehicle.first_order:
         limits["acceleration"] = scale * vehicle.max_acceleration
+    if math.isfinite(vehicle.max_lateral_acceleration):
+        limits["lateral_acceleration"] = scale * vehicle.max_lateral_acceleration
     if isinstance(vehicle, DifferentialDrive):
         turning = {"turn_rate": vehicle.max_turn_rate, "turn_acceleration": vehicle.max_turn_acceleration}
     else:
@@ -195,9 +204,10 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
     if not isinstance(fields, Mapping):
         raise ValueError(f"has limits {short(fields)}; expected fields {', '.join(_LIMITS[kind])}")
     for name in fields:
-        if name in ALL_LIMITS and name not in _LIMITS[kind]:
+        if name in ALL_LIMITS and name not in (*_LIMITS[kind], *_MAY_HAVE):
             raise ValueError(f"has the limit {name}, which the kind {kind} does not have; leave it out")
-    check_fields([f"limits.{name}" for name in fields], [f"limits.{name}" for name in _LIMITS[kind]])
+    known = (*_LIMITS[kind], *_MAY_HAVE)
+    check_fields([f"limits.{name}" for name in fields], [f"limits.{name}" for name in known])
     _check_complete(fields, _LIMITS[kind], "limits.")
     speeds = fields["speed"]
     if not isinstance(speeds, list) or len(speeds) != 2:
@@ -208,7 +218,8 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
             f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most] with most above the least, "
             f"from {_LEAST:g}, both within {_FASTEST:g}"
         )
-    others = {name: _ranged(fields[name], name, "limits.") for name in _LIMITS[kind] if name != "speed"}
+    given = [name for name in known if name != "speed" and fields.get(name) is not None]
+    others = {name: _ranged(fields[name], name, "limits.") for name in given}
     return {"speed": (least, most), **others}
 
 

@@ -60,9 +60,22 @@ def limits_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Limit]
     if not vehicle.first_order:  # which may change as much as speed and steering themselves allow
         most = vehicle.max_acceleration
         found += [Limit("Acceleration", controls[:, 0], -most, most, "m/s^2"), second]
+    if math.isfinite(vehicle.max_lateral_acceleration):
+        most = vehicle.max_lateral_acceleration
+        found.append(
+            Limit("Lateral acceleration", states[:, 3] * _turns(states, vehicle), -most, most, "m/s^2")
+        )
     for i, (hitch, trailer) in enumerate(zip(states[:, 5:].T, trailers_of(vehicle), strict=True)):
         found.append(Limit(f"Hitch {i + 1}", hitch, -trailer.max_hitch, trailer.max_hitch, "rad"))
     return found
+
+
+def _turns(states: Floats, vehicle: Vehicle) -> Floats:
+    """How fast the leading body turns (rad/s) in each of ``states [T, S]``."""
+    if isinstance(vehicle, DifferentialDrive):
+        return states[:, 4]
+    turns: Floats = states[:, 3] * np.tan(states[:, 4]) / vehicle.wheelbase
+    return turns
 
 
 def simulate_again(start: Floats, controls: Floats, vehicle: Vehicle) -> Floats:

@@ -15,7 +15,7 @@ from planners.world.arrays import Bounds, Box, Floats, Integers
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import State, is_folded, load, swept_bodies
+from planners.world.vehicles.dynamics import State, is_folded, load, slides, swept_bodies
 from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -212,8 +212,12 @@ def point_is_free(x: float, y: float, scene: Scene) -> bool:
 
 @inlined
 def state_is_free(state: State, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether the vehicle is not folded, nor about to be between two states, and its bodies are free."""
-    return not is_folded(state, vehicle) and bodies_are_free(state, vehicle, scene)
+    """Whether the vehicle neither folds, in the state or next to it, nor slides, and its bodies are free."""
+    return (
+        not is_folded(state, vehicle)
+        and not slides(state, vehicle)
+        and bodies_are_free(state, vehicle, scene)
+    )
 
 
 @inlined

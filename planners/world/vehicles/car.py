@@ -11,7 +11,7 @@ from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
 from planners.world.vehicles import interface
-from planners.world.vehicles.interface import State, kept_within, leading_body
+from planners.world.vehicles.interface import State, fastest_with, kept_within, leading_body
 from planners.world.vehicles.vehicle import Car, CarWithTrailers
 
 CarLike = Car | CarWithTrailers
@@ -90,11 +90,38 @@ def _turn_limit(vehicle: CarLike) -> float:
     return vehicle.max_steering
 
 
-@implements(interface.admissible, Car, CarWithTrailers)
-def _admissible(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
+@implements(interface.within_ranges, Car, CarWithTrailers)
+def _within_ranges(state: State, first: float, second: float, vehicle: CarLike) -> tuple[float, float]:
     return (
         kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
         kept_within(second, state[4], -vehicle.max_steering, vehicle.max_steering, vehicle.dt),
+    )
+
+
+@implements(interface.lateral_acceleration, Car, CarWithTrailers)
+def _lateral_acceleration(state: State, vehicle: CarLike) -> tuple[float, float, float]:
+    speed = state[3]
+    slope = tan(state[4])
+    per_slope = speed * speed / vehicle.wheelbase
+    return per_slope * slope, 2.0 * speed * slope / vehicle.wheelbase, per_slope * (1.0 + slope * slope)
+
+
+@implements(interface.fastest_with, Car, CarWithTrailers)
+def _fastest_with(turn: float, most: float, vehicle: CarLike) -> float:
+    slope = abs(tan(turn))
+    return math.sqrt(most * vehicle.wheelbase / slope) if slope > 0.0 else math.inf
+
+
+@implements(interface.sharpest_at, Car, CarWithTrailers)
+def _sharpest_at(speed: float, most: float, vehicle: CarLike) -> float:
+    return math.atan(most * vehicle.wheelbase / (speed * speed))
+
+
+@implements(interface.turning_speed, Car, CarWithTrailers)
+def _turning_speed(vehicle: CarLike) -> float:
+    return min(
+        vehicle.max_speed,
+        math.sqrt(vehicle.max_lateral_acceleration * vehicle.wheelbase / tan(vehicle.max_steering)),
     )
 
 
@@ -106,7 +133,10 @@ def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
 
 @implements(interface.tightest_bend, Car, CarWithTrailers)
 def _tightest_bend(speed: float, vehicle: CarLike) -> float:
-    return vehicle.max_steering
+    most = vehicle.max_lateral_acceleration * vehicle.wheelbase
+    if most >= speed * speed * tan(vehicle.max_steering):
+        return vehicle.max_steering
+    return math.atan(most / (speed * speed))
 
 
 @implements(interface.bend_rate, Car, CarWithTrailers)
@@ -127,6 +157,14 @@ def _bend_with(curvature: float, vehicle: CarLike) -> float:
 @implements(interface.bend_of, Car, CarWithTrailers)
 def _bend_of(state: State, vehicle: CarLike) -> float:
     return state[4]
+
+
+@implements(interface.top_speed, Car, CarWithTrailers)
+def _top_speed(gear: float, bend: float, vehicle: CarLike) -> float:
+    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    if vehicle.max_lateral_acceleration < math.inf:
+        top = min(top, fastest_with(bend, vehicle.max_lateral_acceleration, vehicle))
+    return top
 
 
 @implements(interface.turn_in, Car, CarWithTrailers)

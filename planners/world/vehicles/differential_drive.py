@@ -5,6 +5,8 @@ Of first order, as a unicycle, v and w are constant in a step: v + h a and w + h
 
 from __future__ import annotations
 
+import math
+
 from planners.world.arrays import Box, Floats
 from planners.world.jit import implements
 from planners.world.trigonometry import angle_to, wrapped
@@ -53,12 +55,34 @@ def _turn_limit(vehicle: DifferentialDrive) -> float:
     return vehicle.max_turn_rate
 
 
-@implements(interface.admissible, DifferentialDrive)
-def _admissible(state: State, first: float, second: float, vehicle: DifferentialDrive) -> tuple[float, float]:
+@implements(interface.within_ranges, DifferentialDrive)
+def _within_ranges(
+    state: State, first: float, second: float, vehicle: DifferentialDrive
+) -> tuple[float, float]:
     return (
         kept_within(first, state[3], vehicle.min_speed, vehicle.max_speed, vehicle.dt),
         kept_within(second, state[4], -vehicle.max_turn_rate, vehicle.max_turn_rate, vehicle.dt),
     )
+
+
+@implements(interface.lateral_acceleration, DifferentialDrive)
+def _lateral_acceleration(state: State, vehicle: DifferentialDrive) -> tuple[float, float, float]:
+    return state[3] * state[4], state[4], state[3]
+
+
+@implements(interface.fastest_with, DifferentialDrive)
+def _fastest_with(turn: float, most: float, vehicle: DifferentialDrive) -> float:
+    return most / abs(turn) if turn != 0.0 else math.inf
+
+
+@implements(interface.sharpest_at, DifferentialDrive)
+def _sharpest_at(speed: float, most: float, vehicle: DifferentialDrive) -> float:
+    return most / speed
+
+
+@implements(interface.turning_speed, DifferentialDrive)
+def _turning_speed(vehicle: DifferentialDrive) -> float:
+    return min(vehicle.max_speed, vehicle.max_lateral_acceleration / vehicle.max_turn_rate)
 
 
 @implements(interface.turn_error, DifferentialDrive)
@@ -68,7 +92,7 @@ def _turn_error(state: State, x: float, y: float, vehicle: DifferentialDrive) ->
 
 @implements(interface.tightest_bend, DifferentialDrive)
 def _tightest_bend(speed: float, vehicle: DifferentialDrive) -> float:
-    return vehicle.max_turn_rate / speed
+    return min(vehicle.max_turn_rate, vehicle.max_lateral_acceleration / speed) / speed
 
 
 @implements(interface.bend_rate, DifferentialDrive)
@@ -89,6 +113,15 @@ def _bend_with(curvature: float, vehicle: DifferentialDrive) -> float:
 @implements(interface.bend_of, DifferentialDrive)
 def _bend_of(state: State, vehicle: DifferentialDrive) -> float:
     return state[4] / max(abs(state[3]), SLOW) * (1.0 if state[3] >= 0.0 else -1.0)
+
+
+@implements(interface.top_speed, DifferentialDrive)
+def _top_speed(gear: float, bend: float, vehicle: DifferentialDrive) -> float:
+    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
+    if bend != 0.0:
+        bent = abs(bend)
+        top = min(top, vehicle.max_turn_rate / bent, math.sqrt(vehicle.max_lateral_acceleration / bent))
+    return top
 
 
 @implements(interface.turn_in, DifferentialDrive)

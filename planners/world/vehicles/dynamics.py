@@ -15,14 +15,20 @@ from planners.world.vehicles.interface import bend_with as bend_with
 from planners.world.vehicles.interface import control_limits as control_limits
 from planners.world.vehicles.interface import curvature_of as curvature_of
 from planners.world.vehicles.interface import is_folded as is_folded
+from planners.world.vehicles.interface import lateral_acceleration as lateral_acceleration
 from planners.world.vehicles.interface import load as load
+from planners.world.vehicles.interface import sharpest_at as sharpest_at
+from planners.world.vehicles.interface import slides as slides
 from planners.world.vehicles.interface import step as step
 from planners.world.vehicles.interface import store as store
 from planners.world.vehicles.interface import swept_bodies as swept_bodies
 from planners.world.vehicles.interface import tightest_bend as tightest_bend
+from planners.world.vehicles.interface import top_speed as top_speed
 from planners.world.vehicles.interface import turn_error as turn_error
 from planners.world.vehicles.interface import turn_in as turn_in
 from planners.world.vehicles.interface import turn_limit as turn_limit
+from planners.world.vehicles.interface import turning_speed as turning_speed
+from planners.world.vehicles.interface import within_ranges as within_ranges
 from planners.world.vehicles.vehicle import Vehicle
 
 KINDS = (car, differential_drive, car_with_trailers)  # imported so that their kernels are registered

@@ -9,6 +9,7 @@ entry in ``dynamics.KINDS``, and a branch wherever the kind of a vehicle is aske
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from planners.world.arrays import Box, Floats
@@ -19,6 +20,7 @@ from planners.world.vehicles.vehicle import About, Vehicle
 State = tuple[float, ...]
 
 SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority rounds up
+ROUNDING: Final = 1e-9  # share of the largest lateral acceleration that is left, so that none is above it
 
 unseen(About)
 
@@ -55,11 +57,35 @@ def turn_limit(vehicle: Vehicle) -> float:
 
 
 @by_vehicle
-def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
-    """The controls, reduced if a step with them would lead past a limit of the state.
+def within_ranges(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
+    """The controls, reduced if a step with them would lead out of the range of speed or of turning.
 
     So no state of a plan is ever clamped, and the margins of ``swept_bodies`` hold.
     """
+    raise NotImplementedError
+
+
+@by_vehicle
+def lateral_acceleration(state: State, vehicle: Vehicle) -> tuple[float, float, float]:
+    """Of the reference point, m/s^2, left positive; and how it changes with speed and the fifth variable."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def fastest_with(turn: float, most: float, vehicle: Vehicle) -> float:
+    """The speed (m/s) at which a fifth variable causes the lateral acceleration ``most`` (m/s^2)."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def sharpest_at(speed: float, most: float, vehicle: Vehicle) -> float:
+    """The fifth variable that causes the lateral acceleration ``most`` (m/s^2) at a speed above 0 (m/s)."""
+    raise NotImplementedError
+
+
+@by_vehicle
+def turning_speed(vehicle: Vehicle) -> float:
+    """The largest speed (m/s) at which its lateral acceleration lets a vehicle steer or turn fully."""
     raise NotImplementedError
 
 
@@ -103,6 +129,12 @@ def bend_of(state: State, vehicle: Vehicle) -> float:
 
 
 @by_vehicle
+def top_speed(gear: float, bend: float, vehicle: Vehicle) -> float:
+    """The largest speed (m/s) in a gear and a bend; 0 or less if the vehicle does not drive in that gear."""
+    raise NotImplementedError
+
+
+@by_vehicle
 def turn_in(bend: float, speed: float, vehicle: Vehicle) -> float:
     """The fifth variable of a state that drives a bend at this speed (m/s)."""
     raise NotImplementedError
@@ -129,6 +161,42 @@ def swept_bodies(state: State, vehicle: Vehicle) -> tuple[Box, ...]:
 def kept_within(control: float, value: float, low: float, high: float, dt: float) -> float:
     """The control, reduced if ``dt`` seconds of it would lead ``value`` out of ``low`` to ``high``."""
     return min(max(control, (low - value) / dt), (high - value) / dt)
+
+
+@inlined
+def slides(state: State, vehicle: Vehicle) -> bool:
+    """Whether a state needs more lateral acceleration than the vehicle allows."""
+    most = vehicle.max_lateral_acceleration
+    return most < math.inf and abs(lateral_acceleration(state, vehicle)[0]) > most
+
+
+@inlined
+def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
+    """The controls, reduced if a step with them would lead past a limit of the state.
+
+    Where the way asked for bends too sharply for the speed, it brakes; what braking leaves too sharp, it
+    turns less.
+    """
+    first, second = within_ranges(state, first, second, vehicle)
+    most = vehicle.max_lateral_acceleration
+    if most == math.inf:
+        return first, second
+    most *= 1.0 - ROUNDING
+    h = vehicle.dt
+    speed = state[3] + h * first
+    turn = state[4] + h * second
+    fastest = fastest_with(turn, most, vehicle)
+    if abs(speed) <= fastest:
+        return first, second
+    least = abs(state[3]) - h * control_limits(vehicle)[0]
+    if speed > 0.0:
+        speed = max(fastest, least, vehicle.min_speed)
+    else:
+        speed = min(-max(fastest, least), vehicle.max_speed)
+    if abs(speed) > fastest:
+        sharpest = sharpest_at(abs(speed), most, vehicle)
+        turn = min(max(turn, -sharpest), sharpest)
+    return (speed - state[3]) / h, (turn - state[4]) / h
 
 
 @inlined

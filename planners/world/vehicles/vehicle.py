@@ -13,6 +13,7 @@ Lengths here are canonical: ``scale`` says how many metres of the world outside 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 Corners = tuple[tuple[float, float], ...]  # of a convex polygon, metres around the reference point
@@ -37,6 +38,7 @@ class Car(NamedTuple):
     max_speed: float = 4.0  # m/s
     max_acceleration: float = 2.0  # m/s^2
     max_steering_rate: float = 1.6  # rad/s
+    max_lateral_acceleration: float = math.inf  # m/s^2
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0
@@ -54,6 +56,7 @@ class DifferentialDrive(NamedTuple):
     max_acceleration: float = 2.0  # m/s^2
     max_turn_rate: float = 2.0  # rad/s
     max_turn_acceleration: float = 4.0  # rad/s^2
+    max_lateral_acceleration: float = math.inf  # m/s^2
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0
@@ -87,6 +90,7 @@ class CarWithTrailers(NamedTuple):
     max_speed: float = 4.0  # m/s
     max_acceleration: float = 2.0  # m/s^2
     max_steering_rate: float = 1.6  # rad/s
+    max_lateral_acceleration: float = math.inf  # m/s^2
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0

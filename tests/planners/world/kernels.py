@@ -30,3 +30,13 @@ def state_is_free(state, vehicle, scene):
 @jit
 def is_folded(state, vehicle):
     return dynamics.is_folded(state, vehicle)
+
+
+@jit
+def lateral_acceleration(state, vehicle):
+    return dynamics.lateral_acceleration(state, vehicle)
+
+
+@jit
+def slides(state, vehicle):
+    return dynamics.slides(state, vehicle)

@@ -70,3 +70,13 @@ def test_a_heading_without_a_tolerance_is_told_by_both_its_names() -> None:
     assert fault is not None
     assert "goal_tolerance" in fault
     assert "heading_tolerance" in fault
+
+
+@given(speed=st.floats(0.1, 4.0), steering=st.floats(-0.69, 0.69), most=st.floats(0.1, 5.0))
+def test_a_start_that_slides_is_told(speed: float, steering: float, most: float) -> None:
+    needed = speed**2 * abs(np.tan(steering)) / CAR.wheelbase
+    vehicle = CAR._replace(max_lateral_acceleration=most)
+    fault = problem_fault(replace(problem_of([]), start_motion=(speed, steering)), vehicle)
+    assert (fault is not None) == (needed > most)
+    if fault is not None:
+        assert f"{needed:g} m/s^2 sideways; the vehicle allows {most:g}" in fault

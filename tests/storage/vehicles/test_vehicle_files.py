@@ -73,6 +73,17 @@ def test_a_file_a_vehicle_and_its_text_say_the_same(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
+def test_lateral_acceleration_may_be_limited_whatever_the_kind_and_the_scale(path: Path) -> None:
+    limits = yaml.safe_load(path.read_text())
+    limits["limits"]["lateral_acceleration"] = 1.7
+    vehicle = vehicle_of(limits)
+    assert vehicle.scale * vehicle.max_lateral_acceleration == pytest.approx(1.7)
+    definition = definition_of(vehicle)
+    assert definition["limits"]["lateral_acceleration"] == pytest.approx(1.7)
+    assert vehicle_of(json.loads(json.dumps(definition))) == vehicle
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
 def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
     """So that nothing is compiled for it: Numba compiles for types, and settings are values."""
     vehicle = read_vehicle(path)
@@ -107,6 +118,8 @@ def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
         ("limits.steering", 40, "limits.steering 40 rad; expected 0.001 to 1.4"),
         ("limits.steering", None, "lacks the field limits.steering"),
         ("limits.stering", 0.5, "nearest is 'limits.steering'"),
+        ("limits.lateral_acceleration", 0, "limits.lateral_acceleration 0 m/s^2; expected 0.001 to 100"),
+        ("limits.lateral_aceleration", 2, "nearest is 'limits.lateral_acceleration'"),
         ("limits.turn_rate", 0.5, "limit turn_rate, which the kind car does not have"),
         ("body", [], "body []; expected a list of 1 to 16"),
         ("body", [[[0, 0], [1, 0]]], "3 to 32 corners"),

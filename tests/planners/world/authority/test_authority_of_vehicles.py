@@ -54,6 +54,19 @@ def test_a_good_plan_has_no_faults(vehicle: Vehicle) -> None:
 
 
 @each_vehicle
+def test_a_plan_that_slides_is_found(vehicle: Vehicle) -> None:
+    """Turning a little at full speed, which all of these vehicles may without a limit."""
+    controls = straight(vehicle).controls
+    controls[60:62, 1] = 1.0, -1.0
+    plan = driven(vehicle, controls)
+    motion = exact_motion(plan.states[61], np.zeros(2), np.array([1e-4]), vehicle)[0]
+    needed = abs(plan.states[61, 3] * (motion[2] - plan.states[61, 2]) / 1e-4)
+    for allowed, kind in ((1.01 * needed, []), (0.99 * needed, ["Lateral acceleration"])):
+        limited = vehicle._replace(max_lateral_acceleration=allowed)
+        assert [each for each in kinds(faults(EMPTY, plan, limited)) if each.startswith("Lateral")] == kind
+
+
+@each_vehicle
 def test_a_plan_of_another_vehicle_is_found(vehicle: Vehicle) -> None:
     """Were it only because the car, turning its wheels, follows other equations than the others."""
     for other in VEHICLES.values():
