@@ -36,7 +36,7 @@ from planners.world.geometry.occupancy import window_of
 from planners.world.goal import RADIUS, asks_for_more, goal_of, place
 from planners.world.jit import lean
 from planners.world.problem import Plan, start_state
-from planners.world.vehicles.dynamics import load, store
+from planners.world.vehicles.dynamics import load, store, turning_speed
 from planners.world.vehicles.vehicle import Vehicle, state_size
 from planners.world.view import View
 
@@ -154,7 +154,8 @@ def sub_plan_answer(
     metres = max(math.hypot(x, y) - float(near[RADIUS]), 0.0)
     turn = 1.0 - math.cos(math.atan2(y, x) - start[2])
     seconds = seconds_for(metres, turn, start[3], vehicle)
-    full_turn_s = 2.0 * math.pi * radius_at(vehicle.max_speed, vehicle) / vehicle.max_speed
+    turning = turning_speed(vehicle)
+    full_turn_s = 2.0 * math.pi * radius_at(turning, vehicle) / turning
     within = (PATIENT * seconds + full_turn_s) / vehicle.dt
     steps = stored = int(recall_one(subs, 0, near, within, LOOKS_AT_ONCE, offset, cells, r, vehicle, scene))
     view.lap("check")

@@ -25,9 +25,10 @@ from planners.world.vehicles.dynamics import (
     load,
     step,
     tightest_bend,
+    top_speed,
     turn_in,
 )
-from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size
+from planners.world.vehicles.vehicle import Vehicle, state_size
 
 STANDS: Final = 1e-6  # metres of a step: less is no drive
 GENTLE: Final = 0.95  # of all limits: the rest is left for closing gaps
@@ -121,9 +122,7 @@ def _driven(run: Run, vehicle: Vehicle, begin: float, end: float) -> Floats:
     fastest = vehicle.max_speed if run.gear > 0.0 else -vehicle.min_speed
     acceleration, rate = (GENTLE * each for each in _limits(fastest, vehicle))
     ways = np.diff(run.metres)
-    tops = np.full(len(run.metres), GENTLE * fastest)
-    if isinstance(vehicle, DifferentialDrive):
-        tops = np.minimum(tops, GENTLE * vehicle.max_turn_rate / np.maximum(np.abs(run.bends), 1e-9))
+    tops = GENTLE * np.array([top_speed(run.gear, bend, vehicle) for bend in run.bends])
     slopes = np.abs(np.diff(run.bends)) / ways
     steered = rate / np.maximum(slopes, 1e-9)
     tops[1:] = np.minimum(tops[1:], steered)

@@ -16,6 +16,7 @@ from planners.world.vehicles.interface import SPARE
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
 
 SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
+SHY_OF_SLIDING = 0.999  # share of the largest lateral acceleration, for the same reason as ...
 SHY_OF_JACK_KNIFE = 1e-3  # rad: the solver may pass a limit by its tolerance
 
 
@@ -79,6 +80,13 @@ def limits_of(vehicle: Vehicle) -> VehicleLimits:
         -controls,
         controls,
     )
+
+
+def lateral_acceleration_of(vehicle: Vehicle) -> ca.Function:
+    """Return a function from state ``[S]`` to the lateral acceleration of the reference point, in m/s^2."""
+    state = ca.SX.sym("state", state_size(vehicle))
+    turn = slopes(state, ca.SX.zeros(2), vehicle)[2]
+    return ca.Function("lateral_acceleration", [state], [state[3] * turn])
 
 
 def discs_of(vehicle: Vehicle, a_body: int) -> ca.Function:

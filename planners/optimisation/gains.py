@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
-from planners.world.vehicles.dynamics import State, admissible, control_limits, load
+from planners.world.vehicles.dynamics import State, admissible, control_limits, load, within_ranges
 from planners.world.vehicles.interface import kept_within
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -208,12 +208,19 @@ def in_time(
 
     Who is too fast for that already gets a control beyond its limit, which ``shorten`` does not accept.
     """
+    first, second = _can_end(state, first, second, left, last, vehicle)
+    return admissible(state, first, second, vehicle)
+
+
+@inlined
+def _can_end(
+    state: State, first: float, second: float, left: int, last: LastMotion, vehicle: Vehicle
+) -> tuple[float, float]:
     limit_0, limit_1 = control_limits(vehicle)
     change = left * limit_0 * vehicle.dt
     first = kept_within(first, state[3], last.least_speed - change, last.most_speed + change, vehicle.dt)
     most_turn = last.most_turn + left * limit_1 * vehicle.dt
-    second = kept_within(second, state[4], -most_turn, most_turn, vehicle.dt)
-    return admissible(state, first, second, vehicle)
+    return first, kept_within(second, state[4], -most_turn, most_turn, vehicle.dt)
 
 
 @lean
@@ -237,8 +244,10 @@ def _feed_back(
     """
     most_0, most_1 = control_limits(vehicle)
     here = load(model.states, k, vehicle)
-    high_0, high_1 = in_time(here, most_0, most_1, steps - k - 1, last, vehicle)
-    low_0, low_1 = in_time(here, -most_0, -most_1, steps - k - 1, last, vehicle)
+    high_0, high_1 = _can_end(here, most_0, most_1, steps - k - 1, last, vehicle)
+    high_0, high_1 = within_ranges(here, high_0, high_1, vehicle)
+    low_0, low_1 = _can_end(here, -most_0, -most_1, steps - k - 1, last, vehicle)
+    low_0, low_1 = within_ranges(here, low_0, low_1, vehicle)
     u = model.controls[k, 0]
     w = model.controls[k, 1]
     low = (low_0 - u, low_1 - w)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,12 +12,13 @@ from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length
-from planners.world.vehicles.dynamics import load, step, swept_bodies
+from planners.world.vehicles.dynamics import lateral_acceleration, load, step, swept_bodies
 from planners.world.vehicles.vehicle import Vehicle
 
 NEVER: Final = 1 << 30  # steps, of a drive that there is not
 NUDGE: Final = 1e-6  # of a state or control, for derivatives by differences
 HITCH: Final = Barrier(0.01, 0.2, 0.0, 0.0, 0.01)  # radians instead of metres
+SLIDING: Final = Barrier(0.002, 0.1, 0.0, 0.0, 0.002)  # shares of the largest lateral acceleration
 
 
 class Model(NamedTuple):
@@ -100,7 +102,7 @@ def differentiate_steps(model: Model, steps: int, vehicle: Vehicle) -> None:
 def nearness_cost(
     states: Floats, i: int, vehicle: Vehicle, scene: Scene, circles: Floats, barrier: Barrier
 ) -> float:
-    """What nearness to obstacles, bounds and jack-knifing costs in state ``i`` of ``states [T, S]``."""
+    """What nearness to obstacles, bounds, folding and sliding costs in state ``i`` of ``states [T, S]``."""
     cost = 0.0
     bounds = scene.bounds
     far = barrier.range_m + barrier.margin_m
@@ -121,6 +123,10 @@ def nearness_cost(
                 cost += nearness(gap - barrier.margin_m, barrier)[0]
     for h in range(5, states.shape[1]):
         cost += nearness(barrier.widest_hitch - abs(states[i, h]), HITCH)[0]
+    most = vehicle.max_lateral_acceleration
+    if most < math.inf:
+        lateral = lateral_acceleration(load(states, i, vehicle), vehicle)[0]
+        cost += nearness(1.0 - abs(lateral) / most, SLIDING)[0]
     return cost
 
 
@@ -171,6 +177,19 @@ def differentiate_nearness(
         _, slope, bend = nearness(barrier.widest_hitch - abs(hitch), HITCH)
         gradient[h] += -slope if hitch > 0.0 else slope
         curvature[h, h] += bend
+    most = vehicle.max_lateral_acceleration
+    if most < math.inf:
+        lateral, by_speed, by_turn = lateral_acceleration(load(states, i, vehicle), vehicle)
+        _, slope, bend = nearness(1.0 - abs(lateral) / most, SLIDING)
+        per_unit = (-1.0 if lateral > 0.0 else 1.0) / most  # how the share that is left changes
+        by_speed *= per_unit
+        by_turn *= per_unit
+        gradient[3] += slope * by_speed
+        gradient[4] += slope * by_turn
+        curvature[3, 3] += bend * by_speed * by_speed
+        curvature[3, 4] += bend * by_speed * by_turn
+        curvature[4, 3] += bend * by_speed * by_turn
+        curvature[4, 4] += bend * by_turn * by_turn
 
 
 @inlined

@@ -19,7 +19,13 @@ import casadi as ca
 import numpy as np
 
 from planners.optimisation.clearance_field import ClearanceField
-from planners.optimisation.equations import discs_of, limits_of, step_of
+from planners.optimisation.equations import (
+    SHY_OF_SLIDING,
+    discs_of,
+    lateral_acceleration_of,
+    limits_of,
+    step_of,
+)
 from planners.world.arrays import Floats
 from planners.world.goal import must_not_turn
 from planners.world.problem import Arrival, Plan, Problem, start_state
@@ -113,6 +119,9 @@ def transcribe(
     gaps = _gaps(field, vehicle, discs).map(steps)(states[:, 1:])  # the start is fixed
     miss = ca.sumsqr(states[:2, -1] - ca.DM(problem.goal))
     facing = [] if heading is None else [ca.cos(states[2, -1] - heading)]
+    sideways, most = ca.MX(0, 1), SHY_OF_SLIDING * vehicle.max_lateral_acceleration
+    if math.isfinite(most):
+        sideways = lateral_acceleration_of(vehicle).map(steps)(states[:, 1:]).T
 
     limits = limits_of(vehicle)
     effort = ca.sumsqr(controls / ca.repmat(ca.DM(limits.control_high), 1, steps))
@@ -140,14 +149,15 @@ def transcribe(
     reach = max(problem.goal_radius - GOAL_SHY_M, 0.0)
     aligned = [math.cos(GOAL_SHY * arrival.heading_tolerance)] * len(facing)
     dynamics, clear = np.zeros(size * steps), np.full(gaps.numel(), margin_m)
+    slid = np.full(sideways.numel(), most)
     return Programme(
         steps,
         size,
-        {"x": unknowns, "f": cost, "g": ca.veccat(following - states[:, 1:], gaps, miss, *facing)},
+        {"x": unknowns, "f": cost, "g": ca.veccat(following - states[:, 1:], gaps, miss, sideways, *facing)},
         all_low,
         all_high,
-        np.concatenate((dynamics, clear, [-np.inf], aligned)),
-        np.concatenate((dynamics, np.full_like(clear, np.inf), [reach**2], [np.inf] * len(facing))),
+        np.concatenate((dynamics, clear, [-np.inf], -slid, aligned)),
+        np.concatenate((dynamics, np.full_like(clear, np.inf), [reach**2], slid, [np.inf] * len(facing))),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.problem import Plan
-from planners.world.vehicles.dynamics import control_limits
+from planners.world.vehicles.dynamics import bend_of, control_limits, top_speed
 from planners.world.vehicles.vehicle import Vehicle
 
 STANDING_M: Final = 1e-6  # a step that is shorter stands still
@@ -56,6 +56,11 @@ def _run(
     reached = np.sqrt(speeds[0] ** 2 + 2.0 * acceleration * at)
     left = np.sqrt(speeds[1] ** 2 + 2.0 * acceleration * (along[-1] - at))
     speed = np.minimum(np.minimum(reached, left), top)
+    if math.isfinite(vehicle.max_lateral_acceleration):
+        bends = np.interp(at, along, [bend_of(tuple(state), vehicle) for state in way])
+        slow = SPEED_SHARE * np.array([top_speed(1.0, bend, vehicle) for bend in bends])
+        squares = slow**2 + 2.0 * acceleration * np.abs(at[:, np.newaxis] - at)
+        speed = np.minimum(speed, np.sqrt(squares.min(axis=1)))
     seconds = np.concatenate([[0.0], np.cumsum(np.diff(at) / (0.5 * (speed[1:] + speed[:-1])))])
     steps = max(math.ceil(seconds[-1] / vehicle.dt), LEAST_STEPS)
     times = np.linspace(0.0, seconds[-1], steps + 1)[1:]

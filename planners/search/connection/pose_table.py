@@ -17,6 +17,7 @@ from planners.world.arrays import Floats, Pose
 from planners.world.goal import goal_of_pose
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos, wrapped
+from planners.world.vehicles.dynamics import turning_speed
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
 REACH_M: Final = 12.0  # the table's half width; farther away the rest is driven straight on, at full speed
@@ -38,8 +39,11 @@ def _fill(table: Floats, c: Connection, goal: Floats, vehicle: Vehicle) -> None:
                 c.states[0, 1] = row * CELL - REACH_M
                 c.states[0, 2] = h * (2.0 * math.pi / HEADINGS)
                 least = NEVER
-                for i in range(list_connections(c, goal, vehicle.max_speed, vehicle)):
-                    least = min(least, c.seconds[i])
+                for top in (vehicle.max_speed, turning_speed(vehicle)):
+                    for i in range(list_connections(c, goal, top, vehicle)):
+                        least = min(least, c.seconds[i])
+                    if turning_speed(vehicle) == vehicle.max_speed:
+                        break
                 table[h, row, column] = least
 
 

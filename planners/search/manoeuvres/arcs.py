@@ -8,21 +8,12 @@ from typing import Final
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined
-from planners.world.vehicles.dynamics import State, curvature_of, step, store, turn_in, turn_limit
+from planners.world.vehicles.dynamics import State, step, store, top_speed, turn_in
 from planners.world.vehicles.vehicle import Vehicle
 
 STRIDE: Final = 0.02  # of the first body's length: from one look at obstacles to the next
 COARSE: Final = 4.0  # strides of a step where nothing is looked at, or roughly
 FINE: Final = 5  # so many looks where the way is narrow, each with a smaller margin
-
-
-@inlined
-def top_speed(gear: float, bend: float, vehicle: Vehicle) -> float:
-    """The largest speed (m/s) in a gear and a bend; 0 or less if the vehicle does not drive in that gear."""
-    top = vehicle.max_speed if gear > 0.0 else -vehicle.min_speed
-    if bend != 0.0 and turn_in(bend, 0.0, vehicle) != bend:  # it turns by driving
-        top = min(top, turn_limit(vehicle) / abs(curvature_of(bend, vehicle)))
-    return float(top)
 
 
 @inlined

@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.connection.connect import connect
 from planners.search.connection.connection import Connection, allocate_connection, radius_at
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of, top_speed
+from planners.search.manoeuvres.arcs import FINE, at_pace, stride_of
 from planners.search.manoeuvres.joining import Join, allocate_join
 from planners.search.manoeuvres.near_meetings import NearMeetings, allocate_near_meetings
 from planners.search.manoeuvres.pace import fill_pace
@@ -27,7 +27,9 @@ from planners.world.vehicles.dynamics import (
     step,
     store,
     tightest_bend,
+    top_speed,
     turn_in,
+    turning_speed,
 )
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -237,11 +239,13 @@ def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
     c = drive.connection
     at = drive.counts[0]
     at_rest = vehicle.first_order or drive.states[at, 3] == 0.0
+    turning = turning_speed(vehicle)
+    radius = radius_at(turning, vehicle)
     for share in (1.0, 0.5, 0.25):
         for k in range(c.states.shape[1]):
             c.states[0, k] = drive.states[at, k]
-        top = share * vehicle.max_speed
-        if radius_at(top, vehicle) != radius_at(vehicle.max_speed, vehicle):
+        top = share * turning
+        if radius_at(top, vehicle) != radius:
             break
         steps = connect(c, word, drive.target, top, vehicle)
         if steps > 0 and connection_is_free(drive, steps, vehicle, scene):
@@ -250,8 +254,7 @@ def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
             return False
     if not at_rest:
         return False
-    radius = radius_at(vehicle.max_speed, vehicle)
-    bend = tightest_bend(vehicle.max_speed, vehicle)
+    bend = tightest_bend(turning, vehicle)
     for k in range(PARTS):
         metres = radius * c.words[word, PARTS + k]
         if abs(metres) > SMALLEST:

@@ -18,7 +18,15 @@ from planners.world.arrays import Floats, Indices
 from planners.world.geometry.collision import Scene
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
-from planners.world.vehicles.dynamics import State, bend_with, load, step, store, tightest_bend
+from planners.world.vehicles.dynamics import (
+    State,
+    bend_with,
+    load,
+    step,
+    store,
+    tightest_bend,
+    turning_speed,
+)
 from planners.world.vehicles.vehicle import Vehicle
 
 MOST_ARCS: Final = 2 * PARTS
@@ -136,7 +144,7 @@ def close(start: Floats, join: Join, vehicle: Vehicle) -> bool:
     columns = 2 * join.counts[ARCS]
     for column in range(columns):
         join.free[column] = 1.0
-    limit = tightest_bend(vehicle.max_speed, vehicle)
+    limit = tightest_bend(turning_speed(vehicle), vehicle)
     size = vehicle.front + vehicle.rear
     _ends(start, join, -1, vehicle)
     for _ in range(ROUNDS):

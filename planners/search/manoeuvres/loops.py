@@ -25,7 +25,15 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, bodies_are_free, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
-from planners.world.vehicles.dynamics import bend_with, curvature_of, load, step, store, tightest_bend
+from planners.world.vehicles.dynamics import (
+    bend_with,
+    curvature_of,
+    load,
+    step,
+    store,
+    tightest_bend,
+    turning_speed,
+)
 from planners.world.vehicles.vehicle import Vehicle, trailers_of
 
 NEAR_BY: Final = 1.5  # lengths of the whole train: if the goal is farther away, the way there turns anyway
@@ -163,7 +171,7 @@ def list_loops(
     loops.blocked.fill(1.0)
     loops.trial.fill(0.0)
     goal = (end[0, 0], end[0, 1], end[0, 2])
-    tight = TIGHTEST / curvature_of(tightest_bend(vehicle.max_speed, vehicle), vehicle)
+    tight = TIGHTEST / curvature_of(tightest_bend(turning_speed(vehicle), vehicle), vehicle)
     for width in WIDTHS:
         radius = tight + width * max(wide - tight, 0.0)
         for back in BACKS:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 from planners.search.connection.pose_table import seconds_from
-from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of, top_speed
+from planners.search.manoeuvres.arcs import FINE, STRIDE, at_pace, stride_along, stride_of
 from planners.search.manoeuvres.driving import Drive
 from planners.search.manoeuvres.endings import add_endings
 from planners.search.manoeuvres.meeting import meet
@@ -34,7 +34,7 @@ from planners.world.arrays import Floats, Integers, Pose
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
-from planners.world.vehicles.dynamics import State, load, tightest_bend
+from planners.world.vehicles.dynamics import State, load, tightest_bend, top_speed, turning_speed
 from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
@@ -58,7 +58,7 @@ class Outward(NamedTuple):
 @lean
 def room_around(states: Floats, outgoing: Vehicle, vehicle: Vehicle, scene: Scene) -> float:
     """The share that is free of the tightest arcs and straight ways from ``states[0]``, a length each."""
-    bend_limit = tightest_bend(vehicle.max_speed, vehicle)
+    bend_limit = tightest_bend(turning_speed(vehicle), vehicle)
     free = 0.0
     whole = 0.0
     for gear in GEARS:
@@ -167,7 +167,7 @@ def open_node(
 
     ``outgoing`` is the vehicle as it drives out of the root: out of a goal its speeds have other signs.
     """
-    bend_limit = tightest_bend(vehicle.max_speed, vehicle)
+    bend_limit = tightest_bend(turning_speed(vehicle), vehicle)
     size = vehicle.front + vehicle.rear
     for gear in GEARS:
         stride = settings.stride * stride_of(gear, outgoing)

@@ -25,7 +25,7 @@ from planners.search.structures.cost_to_go import CostToGo
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene
 from planners.world.jit import lean
-from planners.world.vehicles.dynamics import load, tightest_bend
+from planners.world.vehicles.dynamics import load, tightest_bend, turning_speed
 from planners.world.vehicles.vehicle import Vehicle
 
 OUTLINES: Final = 12  # words of a shot that are glanced at
@@ -93,7 +93,7 @@ def _shoot_alone(
     target[0] = tree.states[node, 0]
     target[1] = tree.states[node, 1]
     target[3] = tree.states[node, 2]
-    top = vehicle.max_speed
+    top = turning_speed(vehicle)
     radius = radius_at(top, vehicle)
     count = list_connections(c, target, top, vehicle)
     for _ in range(OUTLINES):

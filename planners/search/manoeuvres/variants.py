@@ -7,6 +7,7 @@ from typing import Final
 
 from planners.search.connection.connection import radius_at
 from planners.world.arrays import Floats
+from planners.world.vehicles.dynamics import turning_speed
 from planners.world.vehicles.vehicle import (
     Car,
     CarWithTrailers,
@@ -69,7 +70,7 @@ def word_radius(vehicle: Vehicle) -> float:
     for trailer in reversed(trailers_of(vehicle)):
         length = trailer.hitch_length
         least = max(length / math.sin(HITCH_SHARE * trailer.max_hitch), math.hypot(least, length))
-    return max(least, float(radius_at(vehicle.max_speed, vehicle)))
+    return max(least, float(radius_at(turning_speed(vehicle), vehicle)))
 
 
 def without_trailers(vehicle: Vehicle) -> Vehicle:

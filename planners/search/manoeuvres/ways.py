@@ -11,11 +11,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.connection.words import PARTS
-from planners.search.manoeuvres.arcs import top_speed
 from planners.search.manoeuvres.pose_tree import PoseTree, seconds_of_run
 from planners.world.arrays import Floats, Indices
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
+from planners.world.vehicles.dynamics import top_speed
 from planners.world.vehicles.vehicle import Vehicle
 
 KEPT: Final = 2  # drives of different kinds: with a third, drives are no shorter by what it takes

@@ -20,7 +20,15 @@ from planners.world.goal import asks_for_more, metres_to, reaches
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
 from planners.world.trigonometry import gap_to_segment, length
-from planners.world.vehicles.dynamics import State, admissible, control_limits, load, step, store
+from planners.world.vehicles.dynamics import (
+    State,
+    admissible,
+    control_limits,
+    load,
+    step,
+    store,
+    turning_speed,
+)
 from planners.world.vehicles.vehicle import Vehicle
 
 # indices into Tree.counts
@@ -249,7 +257,7 @@ def extend(
             connects
             and i % CONNECT_EVERY == CONNECT_EVERY - 1
             and metres_to(state, goal) < CONNECT_M
-            and connect_to_goal(tree, parent, goal, vehicle.max_speed, vehicle, scene)
+            and connect_to_goal(tree, parent, goal, turning_speed(vehicle), vehicle, scene)
         ):
             break
         arrived = length(x - target_x, y - target_y) < settings.arrival_m

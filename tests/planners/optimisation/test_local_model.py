@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,12 +25,13 @@ BARRIER = Barrier(0.01, 6.0, 0.0, 1.2, 0.003)  # of a range that always sees som
 STEP = 1e-5
 
 
+@pytest.mark.parametrize("lateral", [math.inf, 0.5])
 @pytest.mark.parametrize("name", ["car", "car-first-order", "differential-drive", "car-2-trailers"])
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10**6))
-def test_the_gradient_of_nearness_is_that_of_its_cost(name: str, seed: int) -> None:
+def test_the_gradient_of_nearness_is_that_of_its_cost(name: str, lateral: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    vehicle, size = KINDS[name], state_size(KINDS[name])
+    vehicle, size = KINDS[name]._replace(max_lateral_acceleration=lateral), state_size(KINDS[name])
     model, circles = allocate_model(1, size), circles_around(SCENE)
     state = rng.uniform(0.2, 0.9, size) * rng.choice([-1.0, 1.0], size)
     state[:3] = *rng.uniform(2.0, 9.0, 2), rng.uniform(-3.0, 3.0)
