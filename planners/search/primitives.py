@@ -38,15 +38,14 @@ from planners.world.vehicles.dynamics import (
     admissible,
     control_limits,
     load,
-    sharpest_at,
     step,
     turn_limit,
+    turn_limit_at,
 )
 from planners.world.vehicles.vehicle import Vehicle
 
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
 GRIPPING: Final = 0.6  # of ``SHARES``: that which is as sharp as lateral acceleration allows at the speed
-SLOWEST: Final = 1e-3  # m/s, at which lateral acceleration is asked for
 SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
 CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
 
@@ -75,10 +74,9 @@ def controls_of(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -
     turn = min(max(lattice.turn * side, -1.0), 1.0) * turn_limit(vehicle)
     limit_1, limit_2 = control_limits(vehicle)
     control_1 = min(max((speed - state[3]) / vehicle.dt, -limit_1), limit_1)
-    most = vehicle.max_lateral_acceleration
-    if most < math.inf and abs(side) < 1.0:  # only who turns fully brakes for it
-        speed = max(abs(state[3] + vehicle.dt * control_1), SLOWEST)
-        turn *= min(sharpest_at(speed, most, vehicle) / turn_limit(vehicle), 1.0) / GRIPPING
+    if vehicle.max_lateral_acceleration < math.inf and abs(side) < 1.0:  # only who turns fully brakes for it
+        sharpest = turn_limit_at(state[3] + vehicle.dt * control_1, vehicle)
+        turn *= sharpest / turn_limit(vehicle) / GRIPPING
     control_2 = min(max((turn - state[4]) / vehicle.dt, -limit_2), limit_2)
     return admissible(state, control_1, control_2, vehicle)
 

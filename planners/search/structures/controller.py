@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import Final, NamedTuple
 
 from planners.world.jit import inlined
-from planners.world.vehicles.dynamics import State, control_limits, turn_error
+from planners.world.vehicles.dynamics import State, control_limits, turn_error, turn_limit_at
+from planners.world.vehicles.interface import kept_within
 from planners.world.vehicles.vehicle import Vehicle
 
 Errors = tuple[float, float, float, float]  # of heading (rad) and speed (m/s) a step ago; their integrals
 NO_ERRORS = (0.0, 0.0, 0.0, 0.0)
+WIDE: Final = 0.6  # radians: for smaller errors a vehicle does not brake so that it may turn more sharply
 
 
 class Gains(NamedTuple):
@@ -46,4 +49,8 @@ def steer(
     slow_sum += slow * vehicle.dt
     control_1 = _pid(slow, last_slow, slow_sum, gains, vehicle.dt, limit_1)
     control_2 = _pid(turn, last_turn, turn_sum, gains, vehicle.dt, limit_2)
+    if vehicle.max_lateral_acceleration < math.inf and abs(turn) < WIDE:
+        sharpest = turn_limit_at(state[3] + vehicle.dt * control_1, vehicle)
+        within = kept_within(control_2, state[4], -sharpest, sharpest, vehicle.dt)
+        control_2 = min(max(within, -limit_2), limit_2)
     return control_1, control_2, (turn, slow, turn_sum, slow_sum)

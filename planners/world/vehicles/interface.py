@@ -171,6 +171,15 @@ def slides(state: State, vehicle: Vehicle) -> bool:
 
 
 @inlined
+def turn_limit_at(speed: float, vehicle: Vehicle) -> float:
+    """The largest absolute value of the fifth variable of a state at a speed (m/s)."""
+    most = vehicle.max_lateral_acceleration
+    if most == math.inf or speed == 0.0:
+        return turn_limit(vehicle)
+    return min(turn_limit(vehicle), sharpest_at(abs(speed), most, vehicle))
+
+
+@inlined
 def admissible(state: State, first: float, second: float, vehicle: Vehicle) -> tuple[float, float]:
     """The controls, reduced if a step with them would lead past a limit of the state.
 

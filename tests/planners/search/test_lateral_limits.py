@@ -66,7 +66,9 @@ def test_a_train_turns_round_within_its_limit() -> None:
 def test_a_robot_that_is_at_its_limit_goes_on_from_there() -> None:
     speed = 3.9
     steering = float(np.arctan(MOST * CAR.wheelbase / speed**2))
-    problem = replace(problem_of([box(20.0, 0.0, 0.0, 2.0, 2.0)]), start_motion=(speed, steering * (1.0 - 1e-9)))
+    problem = replace(
+        problem_of([box(20.0, 0.0, 0.0, 2.0, 2.0)]), start_motion=(speed, steering * (1.0 - 1e-9))
+    )
     driven(problem, "lattice", limited(CAR))
 
 
