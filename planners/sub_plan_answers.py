@@ -108,7 +108,7 @@ def _close(
         if row < 0 or row >= best:
             continue
         for half in range(2):
-            top = vehicle.max_speed * (0.5 if half else 1.0)
+            top = turning_speed(vehicle) * (0.5 if half else 1.0)
             more = _closed_from(row, best - row, goal, top, c, r, vehicle, scene)
             if more > 0:
                 best = row + more

@@ -41,6 +41,7 @@ from planners.world.vehicles.dynamics import (
     step,
     turn_limit,
     turn_limit_at,
+    turning_speed,
 )
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -163,7 +164,7 @@ def grow_lattice(
     """Drive the primitive with the least estimate until solved, nothing is left, or ``until`` expansions."""
     counts = tree.counts
     connects = asks_for_more(goal)
-    top = lattice.pace * vehicle.max_speed
+    top = lattice.pace * turning_speed(vehicle)
     if connects and trees.connect_to_goal(tree, 0, goal, top, vehicle, scene):
         return
     while (

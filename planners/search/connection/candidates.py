@@ -11,6 +11,7 @@ from planners.search.connection.connection import (
     last_speed,
     lead_of,
     radius_at,
+    straight_speed,
 )
 from planners.search.connection.dubins import list_forward_words
 from planners.search.connection.profile import run_seconds
@@ -29,6 +30,7 @@ def word_seconds(
 ) -> float:
     """How long a word takes to drive, in seconds; infinite if the speed at its ends does not allow it."""
     acceleration = control_limits(vehicle)[0]
+    straight = straight_speed(top, vehicle)
     seconds = 0.0
     k = 0
     while k < PARTS and word[PARTS + k] == 0.0:
@@ -37,8 +39,11 @@ def word_seconds(
     while k < PARTS:
         gear = 1.0 if word[PARTS + k] > 0.0 else -1.0
         metres = 0.0
+        bent = 0.0
         while k < PARTS and gear * word[PARTS + k] >= 0.0:
             metres += radius * abs(word[PARTS + k])
+            if word[k] != 0.0:
+                bent += radius * abs(word[PARTS + k])
             k += 1
         begin = 0.0
         if first:
@@ -47,7 +52,7 @@ def word_seconds(
             if begin < 0.0:
                 return math.inf
         first = False
-        fastest = top if gear > 0.0 else min(top, -vehicle.min_speed)
+        fastest = straight if gear > 0.0 else min(straight, -vehicle.min_speed)
         if fastest <= 0.0:
             return math.inf
         end = 0.0
@@ -56,6 +61,9 @@ def word_seconds(
             if end < 0.0:
                 return math.inf
         seconds += run_seconds(metres, begin, end, fastest, acceleration)
+        if top < fastest:  # about as much longer as arcs take
+            reached = min(fastest, math.sqrt(acceleration * metres + 0.5 * (begin * begin + end * end)))
+            seconds += bent * max(1.0 / top - 1.0 / reached, 0.0)
     return seconds
 
 

@@ -10,11 +10,19 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from planners.search.connection.connection import Connection, heading_at, last_speed, lead_of, radius_at
+from planners.search.connection.connection import (
+    Connection,
+    braking_seconds,
+    heading_at,
+    last_speed,
+    lead_of,
+    radius_at,
+    straight_speed,
+)
 from planners.search.connection.profile import fill_run
 from planners.search.connection.words import PARTS
 from planners.world.arrays import Floats
-from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, X, Y, reaches
+from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, SLACK, X, Y, reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length, sincos, wrapped
 from planners.world.vehicles.dynamics import (
@@ -35,6 +43,8 @@ CORRECTIONS: Final = 8  # of a word's lengths
 CLOSER: Final = 0.7  # a correction that leaves more of the error than this may happen once
 AIMED: Final = 0.5  # the share of the tolerances that the end is brought within
 DAMPING: Final = 1e-6  # metres squared
+SHORT: Final = 0.1  # radii between two places of a run at which its limits are known ...
+FEWEST: Final = 16  # ... if these are not fewer
 SMALLEST_BEND: Final = 1e-9  # 1/m
 GEAR, BEND, LENGTH, TIME = range(4)  # rows of ``Connection.parts``
 
@@ -56,10 +66,81 @@ def _take(c: Connection, number: int, radius: float, bend: float) -> int:
 
 
 @lean
+def _list_limits(
+    c: Connection, k: int, metres: float, lead: float, top: float, straight: float, least: float
+) -> int:
+    """Fill in how fast a run is driven at each place, ``top`` in arcs; returns how many follow the first.
+
+    The run is ``metres`` long and begins with ``lead`` metres before part ``k``. ``least`` is that of places.
+    """
+    count = min(max(math.ceil(metres / (SHORT * abs(least))), FEWEST), c.limits.shape[0] - 1)
+    part = k
+    end = lead + c.parts[LENGTH, k]
+    for i in range(count + 1):
+        way = i * metres / count
+        while way > end and part + 1 < PARTS:
+            part += 1
+            end += c.parts[LENGTH, part]
+        bends = way >= lead and c.parts[BEND, part] != 0.0
+        c.limits[i] = min(top, straight) if bends else straight
+    return count
+
+
+@lean
+def _fill_limited(
+    c: Connection,
+    at: int,
+    count: int,
+    metres: float,
+    begin: float,
+    last: float,
+    gear: float,
+    most: float,
+    dt: float,
+) -> int:
+    """Fill in the speeds of a run from ``c.speeds[at]`` on, as quick as ``c.limits`` allow.
+
+    It leads about as far as asked: what is missing is corrected with the rest. Returns where it ends; -1 if
+    it cannot be driven, or room is missing.
+    """
+    limits = c.limits
+    stride = metres / count
+    limits[0] = begin
+    limits[count] = last
+    for i in range(count - 1, -1, -1):
+        limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * most * stride))
+    if limits[0] < begin - SLACK:
+        return -1
+    seconds = 0.0
+    for i in range(1, count + 1):
+        limits[i] = min(limits[i], math.sqrt(limits[i - 1] * limits[i - 1] + 2.0 * most * stride))
+        seconds += 2.0 * stride / (limits[i - 1] + limits[i])
+    steps = max(math.ceil(seconds / dt), 1)
+    if limits[count] < last - SLACK or at + steps >= c.speeds.shape[0]:
+        return -1
+    share = seconds / (steps * dt)
+    c.speeds[at] = gear * begin
+    i = 0
+    gone = 0.0
+    cell = 2.0 * stride / (limits[0] + limits[1])
+    for k in range(1, steps):
+        time = k * dt * share
+        while gone + cell < time and i < count - 1:
+            gone += cell
+            i += 1
+            cell = 2.0 * stride / (limits[i] + limits[i + 1])
+        within = min((time - gone) / cell, 1.0)
+        c.speeds[at + k] = gear * share * (limits[i] + within * (limits[i + 1] - limits[i]))
+    c.speeds[at + steps] = gear * last
+    return at + steps
+
+
+@lean
 def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: float, vehicle: Vehicle) -> int:
     """Fill in the speeds, and when each part ends. Returns the steps; -1 if that is not possible."""
     acceleration, turning = control_limits(vehicle)
     parts = c.parts
+    straight = straight_speed(top, vehicle)
     at = 0
     k = 0
     while k < count:
@@ -70,7 +151,7 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
         while end < count and parts[GEAR, end] == gear:
             metres += parts[LENGTH, end]
             end += 1
-        fastest = top if gear > 0.0 else min(top, -vehicle.min_speed)
+        fastest = straight if gear > 0.0 else min(straight, -vehicle.min_speed)
         begin = gear * c.states[0, 3] if k == 0 else 0.0
         last = 0.0
         if end == count:
@@ -78,7 +159,14 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
                 curvature = abs(curvature_of(parts[BEND, count - 1], vehicle))
                 acceleration = min(acceleration, turning / max(curvature, SMALLEST_BEND))
             last = min(last_speed(gear, begin, metres, goal, acceleration), fastest)
-        after = fill_run(c.speeds, at, metres, begin, last, fastest, gear, acceleration, vehicle.dt)
+        if fastest > top and metres > 0.0:
+            before = lead if k == 0 else 0.0
+            if end == count and parts[BEND, end - 1] != 0.0:
+                last = min(last, top)
+            places = _list_limits(c, k, metres, before, top, fastest, radius_at(top, vehicle))
+            after = _fill_limited(c, at, places, metres, begin, last, gear, acceleration, vehicle.dt)
+        else:
+            after = fill_run(c.speeds, at, metres, begin, last, fastest, gear, acceleration, vehicle.dt)
         if after < 0:
             return -1
         mark = lead if k == 0 else 0.0
@@ -99,9 +187,11 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
 
 
 @lean
-def _drive(c: Connection, count: int, steps: int, rate: float, vehicle: Vehicle) -> None:
+def _drive(c: Connection, count: int, steps: int, top: float, vehicle: Vehicle) -> None:
     """Drive ``c.parts`` with the speeds of ``c.speeds``."""
     state = load(c.states, 0, vehicle)
+    rate = bend_rate(top, vehicle)
+    braking = braking_seconds(state, top, vehicle)
     begin = bend_of(state, vehicle)
     bend = begin
     for k in range(count):
@@ -109,7 +199,7 @@ def _drive(c: Connection, count: int, steps: int, rate: float, vehicle: Vehicle)
         bend = c.parts[BEND, k]
         seconds = max(abs(change) / rate, 1e-6)
         c.ramps[k, 0] = change
-        c.ramps[k, 1] = 0.5 * seconds if k == 0 else max(c.parts[TIME, k - 1], 0.5 * seconds)
+        c.ramps[k, 1] = braking + 0.5 * seconds if k == 0 else max(c.parts[TIME, k - 1], 0.5 * seconds)
         c.ramps[k, 2] = 1.0 / seconds
     limit_1, limit_2 = control_limits(vehicle)
     for i in range(steps):
@@ -184,7 +274,7 @@ def _drive_word(
         steps = _plan_speeds(c, count, lead, goal, top, vehicle)
         if steps < 1:
             return 0
-        _drive(c, count, steps, bend_rate(top, vehicle), vehicle)
+        _drive(c, count, steps, top, vehicle)
         dx = goal[X] - c.states[steps, 0]
         dy = goal[Y] - c.states[steps, 1]
         turn = wrapped(heading - c.states[steps, 2])

@@ -12,10 +12,19 @@ from planners.world.arrays import Floats
 from planners.world.goal import HEADING, HEADING_TOLERANCE, LEAST_SPEED, MOST_SPEED, X, Y
 from planners.world.jit import inlined
 from planners.world.trigonometry import angle_to, sincos
-from planners.world.vehicles.dynamics import State, bend_of, bend_rate, curvature_of, tightest_bend
+from planners.world.vehicles.dynamics import (
+    State,
+    bend_of,
+    bend_rate,
+    control_limits,
+    curvature_of,
+    tightest_bend,
+    turning_speed,
+)
 from planners.world.vehicles.vehicle import Vehicle
 
 STEPS: Final = 1000  # of a drive at most
+PLACES: Final = 512  # of a run at most, at which its limits are known
 SHY: Final = 1e-6  # m/s within the speeds that are asked for, because of rounding
 ANY: Final = 10.0  # radians; a tolerance above this means any heading
 
@@ -26,6 +35,7 @@ class Connection(NamedTuple):
     states: Floats  # [STEPS + 1, S]
     controls: Floats  # [STEPS, 2]
     speeds: Floats  # [STEPS + 1] m/s
+    limits: Floats  # [PLACES + 1] m/s, at places equally far from one another along a run
     words: Floats  # [MOST_WORDS, 2 PARTS]
     seconds: Floats  # [MOST_WORDS] an estimate for each word
     parts: Floats  # [4, PARTS] gear (1 or -1); bend; length in metres; when the part ends, in seconds
@@ -39,6 +49,7 @@ def allocate_connection(state_size: int) -> Connection:
         np.zeros((STEPS + 1, state_size)),
         np.zeros((STEPS, 2)),
         np.zeros(STEPS + 1),
+        np.zeros(PLACES + 1),
         np.zeros((MOST_WORDS, 2 * PARTS)),
         np.zeros(MOST_WORDS),
         np.zeros((4, PARTS)),
@@ -58,8 +69,31 @@ def last_speed(gear: float, first: float, metres: float, goal: Floats, accelerat
 
 @inlined
 def lead_of(state: State, top: float, vehicle: Vehicle) -> float:
-    """How far a state drives, in metres, before it bends as the first part does, on average."""
-    return 0.5 * abs(state[3]) * tightest_bend(top, vehicle) / bend_rate(top, vehicle)
+    """How far a state drives, in metres, before it bends as the first part does, on average.
+
+    Who is too fast to bend so brakes first.
+    """
+    speed = abs(state[3])
+    braking = braking_seconds(state, top, vehicle)
+    slowed = speed - control_limits(vehicle)[0] * braking
+    bending = 0.5 * slowed * tightest_bend(top, vehicle) / bend_rate(top, vehicle)
+    return bending + 0.5 * (speed + slowed) * braking
+
+
+@inlined
+def braking_seconds(state: State, top: float, vehicle: Vehicle) -> float:
+    """How long a state brakes, in seconds, before lateral acceleration lets it drive arcs of words."""
+    if vehicle.max_lateral_acceleration == math.inf:
+        return 0.0
+    return max(abs(state[3]) - top, 0.0) / control_limits(vehicle)[0]
+
+
+@inlined
+def straight_speed(top: float, vehicle: Vehicle) -> float:
+    """The largest speed (m/s) on the straight parts of a word whose arcs are driven with up to ``top``."""
+    if vehicle.max_lateral_acceleration == math.inf:
+        return top
+    return min(top * vehicle.max_speed / turning_speed(vehicle), vehicle.max_speed)
 
 
 @inlined

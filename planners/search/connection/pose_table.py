@@ -39,11 +39,8 @@ def _fill(table: Floats, c: Connection, goal: Floats, vehicle: Vehicle) -> None:
                 c.states[0, 1] = row * CELL - REACH_M
                 c.states[0, 2] = h * (2.0 * math.pi / HEADINGS)
                 least = NEVER
-                for top in (vehicle.max_speed, turning_speed(vehicle)):
-                    for i in range(list_connections(c, goal, top, vehicle)):
-                        least = min(least, c.seconds[i])
-                    if turning_speed(vehicle) == vehicle.max_speed:
-                        break
+                for i in range(list_connections(c, goal, turning_speed(vehicle), vehicle)):
+                    least = min(least, c.seconds[i])
                 table[h, row, column] = least
 
 

@@ -131,7 +131,9 @@ def _shoot_with_trailers(
     radius = known.radius
     count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
     for i in range(count):
-        c.seconds[i] = word_seconds(c.words[i], radius, 0.0, 0.0, drive.target, vehicle.max_speed, vehicle)
+        c.seconds[i] = word_seconds(
+            c.words[i], radius, 0.0, 0.0, drive.target, turning_speed(vehicle), vehicle
+        )
     for k in range(tree.states.shape[1]):
         drive.join.ends[1, k] = tree.states[node, k]
     closed = 0

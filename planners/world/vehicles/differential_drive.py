@@ -82,7 +82,8 @@ def _sharpest_at(speed: float, most: float, vehicle: DifferentialDrive) -> float
 
 @implements(interface.turning_speed, DifferentialDrive)
 def _turning_speed(vehicle: DifferentialDrive) -> float:
-    return min(vehicle.max_speed, vehicle.max_lateral_acceleration / vehicle.max_turn_rate)
+    radius = vehicle.max_speed / vehicle.max_turn_rate
+    return min(vehicle.max_speed, math.sqrt(vehicle.max_lateral_acceleration * radius))
 
 
 @implements(interface.turn_error, DifferentialDrive)

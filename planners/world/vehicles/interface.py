@@ -85,7 +85,7 @@ def sharpest_at(speed: float, most: float, vehicle: Vehicle) -> float:
 
 @by_vehicle
 def turning_speed(vehicle: Vehicle) -> float:
-    """The largest speed (m/s) at which its lateral acceleration lets a vehicle steer or turn fully."""
+    """The largest speed (m/s) at which a vehicle may bend as it could at full speed without a limit."""
     raise NotImplementedError
 
 

@@ -13,10 +13,16 @@ from planners.search.connection.connection import allocate_connection
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of, simulate_again
 from planners.world.goal import MOST_TURN, SLACK, goal_of_pose, reaches
-from planners.world.vehicles.dynamics import load
+from planners.world.vehicles.dynamics import load, turning_speed
 from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle, state_size
 
-VEHICLES = {"car": CAR, "differential-drive": DIFFERENTIAL_DRIVE, "car-2-trailers": CAR_2_TRAILERS}
+VEHICLES = {
+    "car": CAR,
+    "differential-drive": DIFFERENTIAL_DRIVE,
+    "car-2-trailers": CAR_2_TRAILERS,
+    "limited-car": CAR._replace(max_lateral_acceleration=1.0),
+    "limited-differential-drive": DIFFERENTIAL_DRIVE._replace(max_lateral_acceleration=1.0),
+}
 Drive = tuple[Floats, Floats]
 
 
@@ -41,6 +47,8 @@ def questions(vehicle: Vehicle, moving: bool, count: int, seed: int) -> list[tup
         start[2] = rng.uniform(-math.pi, math.pi)
         if moving:
             start[3:5] = rng.uniform(0.0, 4.0), rng.uniform(-0.5, 0.5)
+            if math.isfinite(vehicle.max_lateral_acceleration):
+                start[4] = 0.0
         bearing, metres = rng.uniform(-math.pi, math.pi), rng.uniform(2.0, 30.0)
         heading = rng.uniform(-math.pi, math.pi)
         drawn.append((start, goal_of_pose(metres * math.cos(bearing), metres * math.sin(bearing), heading)))
@@ -55,7 +63,7 @@ def test_connections_are_lawful_drives_to_the_goal_and_nearly_always_there(
     asked = questions(vehicle, moving, 60, 1)
     closed = 0
     for start, goal in asked:
-        drive = connection(start, goal, vehicle, vehicle.max_speed)
+        drive = connection(start, goal, vehicle, turning_speed(vehicle))
         if drive is None:
             continue
         closed += 1
@@ -67,6 +75,20 @@ def test_connections_are_lawful_drives_to_the_goal_and_nearly_always_there(
                 assert limit.values.min() >= limit.low - 1e-9
                 assert limit.values.max() <= limit.high + 1e-9
     assert closed >= (0.8 if moving else 0.98) * len(asked)
+
+
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE], ids=["car", "differential-drive"])
+def test_only_arcs_are_driven_slowly_where_lateral_acceleration_is_limited(vehicle: Vehicle) -> None:
+    """Nothing is gained by braking where the way is straight."""
+    limited = vehicle._replace(max_lateral_acceleration=0.5)
+    turning = turning_speed(limited)
+    assert turning < 0.3 * vehicle.max_speed
+    start, goal = np.zeros(state_size(limited)), goal_of_pose(30.0, 10.0, 0.5 * math.pi)
+    drive = connection(start, goal, limited, turning)
+    assert drive is not None
+    speeds, lateral = drive[0][:, 3], limits_of(*drive, limited)[-1].values
+    assert speeds.max() > 0.9 * vehicle.max_speed
+    assert np.abs(lateral).max() > 0.9 * limited.max_lateral_acceleration
 
 
 @pytest.mark.parametrize("turn_acceleration", [0.5, 1.5, 4.0])
