@@ -42,7 +42,7 @@ SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
-RESTING: Final = 1e-6  # m/s and radians
+RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
 AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
 
