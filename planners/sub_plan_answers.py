@@ -25,7 +25,13 @@ from planners.memory.library.recalling import (
 from planners.optimisation.descent import arrives
 from planners.search.connection.candidates import list_connections, next_word
 from planners.search.connection.connect import connect
-from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
+from planners.search.connection.connection import (
+    Connection,
+    allocate_connection,
+    first_pose,
+    radius_at,
+    word_speed,
+)
 from planners.search.connection.outline import outline_is_free
 from planners.search.guides.detour import is_long, seconds_for
 from planners.search.structures.cost_to_go import allocate_cost_to_go, fill_cost_to_go
@@ -108,7 +114,7 @@ def _close(
         if row < 0 or row >= best:
             continue
         for half in range(2):
-            top = turning_speed(vehicle) * (0.5 if half else 1.0)
+            top = word_speed(0.5 if half else 1.0, goal, vehicle)
             more = _closed_from(row, best - row, goal, top, c, r, vehicle, scene)
             if more > 0:
                 best = row + more

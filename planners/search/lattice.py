@@ -32,6 +32,7 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
 from planners.world.problem import Plan, is_canonical
+from planners.world.vehicles.dynamics import turning_speed
 
 
 class LatticeSettings(NamedTuple):
@@ -48,7 +49,7 @@ class LatticeSettings(NamedTuple):
         Lattice(speeds=4),
         Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
         Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
-    )  # the same for problems that are not canonical; where a speed is asked at the goal, without two
+    )  # the same for problems that are not canonical; where a speed is asked at the goal, without the first
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
@@ -62,6 +63,7 @@ class LatticeSettings(NamedTuple):
 
 
 NOWHERE = place(0.0, 0.0, 0.0)
+TRIALS = 4  # for which expansions are left in any case
 KEPT_BACK = 0.5  # share of the seconds left that looking for further drives leaves for what follows
 
 
@@ -75,7 +77,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     levels = settings.levels if is_canonical(query.problem) else settings.anywhere
     arrival = query.problem.arrival
     if arrival is not None and arrival.most_speed < vehicle.max_speed:
-        levels = levels[2:]
+        levels = levels[1:]
     level, tried = levels[0], 0
     ahead = Ahead(go, NOWHERE, NO_TABLE)
     manoeuvring: Manoeuvring | None = None
@@ -180,7 +182,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     explore_from = 2 if levels == settings.anywhere else 1  # RRT does not reverse, as the second level does
     outcome = attempt(
         replace(query, beside=beside),
-        settings.restart_after,
+        _restart_after(query, settings),
         prepare,
         grow,
         explore,
@@ -211,6 +213,13 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         collision_checks=outcome.collision_checks + joining.checks,
         joined=joined,
     )
+
+
+def _restart_after(query: Query, settings: LatticeSettings) -> int:
+    """Expansions of a trial: more where a vehicle brakes for bends, as a way then has more states."""
+    slower = query.vehicle.max_speed / turning_speed(query.vehicle)
+    most = max(query.limits.expansions // TRIALS, settings.restart_after)
+    return min(int(slower * slower * settings.restart_after), most)
 
 
 def _differing(kept: list[Other], plan: Plan) -> list[Other]:

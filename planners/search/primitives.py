@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final, NamedTuple
 
+from planners.search.connection.connection import word_speed
 from planners.search.query import Query
 from planners.search.structures import tree as trees
 from planners.search.structures.cost_to_go import (
@@ -46,7 +47,7 @@ from planners.world.vehicles.dynamics import (
 from planners.world.vehicles.vehicle import Vehicle
 
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
-GRIPPING: Final = 0.6  # of ``SHARES``: that which is as sharp as lateral acceleration allows at the speed
+GRIPPING: Final = 0.6  # of ``SHARES``: the one that is as sharp as lateral acceleration allows at the speed
 SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
 CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
 
@@ -77,7 +78,7 @@ def controls_of(state: State, motion: int, lattice: Lattice, vehicle: Vehicle) -
     control_1 = min(max((speed - state[3]) / vehicle.dt, -limit_1), limit_1)
     if vehicle.max_lateral_acceleration < math.inf and abs(side) < 1.0:  # only who turns fully brakes for it
         sharpest = turn_limit_at(state[3] + vehicle.dt * control_1, vehicle)
-        turn *= sharpest / turn_limit(vehicle) / GRIPPING
+        turn *= min(sharpest / (GRIPPING * turn_limit(vehicle)), 1.0)
     control_2 = min(max((turn - state[4]) / vehicle.dt, -limit_2), limit_2)
     return admissible(state, control_1, control_2, vehicle)
 
@@ -164,7 +165,7 @@ def grow_lattice(
     """Drive the primitive with the least estimate until solved, nothing is left, or ``until`` expansions."""
     counts = tree.counts
     connects = asks_for_more(goal)
-    top = lattice.pace * turning_speed(vehicle)
+    top = word_speed(lattice.pace, goal, vehicle)
     if connects and trees.connect_to_goal(tree, 0, goal, top, vehicle, scene):
         return
     while (
@@ -201,7 +202,8 @@ def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
     while faster * paces < vehicle.max_speed - vehicle.min_speed and paces < 8:
         paces += 1
     steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
-    return lattice._replace(steps=max(steps, 1), paces=paces)
+    slower = vehicle.max_speed / turning_speed(vehicle)  # times as long as at full speed a turn takes
+    return lattice._replace(steps=max(steps, 1), paces=paces, heading_s=slower * lattice.heading_s)
 
 
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:

@@ -17,7 +17,7 @@ from planners.world.geometry.collision import (
 )
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Problem, start_state
-from planners.world.vehicles.dynamics import lateral_acceleration, load, swept_bodies, turn_limit
+from planners.world.vehicles.dynamics import lateral_acceleration, load, slides, swept_bodies, turn_limit
 from planners.world.vehicles.reach import REACH_M
 from planners.world.vehicles.vehicle import CAR, Vehicle, name_of, state_names, trailers_of
 
@@ -73,22 +73,21 @@ def _start_fault(problem: Problem, vehicle: Vehicle) -> str | None:
             size = problem.scale if name == "speed" else 1.0
             allowed = f"{size * low:g} to {size * high:g}"
             return f"start {name} is {size * value:g} {unit}; the vehicle allows {allowed}"
-    most, lateral = (
-        vehicle.max_lateral_acceleration,
-        _lateral(start_state(problem, vehicle)[np.newaxis], vehicle),
-    )
-    if lateral > most:
+    slid, lateral = _sliding(start_state(problem, vehicle)[np.newaxis], vehicle)
+    if slid:
+        most = problem.scale * vehicle.max_lateral_acceleration
         return (
-            f"start motion needs {problem.scale * lateral:g} m/s^2 sideways; the vehicle allows "
-            f"{problem.scale * most:g}; start more slowly, or straighter"
+            f"start motion needs {problem.scale * lateral:g} m/s^2 sideways; the vehicle's "
+            f"lateral_acceleration is {most:g}; start more slowly, or straighter"
         )
     return None
 
 
 @jit
-def _lateral(start: Floats, vehicle: Vehicle) -> float:
-    """The lateral acceleration (m/s^2), without its sign, in ``start [1, S]``."""
-    return abs(lateral_acceleration(load(start, 0, vehicle), vehicle)[0])
+def _sliding(start: Floats, vehicle: Vehicle) -> tuple[bool, float]:
+    """Whether ``start [1, S]`` slides, and its lateral acceleration (m/s^2) without its sign."""
+    state = load(start, 0, vehicle)
+    return slides(state, vehicle), abs(lateral_acceleration(state, vehicle)[0])
 
 
 def _arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> str | None:

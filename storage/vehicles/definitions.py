@@ -218,7 +218,7 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
             f"has limits.speed [{least:g}, {most:g}] m/s; expected [least, most] with most above the least, "
             f"from {_LEAST:g}, both within {_FASTEST:g}"
         )
-    given = [name for name in known if name != "speed" and fields.get(name) is not None]
+    given = [name for name in known if name != "speed" and name in fields]
     others = {name: _ranged(fields[name], name, "limits.") for name in given}
     return {"speed": (least, most), **others}
 

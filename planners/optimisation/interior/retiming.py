@@ -58,7 +58,9 @@ def _run(
     speed = np.minimum(np.minimum(reached, left), top)
     if math.isfinite(vehicle.max_lateral_acceleration):
         bends = np.interp(at, along, [bend_of(tuple(state), vehicle) for state in way])
-        slow = SPEED_SHARE * np.array([top_speed(1.0, bend, vehicle) for bend in bends])
+        slow = SPEED_SHARE * np.array(
+            [top_speed(-1.0 if backwards else 1.0, bend, vehicle) for bend in bends]
+        )
         squares = slow**2 + 2.0 * acceleration * np.abs(at[:, np.newaxis] - at)
         speed = np.minimum(speed, np.sqrt(squares.min(axis=1)))
     seconds = np.concatenate([[0.0], np.cumsum(np.diff(at) / (0.5 * (speed[1:] + speed[:-1])))])

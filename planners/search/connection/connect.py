@@ -67,13 +67,13 @@ def _take(c: Connection, number: int, radius: float, bend: float) -> int:
 
 @lean
 def _list_limits(
-    c: Connection, k: int, metres: float, lead: float, top: float, straight: float, least: float
+    c: Connection, k: int, metres: float, lead: float, top: float, straight: float, radius: float
 ) -> int:
     """Fill in how fast a run is driven at each place, ``top`` in arcs; returns how many follow the first.
 
-    The run is ``metres`` long and begins with ``lead`` metres before part ``k``. ``least`` is that of places.
+    The run is ``metres`` long and begins with ``lead`` metres before part ``k``; arcs have this ``radius``.
     """
-    count = min(max(math.ceil(metres / (SHORT * abs(least))), FEWEST), c.limits.shape[0] - 1)
+    count = min(max(math.ceil(metres / (SHORT * radius)), FEWEST), c.limits.shape[0] - 1)
     part = k
     end = lead + c.parts[LENGTH, k]
     for i in range(count + 1):
@@ -115,9 +115,9 @@ def _fill_limited(
     for i in range(1, count + 1):
         limits[i] = min(limits[i], math.sqrt(limits[i - 1] * limits[i - 1] + 2.0 * most * stride))
         seconds += 2.0 * stride / (limits[i - 1] + limits[i])
-    steps = max(math.ceil(seconds / dt), 1)
-    if limits[count] < last - SLACK or at + steps >= c.speeds.shape[0]:
+    if limits[count] < last - SLACK or not seconds < dt * (c.speeds.shape[0] - 2 - at):
         return -1
+    steps = max(math.ceil(seconds / dt), 1)
     share = seconds / (steps * dt)
     c.speeds[at] = gear * begin
     i = 0
@@ -160,10 +160,11 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
                 acceleration = min(acceleration, turning / max(curvature, SMALLEST_BEND))
             last = min(last_speed(gear, begin, metres, goal, acceleration), fastest)
         if fastest > top and metres > 0.0:
-            before = lead if k == 0 else 0.0
             if end == count and parts[BEND, end - 1] != 0.0:
                 last = min(last, top)
-            places = _list_limits(c, k, metres, before, top, fastest, radius_at(top, vehicle))
+            places = _list_limits(
+                c, k, metres, lead if k == 0 else 0.0, top, fastest, radius_at(top, vehicle)
+            )
             after = _fill_limited(c, at, places, metres, begin, last, gear, acceleration, vehicle.dt)
         else:
             after = fill_run(c.speeds, at, metres, begin, last, fastest, gear, acceleration, vehicle.dt)

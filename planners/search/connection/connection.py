@@ -83,7 +83,7 @@ def lead_of(state: State, top: float, vehicle: Vehicle) -> float:
 @inlined
 def braking_seconds(state: State, top: float, vehicle: Vehicle) -> float:
     """How long a state brakes, in seconds, before lateral acceleration lets it drive arcs of words."""
-    if vehicle.max_lateral_acceleration == math.inf:
+    if turning_speed(vehicle) == vehicle.max_speed:
         return 0.0
     return max(abs(state[3]) - top, 0.0) / control_limits(vehicle)[0]
 
@@ -91,9 +91,10 @@ def braking_seconds(state: State, top: float, vehicle: Vehicle) -> float:
 @inlined
 def straight_speed(top: float, vehicle: Vehicle) -> float:
     """The largest speed (m/s) on the straight parts of a word whose arcs are driven with up to ``top``."""
-    if vehicle.max_lateral_acceleration == math.inf:
+    turning = turning_speed(vehicle)
+    if turning == vehicle.max_speed:
         return top
-    return min(top * vehicle.max_speed / turning_speed(vehicle), vehicle.max_speed)
+    return min(top * vehicle.max_speed / turning, vehicle.max_speed)
 
 
 @inlined
@@ -112,6 +113,18 @@ def first_pose(state: State, top: float, vehicle: Vehicle) -> tuple[float, float
     turn = way * curvature_of(bend_of(state, vehicle), vehicle)
     sin, cos = sincos(state[2] + 0.5 * turn)
     return state[0] + way * cos, state[1] + way * sin, state[2] + turn
+
+
+@inlined
+def word_speed(pace: float, goal: Floats, vehicle: Vehicle) -> float:
+    """The largest speed (m/s) in arcs of words, at a share of the quickest ``pace``.
+
+    Where lateral acceleration limits that of the sharpest arcs, it is at least what the goal asks for.
+    """
+    top = pace * turning_speed(vehicle)
+    if turning_speed(vehicle) < vehicle.max_speed:
+        top = max(top, min(goal[LEAST_SPEED] + SHY, vehicle.max_speed))
+    return top
 
 
 @inlined

@@ -245,7 +245,7 @@ def drive_word(drive: Drive, word: int, vehicle: Vehicle, scene: Scene) -> bool:
         for k in range(c.states.shape[1]):
             c.states[0, k] = drive.states[at, k]
         top = share * turning
-        if radius_at(top, vehicle) != radius:
+        if abs(radius_at(top, vehicle) - radius) > ROUNDING * radius:
             break
         steps = connect(c, word, drive.target, top, vehicle)
         if steps > 0 and connection_is_free(drive, steps, vehicle, scene):

@@ -9,7 +9,13 @@ from numpy.random import BitGenerator
 
 from planners.search.connection.candidates import list_connections, next_word
 from planners.search.connection.connect import connect
-from planners.search.connection.connection import Connection, allocate_connection, first_pose, radius_at
+from planners.search.connection.connection import (
+    Connection,
+    allocate_connection,
+    first_pose,
+    radius_at,
+    word_speed,
+)
 from planners.search.connection.outline import outline_is_free
 from planners.search.guides.sampling import uniform
 from planners.search.structures.controller import NO_ERRORS, Gains, steer
@@ -27,7 +33,6 @@ from planners.world.vehicles.dynamics import (
     load,
     step,
     store,
-    turning_speed,
 )
 from planners.world.vehicles.vehicle import Vehicle
 
@@ -257,7 +262,7 @@ def extend(
             connects
             and i % CONNECT_EVERY == CONNECT_EVERY - 1
             and metres_to(state, goal) < CONNECT_M
-            and connect_to_goal(tree, parent, goal, turning_speed(vehicle), vehicle, scene)
+            and connect_to_goal(tree, parent, goal, word_speed(1.0, goal, vehicle), vehicle, scene)
         ):
             break
         arrived = length(x - target_x, y - target_y) < settings.arrival_m

@@ -14,6 +14,7 @@ import numpy as np
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import CarWithTrailers, DifferentialDrive, Trailer, Vehicle, trailers_of
 
+RELATIVE = 1e-6  # by which a lateral acceleration, computed from two rounded numbers, may pass its limit
 WITHIN = 8  # shorter steps in each, at which hitch angles are looked at
 
 
@@ -61,7 +62,7 @@ def limits_of(states: Floats, controls: Floats, vehicle: Vehicle) -> list[Limit]
         most = vehicle.max_acceleration
         found += [Limit("Acceleration", controls[:, 0], -most, most, "m/s^2"), second]
     if math.isfinite(vehicle.max_lateral_acceleration):
-        most = vehicle.max_lateral_acceleration
+        most = vehicle.max_lateral_acceleration * (1.0 + RELATIVE)
         found.append(
             Limit("Lateral acceleration", states[:, 3] * _turns(states, vehicle), -most, most, "m/s^2")
         )

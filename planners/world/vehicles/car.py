@@ -119,10 +119,8 @@ def _sharpest_at(speed: float, most: float, vehicle: CarLike) -> float:
 
 @implements(interface.turning_speed, Car, CarWithTrailers)
 def _turning_speed(vehicle: CarLike) -> float:
-    return min(
-        vehicle.max_speed,
-        math.sqrt(vehicle.max_lateral_acceleration * vehicle.wheelbase / tan(vehicle.max_steering)),
-    )
+    turning = fastest_with(vehicle.max_steering, vehicle.max_lateral_acceleration, vehicle)
+    return max(min(vehicle.max_speed, turning), vehicle.min_speed)
 
 
 @implements(interface.turn_error, Car, CarWithTrailers)

@@ -83,7 +83,8 @@ def _sharpest_at(speed: float, most: float, vehicle: DifferentialDrive) -> float
 @implements(interface.turning_speed, DifferentialDrive)
 def _turning_speed(vehicle: DifferentialDrive) -> float:
     radius = vehicle.max_speed / vehicle.max_turn_rate
-    return min(vehicle.max_speed, math.sqrt(vehicle.max_lateral_acceleration * radius))
+    turning = math.sqrt(vehicle.max_lateral_acceleration * radius)
+    return max(min(vehicle.max_speed, turning), vehicle.min_speed)
 
 
 @implements(interface.turn_error, DifferentialDrive)

@@ -20,7 +20,9 @@ from planners.world.vehicles.vehicle import About, Vehicle
 State = tuple[float, ...]
 
 SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority rounds up
-ROUNDING: Final = 1e-9  # share of the largest lateral acceleration that is left, so that none is above it
+ROUNDING: Final = (
+    1e-6  # share of a largest lateral acceleration by which planners keep off it and states may pass
+)
 
 unseen(About)
 
@@ -167,7 +169,7 @@ def kept_within(control: float, value: float, low: float, high: float, dt: float
 def slides(state: State, vehicle: Vehicle) -> bool:
     """Whether a state needs more lateral acceleration than the vehicle allows."""
     most = vehicle.max_lateral_acceleration
-    return most < math.inf and abs(lateral_acceleration(state, vehicle)[0]) > most
+    return most < math.inf and abs(lateral_acceleration(state, vehicle)[0]) > most * (1.0 + ROUNDING)
 
 
 @inlined

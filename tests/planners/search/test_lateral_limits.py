@@ -58,6 +58,23 @@ def test_a_turn_is_driven_as_fast_as_the_limit_allows(vehicle: Vehicle) -> None:
     assert np.quantile(turned, 0.9) > 0.9 * MOST
 
 
+def test_places_behind_bends_are_reached_about_as_quickly_as_the_bends_allow() -> None:
+    """A trial of the lattice ended so soon that RRT answered, with drives three times as long."""
+    quick = CAR._replace(max_speed=7.0, max_steering=0.5)
+    took = []
+    for most in (np.inf, 1.0):
+        vehicle = quick._replace(max_lateral_acceleration=most)
+        took.append(0.0)
+        for seed in range(4):
+            angle = 0.8 + 0.6 * seed
+            goal = (30.0 * np.cos(angle), 30.0 * np.sin(angle))
+            problem = replace(
+                problem_of([]), bounds=(-60.0, -60.0, 60.0, 60.0), start=(0.0, 0.0, 0.0), goal=goal
+            )
+            took[-1] += driven(problem, "lattice", vehicle).duration_s
+    assert took[1] < 1.45 * took[0]
+
+
 def test_a_train_turns_round_within_its_limit() -> None:
     vehicle = limited(CAR_1_TRAILER)
     driven(family("yard", "standard", vehicle).draw(41, 0), "lattice", vehicle)

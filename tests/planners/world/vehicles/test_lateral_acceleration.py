@@ -69,8 +69,8 @@ def test_admissible_controls_never_lead_into_a_slide(vehicle: Vehicle, seed: int
     unlimited = state.copy()
     unlimited[3:5] += vehicle.dt * np.array(free)
     if not slides(tuple(unlimited), vehicle):
-        assert (first, second) == pytest.approx(free, abs=1e-5)
-    elif abs(second - free[1]) > 1e-6:  # it turns less than asked only after it has braked as hard as it can
+        assert (first, second) == pytest.approx(free, rel=1e-5, abs=1e-4)
+    elif abs(second - free[1]) > 1e-3:  # it turns less than asked only after it has braked as hard as it can
         slowed = abs(state[3]) - vehicle.dt * vehicle.max_acceleration
         assert abs(after[3]) <= max(slowed, 0.0) + 1e-9
 
@@ -84,6 +84,9 @@ def test_bends_and_speeds_belong_together(vehicle: Vehicle, most: float, share: 
     assert speed**2 * curvature_of(bend, vehicle) <= most * (1.0 + 1e-9)
     assert top_speed(1.0, bend, vehicle) >= speed * (1.0 - 1e-9)
     assert tightest_bend(0.5 * speed, vehicle) >= bend
+    assert (
+        turning_speed(vehicle._replace(min_speed=speed)) >= speed
+    )  # who cannot stop goes on so fast at least
     full = turning_speed(vehicle)
     assert full <= vehicle.max_speed
     assert full**2 * curvature_of(tightest_bend(full, vehicle), vehicle) <= most * (1.0 + 1e-9)
