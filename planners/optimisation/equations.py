@@ -16,8 +16,8 @@ from planners.world.vehicles.interface import SPARE
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle, state_size, trailers_of
 
 SMOOTH = 0.01  # m/s, rad: around 0 an absolute value is rounded off, always upwards
-SHY_OF_SLIDING = 0.999  # share of the largest lateral acceleration, for the same reason as ...
 SHY_OF_JACK_KNIFE = 1e-3  # rad: the solver may pass a limit by its tolerance
+SHY_OF_SLIDING = 0.999  # share of the largest lateral acceleration, for the same reason
 
 
 class VehicleLimits(NamedTuple):

@@ -11,7 +11,7 @@ from planners.world.arrays import Box, Floats
 from planners.world.jit import implements, inlined
 from planners.world.trigonometry import angle_to, sincos, tan, turned_by, wrapped
 from planners.world.vehicles import interface
-from planners.world.vehicles.interface import State, fastest_with, kept_within, leading_body
+from planners.world.vehicles.interface import State, fastest_with, kept_within, leading_body, turn_limit_at
 from planners.world.vehicles.vehicle import Car, CarWithTrailers
 
 CarLike = Car | CarWithTrailers
@@ -131,10 +131,7 @@ def _turn_error(state: State, x: float, y: float, vehicle: CarLike) -> float:
 
 @implements(interface.tightest_bend, Car, CarWithTrailers)
 def _tightest_bend(speed: float, vehicle: CarLike) -> float:
-    most = vehicle.max_lateral_acceleration * vehicle.wheelbase
-    if most >= speed * speed * tan(vehicle.max_steering):
-        return vehicle.max_steering
-    return math.atan(most / (speed * speed))
+    return turn_limit_at(speed, vehicle)
 
 
 @implements(interface.bend_rate, Car, CarWithTrailers)

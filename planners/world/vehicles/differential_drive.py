@@ -12,7 +12,7 @@ from planners.world.jit import implements
 from planners.world.trigonometry import angle_to, wrapped
 from planners.world.vehicles import interface
 from planners.world.vehicles.car import drive
-from planners.world.vehicles.interface import State, kept_within, leading_body
+from planners.world.vehicles.interface import State, kept_within, leading_body, turn_limit_at
 from planners.world.vehicles.vehicle import DifferentialDrive
 
 LOOK_AHEAD_S = 0.5  # the present turn is counted on for this long: damps the controller, as steering a car's
@@ -94,7 +94,7 @@ def _turn_error(state: State, x: float, y: float, vehicle: DifferentialDrive) ->
 
 @implements(interface.tightest_bend, DifferentialDrive)
 def _tightest_bend(speed: float, vehicle: DifferentialDrive) -> float:
-    return min(vehicle.max_turn_rate, vehicle.max_lateral_acceleration / speed) / speed
+    return turn_limit_at(speed, vehicle) / speed
 
 
 @implements(interface.bend_rate, DifferentialDrive)

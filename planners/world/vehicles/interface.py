@@ -20,9 +20,7 @@ from planners.world.vehicles.vehicle import About, Vehicle
 State = tuple[float, ...]
 
 SPARE: Final = 1.0 + 1.0 / 32.0  # of half a step is covered, as the authority rounds up
-ROUNDING: Final = (
-    1e-6  # share of a largest lateral acceleration by which planners keep off it and states may pass
-)
+ROUNDING: Final = 1e-6  # of the largest lateral acceleration: planners keep off it, and states may pass it
 
 unseen(About)
 

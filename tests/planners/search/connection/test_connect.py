@@ -13,7 +13,7 @@ from planners.search.connection.connection import allocate_connection
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of, simulate_again
 from planners.world.goal import MOST_TURN, SLACK, goal_of_pose, reaches
-from planners.world.vehicles.dynamics import load, turning_speed
+from planners.world.vehicles.dynamics import load, turn_limit_at, turning_speed
 from planners.world.vehicles.vehicle import CAR, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle, state_size
 
 VEHICLES = {
@@ -47,8 +47,8 @@ def questions(vehicle: Vehicle, moving: bool, count: int, seed: int) -> list[tup
         start[2] = rng.uniform(-math.pi, math.pi)
         if moving:
             start[3:5] = rng.uniform(0.0, 4.0), rng.uniform(-0.5, 0.5)
-            if math.isfinite(vehicle.max_lateral_acceleration):
-                start[4] = 0.0
+            most = (1.0 - 1e-9) * turn_limit_at(start[3], vehicle)
+            start[4] = np.clip(start[4], -most, most)
         bearing, metres = rng.uniform(-math.pi, math.pi), rng.uniform(2.0, 30.0)
         heading = rng.uniform(-math.pi, math.pi)
         drawn.append((start, goal_of_pose(metres * math.cos(bearing), metres * math.sin(bearing), heading)))
