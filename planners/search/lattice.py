@@ -49,7 +49,7 @@ class LatticeSettings(NamedTuple):
         Lattice(speeds=4),
         Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
         Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
-    )  # the same for problems that are not canonical; where a speed is asked at the goal, without the first
+    )  # the same for problems that are not canonical; where a speed is asked at the goal, without one or two
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
@@ -77,7 +77,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     levels = settings.levels if is_canonical(query.problem) else settings.anywhere
     arrival = query.problem.arrival
     if arrival is not None and arrival.most_speed < vehicle.max_speed:
-        levels = levels[1:]
+        levels = levels[2:] if vehicle.first_order else levels[1:]
     level, tried = levels[0], 0
     ahead = Ahead(go, NOWHERE, NO_TABLE)
     manoeuvring: Manoeuvring | None = None
