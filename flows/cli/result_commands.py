@@ -23,10 +23,13 @@ def verify(
         workers: With a data folder: worker processes; default one for each core.
     """
     from tasks.requests.verify import verify as task
+    from tasks.requests.verify_plans import NO_PLAN
 
     checked = task(path, problems, sample, worker_count(workers))
     lines = [f"{count:9,} {what}" for what, count in checked.items()]
-    write_answer(*lines, "No fault found.", checked=dict(checked))
+    was_judged = any(count for what, count in checked.items() if what != NO_PLAN)
+    end = "No fault found." if was_judged else "There was no plan to judge."
+    write_answer(*lines, end, checked=dict(checked))
 
 
 def export(run: Path, *, format: str, out: Path) -> None:

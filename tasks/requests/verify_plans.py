@@ -28,7 +28,7 @@ _LOOKED_AT_LESS: Final = (
     "Obstacles and goals were not looked at: for plans of problems, name the file of these with --problems. "
     "A route was judged on its map when it was made; its file does not name the map."
 )
-_NO_PLAN: Final = "files that hold no plan, but say why there is none"
+NO_PLAN: Final = "files that hold no plan, but say why there is none"
 
 _LOG = logging.getLogger(__name__)
 
@@ -103,7 +103,7 @@ def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
             for file, problem in _with_problems(by_id, problems, vehicle):
                 record = read_plan(file)
                 if record.plan is None:
-                    counts[_NO_PLAN] += 1
+                    counts[NO_PLAN] += 1
                 else:
                     counts[_BY_ITSELF if problems is None else _IN_PROBLEM] += 1
                     wrong += [f"{file}: {fault}" for fault in _faults(record, record.plan, problem)]

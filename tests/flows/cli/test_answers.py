@@ -63,6 +63,21 @@ def _told(words: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any,
     return told
 
 
+def test_nothing_is_called_faultless_where_nothing_was_judged(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    ends = []
+    for name in ("walled", "one"):
+        _told(
+            f"solve {name}.json --planner gust --out {name}.parquet --plans {name}",
+            place,
+            monkeypatch,
+            capsys,
+        )
+        ends.append(_told(f"verify {name}", place, monkeypatch, capsys)["lines"][-1])
+    assert ends[0] != ends[1]
+
+
 @pytest.mark.parametrize(
     ("words", "names", "files"),
     [
