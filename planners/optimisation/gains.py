@@ -216,6 +216,7 @@ def in_time(
 def _can_end(
     state: State, first: float, second: float, left: int, last: LastMotion, vehicle: Vehicle
 ) -> tuple[float, float]:
+    """The controls of ``in_time`` before the vehicle's own limits count."""
     limit_0, limit_1 = control_limits(vehicle)
     change = left * limit_0 * vehicle.dt
     first = kept_within(first, state[3], last.least_speed - change, last.most_speed + change, vehicle.dt)

@@ -203,10 +203,10 @@ def _check_complete(fields: Mapping[str, Any], wanted: Sequence[str], where: str
 def _limits(fields: object, kind: str) -> dict[str, Any]:
     if not isinstance(fields, Mapping):
         raise ValueError(f"has limits {short(fields)}; expected fields {', '.join(_LIMITS[kind])}")
-    for name in fields:
-        if name in ALL_LIMITS and name not in (*_LIMITS[kind], *_MAY_HAVE):
-            raise ValueError(f"has the limit {name}, which the kind {kind} does not have; leave it out")
     known = (*_LIMITS[kind], *_MAY_HAVE)
+    for name in fields:
+        if name in ALL_LIMITS and name not in known:
+            raise ValueError(f"has the limit {name}, which the kind {kind} does not have; leave it out")
     check_fields([f"limits.{name}" for name in fields], [f"limits.{name}" for name in known])
     _check_complete(fields, _LIMITS[kind], "limits.")
     speeds = fields["speed"]

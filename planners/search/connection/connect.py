@@ -19,10 +19,10 @@ from planners.search.connection.connection import (
     radius_at,
     straight_speed,
 )
-from planners.search.connection.profile import fill_run
+from planners.search.connection.profile import fill_limited, fill_run
 from planners.search.connection.words import PARTS
 from planners.world.arrays import Floats
-from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, SLACK, X, Y, reaches
+from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, X, Y, reaches
 from planners.world.jit import lean
 from planners.world.trigonometry import length, sincos, wrapped
 from planners.world.vehicles.dynamics import (
@@ -87,55 +87,6 @@ def _list_limits(
 
 
 @lean
-def _fill_limited(
-    c: Connection,
-    at: int,
-    count: int,
-    metres: float,
-    begin: float,
-    last: float,
-    gear: float,
-    most: float,
-    dt: float,
-) -> int:
-    """Fill in the speeds of a run from ``c.speeds[at]`` on, as quick as ``c.limits`` allow.
-
-    It leads about as far as asked: what is missing is corrected with the rest. Returns where it ends; -1 if
-    it cannot be driven, or room is missing.
-    """
-    limits = c.limits
-    stride = metres / count
-    limits[0] = begin
-    limits[count] = last
-    for i in range(count - 1, -1, -1):
-        limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * most * stride))
-    if limits[0] < begin - SLACK:
-        return -1
-    seconds = 0.0
-    for i in range(1, count + 1):
-        limits[i] = min(limits[i], math.sqrt(limits[i - 1] * limits[i - 1] + 2.0 * most * stride))
-        seconds += 2.0 * stride / (limits[i - 1] + limits[i])
-    if limits[count] < last - SLACK or not seconds < dt * (c.speeds.shape[0] - 2 - at):
-        return -1
-    steps = max(math.ceil(seconds / dt), 1)
-    share = seconds / (steps * dt)
-    c.speeds[at] = gear * begin
-    i = 0
-    gone = 0.0
-    cell = 2.0 * stride / (limits[0] + limits[1])
-    for k in range(1, steps):
-        time = k * dt * share
-        while gone + cell < time and i < count - 1:
-            gone += cell
-            i += 1
-            cell = 2.0 * stride / (limits[i] + limits[i + 1])
-        within = min((time - gone) / cell, 1.0)
-        c.speeds[at + k] = gear * share * (limits[i] + within * (limits[i + 1] - limits[i]))
-    c.speeds[at + steps] = gear * last
-    return at + steps
-
-
-@lean
 def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: float, vehicle: Vehicle) -> int:
     """Fill in the speeds, and when each part ends. Returns the steps; -1 if that is not possible."""
     acceleration, turning = control_limits(vehicle)
@@ -165,7 +116,9 @@ def _plan_speeds(c: Connection, count: int, lead: float, goal: Floats, top: floa
             places = _list_limits(
                 c, k, metres, lead if k == 0 else 0.0, top, fastest, radius_at(top, vehicle)
             )
-            after = _fill_limited(c, at, places, metres, begin, last, gear, acceleration, vehicle.dt)
+            after = fill_limited(
+                *(c.speeds, at, c.limits, places, metres, begin, last, gear, acceleration, vehicle.dt)
+            )
         else:
             after = fill_run(c.speeds, at, metres, begin, last, fastest, gear, acceleration, vehicle.dt)
         if after < 0:

@@ -6,6 +6,7 @@ import math
 from typing import Final
 
 from planners.world.arrays import Floats
+from planners.world.goal import SLACK
 from planners.world.jit import inlined, lean
 
 SOLVES: Final = 40  # most corrections of the cruising speed
@@ -120,4 +121,60 @@ def fill_run(
         return -1
     for k in range(steps + 1):
         speeds[at + k] = gear * _speed(k, steps, first, last, cruising, change)
+    return at + steps
+
+
+@inlined
+def lower_to_brake(limits: Floats, count: int, stride: float, acceleration: float) -> None:
+    """Lower ``limits [count + 1]`` (m/s), at places ``stride`` metres apart, to what can be braked from."""
+    for i in range(count - 1, -1, -1):
+        limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * acceleration * stride))
+
+
+@lean
+def fill_limited(
+    speeds: Floats,
+    at: int,
+    limits: Floats,
+    count: int,
+    metres: float,
+    first: float,
+    last: float,
+    gear: float,
+    acceleration: float,
+    dt: float,
+) -> int:
+    """Fill in the speeds of a run where each place has a limit of its own; the rest as ``fill_run``.
+
+    It leads about as far as asked: who asks corrects what is missing. ``limits [count + 1]`` in m/s are those
+    of places equally far from one another, the first and the last at the ends; they are lowered to what is
+    driven.
+    """
+    stride = metres / count
+    limits[0] = first
+    limits[count] = last
+    lower_to_brake(limits, count, stride, acceleration)
+    if limits[0] < first - SLACK:
+        return -1
+    seconds = 0.0
+    for i in range(1, count + 1):
+        limits[i] = min(limits[i], math.sqrt(limits[i - 1] * limits[i - 1] + 2.0 * acceleration * stride))
+        seconds += 2.0 * stride / (limits[i - 1] + limits[i])
+    if limits[count] < last - SLACK or not seconds < dt * (speeds.shape[0] - 2 - at):
+        return -1
+    steps = max(math.ceil(seconds / dt), 1)
+    share = seconds / (steps * dt)
+    speeds[at] = gear * first
+    i = 0
+    gone = 0.0
+    cell = 2.0 * stride / (limits[0] + limits[1])
+    for k in range(1, steps):
+        time = k * dt * share
+        while gone + cell < time and i < count - 1:
+            gone += cell
+            i += 1
+            cell = 2.0 * stride / (limits[i] + limits[i + 1])
+        within = min((time - gone) / cell, 1.0)
+        speeds[at + k] = gear * share * (limits[i] + within * (limits[i + 1] - limits[i]))
+    speeds[at + steps] = gear * last
     return at + steps

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from planners.search.connection.profile import lower_to_brake
 from planners.world.arrays import Floats
 from planners.world.jit import inlined, lean
 
@@ -43,8 +44,7 @@ def fill_pace(
         How many steps that takes; -1 if there is no room for them.
     """
     stride = metres / count
-    for i in range(count - 1, -1, -1):
-        limits[i] = min(limits[i], math.sqrt(limits[i + 1] * limits[i + 1] + 2.0 * acceleration * stride))
+    lower_to_brake(limits, count, stride, acceleration)
     change = acceleration * dt
     spare = 0.125 * change * dt  # by which whole steps of braking may lead farther than one brake in between
     speeds[0] = 0.0

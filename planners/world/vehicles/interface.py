@@ -67,7 +67,10 @@ def within_ranges(state: State, first: float, second: float, vehicle: Vehicle) -
 
 @by_vehicle
 def lateral_acceleration(state: State, vehicle: Vehicle) -> tuple[float, float, float]:
-    """Of the reference point, m/s^2, left positive; and how it changes with speed and the fifth variable."""
+    """How strongly the reference point is accelerated to the left (m/s^2).
+
+    Returns this, and its derivatives by speed and by the fifth variable.
+    """
     raise NotImplementedError
 
 
