@@ -21,8 +21,8 @@ from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.routes.braking import braking, is_free_drive
 from planners.routes.path_ahead import LocalGoal, PathAhead
+from planners.search.braking import braking, is_free_drive
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of

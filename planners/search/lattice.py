@@ -10,6 +10,7 @@ import math
 from dataclasses import replace
 from typing import NamedTuple
 
+from planners.search.braking import stopping
 from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.manoeuvres.squeezing import squeeze
 from planners.search.manoeuvres.suitability import suits
@@ -29,7 +30,7 @@ from planners.search.structures.frontier import (
 from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
-from planners.world.geometry.occupancy import drawing_of, window_of
+from planners.world.geometry.occupancy import Bits, drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
 from planners.world.problem import Plan, is_canonical
 from planners.world.vehicles.dynamics import turning_speed
@@ -55,6 +56,7 @@ class LatticeSettings(NamedTuple):
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
+    moving: int = 1200  # expansions before who moves looks for manoeuvres from where it has stopped
     further: int = 1000  # expansions of the search for manoeuvres, for drives of other kinds
     longest: int = 4000  # while all that it found takes long
     for_one: int = 2000  # as long as it has found none
@@ -84,19 +86,21 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     joining: Manoeuvring | None = None
     joined = False
     squeezed: Plan | None = None
-    may_squeeze = not improving
+    may_squeeze = may_stop = not improving
+
+    def occupied() -> Bits:
+        if query.occupied is not None:
+            return query.occupied
+        return drawing_of(query.problem, query.workspace).occupied
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
         nonlocal level, tried, ahead, manoeuvring, joining
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
-            occupied = query.occupied
-            if occupied is None:
-                occupied = drawing_of(query.problem, query.workspace).occupied
             if not query.knows_way:
-                fill_cost_to_go(occupied, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+                fill_cost_to_go(occupied(), goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
             if suits(goal, vehicle):
-                manoeuvring = Manoeuvring(query, goal, occupied)
+                manoeuvring = Manoeuvring(query, goal, occupied())
                 if query.endings is not None:
                     joining = manoeuvring.joining(query, query.endings)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle)
@@ -110,6 +114,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         if manoeuvring is None:
             grow_lattice(tree, goal, until, frontier, ahead, level, vehicle, scene)
             return
+        stop(tree, goal)
         here, there = settings.if_tight if manoeuvring.is_hard else settings.by_turns
         now = here
         if counts[trees.EXPANSIONS] == 0:
@@ -127,6 +132,15 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                 return
             now = here
 
+    def stop(tree: trees.Tree, goal: Floats) -> None:
+        """After a while look for manoeuvres from where the vehicle has stopped: at rest it can turn back."""
+        nonlocal may_stop, manoeuvring
+        if may_stop and tree.counts[trees.EXPANSIONS] >= settings.moving:
+            may_stop = False
+            prefix = stopping(query.problem, vehicle, scene)
+            if prefix is not None:
+                manoeuvring = Manoeuvring(replace(query, prefix=prefix), goal, occupied())
+
     def manoeuvre(tree: trees.Tree, search: Manoeuvring, most: int) -> None:
         expansions, checks = search.expansions, search.checks
         search.advance(tree, most)
@@ -136,6 +150,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     def explore(tree: trees.Tree, goal: Floats, until: int) -> None:
         """RRT, or where it has small hopes the search for manoeuvres."""
         counts = tree.counts
+        if manoeuvring is not None:
+            stop(tree, goal)
         if manoeuvring is None or not manoeuvring.is_hard:
             at_random(tree, goal, until)
         elif not join(tree, manoeuvring.is_tight) and not squeezes(tree, manoeuvring):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -80,3 +80,13 @@ class Query:
     beside: Callable[[int], Plan | None] | None = None
     endings: Endings | None = None  # known ways into a pose at rest, for searches of manoeuvres
     others: bool = False  # whether drives of other kinds than the first are wanted, where they are found soon
+
+
+def after_prefix(query: Query) -> Query:
+    """The query as it is asked where its prefix ends."""
+    if query.prefix is None:
+        return query
+    x, y, heading, *motion = query.prefix.states[-1].tolist()
+    problem = replace(query.problem, start=(x, y, heading), start_motion=tuple(motion))
+    limits = replace(query.limits, bound_s=query.limits.bound_s - query.prefix.duration_s)
+    return replace(query, problem=problem, limits=limits, prefix=None)

@@ -147,15 +147,17 @@ def _drive_in(
 
 
 @lean
-def add_to_tree(drive: Drive, tree: trees.Tree, vehicle: Vehicle) -> bool:
-    """Add a drive from the root of a tree to the goal, unless it takes too long or has no room."""
-    steps = drive.counts[0]
+def add_to_tree(drive: Drive, tree: trees.Tree, states: Floats, controls: Floats, vehicle: Vehicle) -> bool:
+    """Add a drive to the goal to the root of a tree, unless it takes too long or has no room.
+
+    What is driven before it, over ``states [n + 1, S]`` by ``controls [n, 2]``, comes first.
+    """
+    length = drive.counts[0]
+    steps = controls.shape[0] + length
     counts = tree.counts
     if steps * vehicle.dt >= tree.bound[0] or counts[trees.SIZE] + steps > tree.states.shape[0]:
         return False
-    parent = 0
-    for i in range(steps):
-        state = load(drive.states, i + 1, vehicle)
-        parent = trees.append(tree, parent, 0, state, drive.controls[i, 0], drive.controls[i, 1], i + 1)
-    counts[trees.GOAL_VERTEX] = parent
+    last = trees.add_drive(tree, 0, states[1:], controls, vehicle)
+    last = trees.add_drive(tree, last, drive.states[1 : length + 1], drive.controls[:length], vehicle)
+    counts[trees.GOAL_VERTEX] = last
     return True

@@ -30,7 +30,7 @@ from planners.search.manoeuvres.variants import (
 )
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Other
-from planners.search.query import Endings, Query
+from planners.search.query import Endings, Query, after_prefix
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
@@ -69,14 +69,18 @@ class Manoeuvring:
         """Begin.
 
         Args:
-            query: the problem, and the buffers.
+            query: the problem, and the buffers. If it has a prefix, drives begin with that.
             goal: that of ``goal_of``; it has to suit.
             occupied: ``[64]`` the cells of the problem's window that are not free.
         """
-        problem, vehicle = query.problem, at_its_slowest(query.vehicle)
+        window, vehicle = window_of(query.problem), at_its_slowest(query.vehicle)
+        start = start_state(query.problem, vehicle)[np.newaxis]
+        self._before = query.prefix or Plan(start, np.empty((0, 2)), vehicle.dt)
+        query = after_prefix(query)
+        start = start_state(query.problem, vehicle)[np.newaxis]
         size = state_size(vehicle)
         self._vehicle, self._scene, self._goal = vehicle, query.scene, goal
-        ends = np.abs([start_state(problem, vehicle)[5:], pose_of(goal, size)[5:]]).max(0)
+        ends = np.abs([start[0, 5:], pose_of(goal, size)[5:]]).max(0)
         self._leaving = less_folded(vehicle, ends)
         self._outgoing = time_reversed(self._leaving)
         self._tree, self._other = query.workspace.buffers(allocate_trees, size, 0)
@@ -86,8 +90,7 @@ class Manoeuvring:
             speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
         go = query.workspace.buffers(allocate_way_from_start)
-        fill_cost_to_go(occupied, *problem.start[:2], AROUND_START_M, window_of(problem), go)
-        start = start_state(problem, vehicle)[np.newaxis]
+        fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
         known = seconds_to_pose(without_trailers(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
         self._known = FromStart(start, go, *known, outward=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
@@ -160,7 +163,7 @@ class Manoeuvring:
         """Search for some expansions at most; whether a drive was found, which is added to ``tree`` then."""
         end = self.expansions + most
         while self._finds_drive(end):
-            if add_to_tree(self._drive, tree, self._vehicle):
+            if add_to_tree(self._drive, tree, self._before.states, self._before.controls, self._vehicle):
                 self._keep()
                 return True
         return False
@@ -261,7 +264,9 @@ class Manoeuvring:
     def _keep(self) -> None:
         drive = self._drive
         steps = int(drive.counts[0])
-        plan = Plan(drive.states[: steps + 1].copy(), drive.controls[:steps].copy(), self._vehicle.dt)
+        states = np.concatenate([self._before.states, drive.states[1 : steps + 1]])
+        controls = np.concatenate([self._before.controls, drive.controls[:steps]])
+        plan = Plan(states, controls, self._vehicle.dt)
         self._kept[keep_last(drive.ways)] = Other(plan, self.joined)
 
     def _begin_at_coarsest(self) -> None:

@@ -140,6 +140,18 @@ def append(
 
 
 @lean
+def add_drive(tree: Tree, vertex: int, states: Floats, controls: Floats, vehicle: Vehicle) -> int:
+    """Add a drive from a vertex on: ``controls [n, 2]`` lead to ``states [n, S]``, one to each.
+
+    Returns the last vertex. The tree must have room.
+    """
+    for i in range(controls.shape[0]):
+        state, depth = load(states, i, vehicle), tree.depths[vertex] + 1
+        vertex = append(tree, vertex, 0, state, controls[i, 0], controls[i, 1], depth)
+    return vertex
+
+
+@lean
 def connect_to_goal(
     tree: Tree, vertex: int, goal: Floats, top: float, vehicle: Vehicle, scene: Scene
 ) -> bool:

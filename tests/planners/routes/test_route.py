@@ -18,9 +18,9 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
-from planners.routes.braking import braking, is_free_drive
 from planners.routes.path_ahead import PathAhead
 from planners.routes.route import Route, Router, Stuck
+from planners.search.braking import braking, is_free_drive
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of

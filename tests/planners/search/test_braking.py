@@ -1,17 +1,20 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planners.routes.braking import braking
+from planners.search.braking import braking, stopping
 from planners.world.arrays import Floats
 from planners.world.authority.authority_equations import limits_of
+from planners.world.geometry.collision import scene_of
 from planners.world.problem import start_state
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
-from tests.worlds import problem_of
+from tests.worlds import box, problem_of
 
 MIDDLE = (25.0, 25.0, 0.3)
 
@@ -46,3 +49,28 @@ def test_braking_ends_at_rest_all_straight(name: str, speed: float, aside: float
     assert rests(states[-1])
     assert within_limits(states, controls, vehicle)
     assert len(controls) <= 20  # 4 m/s at 2 m/s^2
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+@given(speed=st.floats(0.1, 4.0), metres=st.floats(0.1, 12.0))
+def test_who_moves_stops_before_a_wall_or_is_told_that_it_cannot(
+    name: str, speed: float, metres: float
+) -> None:
+    vehicle = VEHICLES[name]
+    ahead = 10.0 + vehicle.front + metres
+    wall = box(ahead + 0.5, 25.0, 0.0, 0.5, 20.0)
+    problem = replace(problem_of([wall]), start=(10.0, 25.0, 0.0), start_motion=(speed,))
+    stop = stopping(problem, vehicle, scene_of(problem))
+    needed = 0.5 * speed * speed / vehicle.max_acceleration
+    if metres > needed + 0.5 * speed * vehicle.dt + 0.1:
+        assert stop is not None
+        assert np.array_equal(stop.states[0], start_state(problem, vehicle))
+        assert rests(stop.states[-1])
+    if metres < needed:
+        assert stop is None
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_who_stands_has_nothing_to_stop(name: str) -> None:
+    problem = problem_of([])
+    assert stopping(problem, VEHICLES[name], scene_of(problem)) is None

@@ -8,7 +8,8 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix
-from planners.world.vehicles.dynamics import control_limits
+from planners.world.problem import Plan, Problem, start_state
+from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import Vehicle
 
 
@@ -20,6 +21,20 @@ def braking(state: Floats, vehicle: Vehicle) -> Floats:
     for i, ramp in enumerate(ramps):
         controls[: len(ramp), i] = ramp
     return controls
+
+
+def stopping(problem: Problem, vehicle: Vehicle, scene: Scene) -> Plan | None:
+    """Return the drive on which a vehicle that moves comes to rest after the start.
+
+    Returns None if it does not move, cannot stand, or something is in the way.
+    """
+    start = start_state(problem, vehicle)
+    if vehicle.first_order or vehicle.min_speed > 0.0 or start[3] == 0.0:
+        return None
+    controls = braking(start, vehicle)
+    states = simulate(start, controls, vehicle)
+    states[-1, 3:5] = 0.0  # as it is but for rounding
+    return Plan(states, controls, vehicle.dt) if is_free_drive(states, vehicle, scene) else None
 
 
 def is_free_drive(states: Floats, vehicle: Vehicle, scene: Scene) -> bool:
