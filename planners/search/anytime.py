@@ -41,8 +41,10 @@ FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer b
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
 SHORTER = 0.9  # of the driving time of the quickest so far: so long may the next one take ...
-AGAIN = 1000  # ... and so many expansions its search, and the first one beside a plan that is given, ...
-BESIDE = 4000  # ... or so many where it is narrow
+AGAIN = 1000  # ... and so many expansions its search at least, ...
+AS_MANY = 8  # ... so many times as many as the first one had, ...
+MOST_AGAIN = 8000  # ... and so many at most
+BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
 POLISHED = 2  # of the shortest plans: which of them is quickest when polished cannot be told before
 
 
@@ -198,8 +200,9 @@ def search_and_polish(
     """Search for several plans, polish them and keep the quickest.
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
-    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon. A given plan may
-    be of a worse kind than what the planner finds, so it searches as if there were none, but not for long.
+    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
+    first search took, the worse its plan mostly is, and the longer they may take. A given plan may be of a
+    worse kind than what the planner finds, so it searches as if there were none, but not for long.
 
     Args:
         planner: one of ``PLANNERS``.
@@ -224,11 +227,12 @@ def search_and_polish(
         most = min(BESIDE if varies else AGAIN, most)
     found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
     plan = None if varies else found[0].plan
+    again = min(max(AGAIN, AS_MANY * found[0].expansions), MOST_AGAIN)
     shortest_s = min((each.duration_s for each in (given, found[0].plan) if each is not None), default=0.0)
     while plan is not None and shortest_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
-            expansions=min(AGAIN, query.limits.expansions - sum(each.expansions for each in found)),
+            expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
             seconds=until - working_clock(),
             bound_s=min(SHORTER * shortest_s, query.limits.bound_s),
         )
