@@ -67,8 +67,13 @@ def _plain_object(text: str | bytes) -> dict[str, Any] | None:
 
 
 def nearest(given: str, names: Iterable[str]) -> str:
-    """The part of a message about an unknown name that suggests the nearest known one; may be empty."""
-    near = get_close_matches(given[:LONGEST].lower(), names, 1)
+    """The part of a message about an unknown name that suggests the nearest known one; may be empty.
+
+    A name of which only the beginning is given is nearer than one that is spelt alike.
+    """
+    begun, known = given[:LONGEST].lower(), list(names)
+    longer = [name for name in known if len(begun) > 1 and name.startswith(begun)]
+    near = longer or get_close_matches(begun, known, 1)
     return f" (nearest is {near[0]!r})" if near else ""
 
 

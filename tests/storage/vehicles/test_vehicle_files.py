@@ -121,6 +121,7 @@ def test_a_new_vehicle_brings_no_new_type_of_values(path: Path) -> None:
         ("limits.lateral_acceleration", 0, "limits.lateral_acceleration 0 m/s^2; expected 0.001 to 100"),
         ("limits", CAR_FILE["limits"] | {"lateral_acceleration": None}, "limits.lateral_acceleration"),
         ("limits.lateral_aceleration", 2, "nearest is 'limits.lateral_acceleration'"),
+        ("limits.lateral", 2, "nearest is 'limits.lateral_acceleration'"),
         ("limits.turn_rate", 0.5, "limit turn_rate, which the kind car does not have"),
         ("body", [], "body []; expected a list of 1 to 16"),
         ("body", [[[0, 0], [1, 0]]], "3 to 32 corners"),
