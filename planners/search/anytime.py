@@ -202,7 +202,7 @@ def search_and_polish(
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
     first search took, the worse its plan mostly is, and the longer they may take. A given plan may be of a
-    worse kind than what the planner finds, so it searches as if there were none, but not for long.
+    worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.

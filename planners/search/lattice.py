@@ -139,7 +139,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             may_stop = False
             prefix = stopping(query.problem, vehicle, scene)
             if prefix is not None:
-                manoeuvring = Manoeuvring(replace(query, prefix=prefix), goal, occupied())
+                limits = replace(query.limits, seconds=max(latest - working_clock(), 0.0))
+                manoeuvring = Manoeuvring(replace(query, prefix=prefix, limits=limits), goal, occupied())
 
     def manoeuvre(tree: trees.Tree, search: Manoeuvring, most: int) -> None:
         expansions, checks = search.expansions, search.checks

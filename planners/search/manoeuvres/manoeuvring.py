@@ -52,8 +52,11 @@ SLICE: Final = 64  # expansions between two looks at the clock
 AROUND_START_M: Final = 0.1  # as far as the way to the start counts as nothing
 
 
-def allocate_way_from_start() -> CostToGo:
-    """Buffers of their own, since the search beside this one needs the way to the goal."""
+def allocate_way_from_start(goes_on: bool) -> CostToGo:
+    """Buffers of their own, since the search beside this one needs the way to the goal.
+
+    They are others if the search goes on from a prefix: one with known endings may still need the first.
+    """
     return allocate_cost_to_go()
 
 
@@ -89,7 +92,7 @@ class Manoeuvring:
         if vehicle.min_speed > 0.0:
             speeds = vehicle.min_speed - SLACK, vehicle.max_speed + SLACK
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
-        go = query.workspace.buffers(allocate_way_from_start)
+        go = query.workspace.buffers(allocate_way_from_start, len(self._before.controls) > 0)
         fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
         known = seconds_to_pose(without_trailers(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
         self._known = FromStart(start, go, *known, outward=True)
