@@ -86,7 +86,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     joining: Manoeuvring | None = None
     joined = False
     squeezed: Plan | None = None
-    may_squeeze = may_stop = not improving
+    may_squeeze = not improving
+    may_stop = not improving and query.prefix is None
 
     def occupied() -> Bits:
         if query.occupied is not None:
