@@ -22,7 +22,7 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.path_ahead import LocalGoal, PathAhead
-from planners.search.braking import braking, is_free_drive
+from planners.search.braking import free_stop, is_free_drive
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
@@ -245,10 +245,7 @@ class Router:
             for steps in range(min(int(share * (len(drive.states) - 1)), later - 1), 0, -1):
                 if to_go[steps] > to_go[0] - PROGRESS_M:
                     continue
-                brake = simulate(
-                    drive.states[steps], braking(drive.states[steps], self._vehicle), self._vehicle
-                )
-                if is_free_drive(brake, self._vehicle, self._scene):
+                if free_stop(drive.states[steps], self._vehicle, self._scene) is not None:
                     yield drive.leg(steps, np.empty((0, 2)), drive.states[steps])
                     later = steps
                     break
@@ -258,10 +255,9 @@ class Router:
         free = count_free_prefix(drive.states, self._vehicle, self._scene)
         stops = []
         for steps in range(1, free):
-            brake = braking(drive.states[steps], self._vehicle)
-            states = simulate(drive.states[steps], brake, self._vehicle)
-            if is_free_drive(states, self._vehicle, self._scene):
-                stops.append((steps, brake, states[-1]))
+            stop = free_stop(drive.states[steps], self._vehicle, self._scene)
+            if stop is not None:
+                stops.append((steps, stop.controls, stop.states[-1]))
         if stops:
             rests = np.array([end for _, _, end in stops])
             arrived, to_go = ahead.arrived(rests), ahead.to_go(rests)

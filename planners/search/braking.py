@@ -31,9 +31,16 @@ def stopping(problem: Problem, vehicle: Vehicle, scene: Scene) -> Plan | None:
     start = start_state(problem, vehicle)
     if vehicle.first_order or vehicle.min_speed > 0.0 or start[3] == 0.0:
         return None
-    controls = braking(start, vehicle)
-    states = simulate(start, controls, vehicle)
-    states[-1, 3:5] = 0.0  # as it is but for rounding
+    stop = free_stop(start, vehicle, scene)
+    if stop is not None:
+        stop.states[-1, 3:5] = 0.0  # as it is but for rounding
+    return stop
+
+
+def free_stop(state: Floats, vehicle: Vehicle, scene: Scene) -> Plan | None:
+    """Return the drive on which a vehicle comes to rest from a state ``[S]``, if nothing is in the way."""
+    controls = braking(state, vehicle)
+    states = simulate(state, controls, vehicle)
     return Plan(states, controls, vehicle.dt) if is_free_drive(states, vehicle, scene) else None
 
 

@@ -98,10 +98,11 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         nonlocal level, tried, ahead, manoeuvring, joining
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
+            cells = occupied()
             if not query.knows_way:
-                fill_cost_to_go(occupied(), goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
+                fill_cost_to_go(cells, goal[X], goal[Y], goal[RADIUS], window_of(query.problem), go)
             if suits(goal, vehicle):
-                manoeuvring = Manoeuvring(query, goal, occupied())
+                manoeuvring = Manoeuvring(query, goal, cells)
                 if query.endings is not None:
                     joining = manoeuvring.joining(query, query.endings)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle)

@@ -12,7 +12,7 @@ import numpy as np
 from planners.world.arrays import Floats, Integers
 from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import CAR, Vehicle
 from planners.world.workspace import Workspace
 
@@ -80,6 +80,13 @@ class Query:
     beside: Callable[[int], Plan | None] | None = None
     endings: Endings | None = None  # known ways into a pose at rest, for searches of manoeuvres
     others: bool = False  # whether drives of other kinds than the first are wanted, where they are found soon
+
+
+def prefix_of(query: Query) -> Plan:
+    """The drive from which a search goes on: the prefix, or the start alone."""
+    if query.prefix is not None:
+        return query.prefix
+    return Plan(start_state(query.problem, query.vehicle)[np.newaxis], np.empty((0, 2)), query.vehicle.dt)
 
 
 def after_prefix(query: Query) -> Query:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from planners.search.outcome import Outcome, Status, work_of
-from planners.search.query import Query
+from planners.search.query import Query, prefix_of
 from planners.search.structures import tree as trees
 from planners.search.structures.unreachable import is_unreachable
 from planners.world.arrays import Floats
@@ -15,13 +15,12 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.collision import Scene, bodies_are_free, point_is_free
 from planners.world.goal import goal_of, reaches
 from planners.world.jit import lean
-from planners.world.problem import Plan, start_state
+from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import load
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
 Grow = Callable[[trees.Tree, Floats, int], None]  # tree, goal, number of expansions at which to return
 
-NO_CONTROLS = np.empty((0, 2))
 GUIDED = 300  # expansions along a guide before a planner goes on with a structure of its own
 _FIRST = (Status.BUDGET_SPENT, Status.START_BLOCKED, Status.GOAL_BLOCKED, Status.SOLVED)
 SLICE = 256  # expansions between two looks at the clock: a few milliseconds
@@ -70,9 +69,7 @@ def attempt(
     began = working_clock()
     tree = query.workspace.buffers(trees.allocate_tree, limits.nodes, state_size(vehicle))
     goal = goal_of(problem, vehicle)
-    prefix = query.prefix
-    if prefix is None:
-        prefix = Plan(start_state(problem, vehicle)[np.newaxis], NO_CONTROLS, vehicle.dt)
+    prefix = prefix_of(query)
     first = np.ascontiguousarray(prefix.states)
     trees.plant(tree, first, np.ascontiguousarray(prefix.controls), scene.bounds, limits.bound_s)
     counts = tree.counts

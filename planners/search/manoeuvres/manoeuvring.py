@@ -30,7 +30,7 @@ from planners.search.manoeuvres.variants import (
 )
 from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, keep_last
 from planners.search.outcome import Other
-from planners.search.query import Endings, Query, after_prefix
+from planners.search.query import Endings, Query, after_prefix, prefix_of
 from planners.search.structures.cost_to_go import CostToGo, allocate_cost_to_go, fill_cost_to_go
 from planners.search.structures.tree import Tree
 from planners.world.arrays import Floats
@@ -77,8 +77,7 @@ class Manoeuvring:
             occupied: ``[64]`` the cells of the problem's window that are not free.
         """
         window, vehicle = window_of(query.problem), at_its_slowest(query.vehicle)
-        start = start_state(query.problem, vehicle)[np.newaxis]
-        self._before = query.prefix or Plan(start, np.empty((0, 2)), vehicle.dt)
+        self._before = prefix_of(query)
         query = after_prefix(query)
         start = start_state(query.problem, vehicle)[np.newaxis]
         size = state_size(vehicle)

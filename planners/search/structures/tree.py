@@ -145,9 +145,10 @@ def add_drive(tree: Tree, vertex: int, states: Floats, controls: Floats, vehicle
 
     Returns the last vertex. The tree must have room.
     """
+    waypoint = tree.waypoints[vertex]
     for i in range(controls.shape[0]):
         state, depth = load(states, i, vehicle), tree.depths[vertex] + 1
-        vertex = append(tree, vertex, 0, state, controls[i, 0], controls[i, 1], depth)
+        vertex = append(tree, vertex, waypoint, state, controls[i, 0], controls[i, 1], depth)
     return vertex
 
 
@@ -186,13 +187,8 @@ def connect_to_goal(
         tree.counts[CHECKS] += min(free, steps)
         if free <= steps:
             continue
-        parent = vertex
-        for i in range(1, steps + 1):
-            state = load(c.states, i, vehicle)
-            first = c.controls[i - 1, 0]
-            second = c.controls[i - 1, 1]
-            parent = append(tree, parent, tree.waypoints[vertex], state, first, second, depth + i)
-        tree.counts[GOAL_VERTEX] = parent
+        states, controls = c.states[1 : steps + 1], c.controls[:steps]
+        tree.counts[GOAL_VERTEX] = add_drive(tree, vertex, states, controls, vehicle)
         return True
     return False
 
