@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -115,6 +116,35 @@ def gears_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
 def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
     """The rows of the states at which ``vehicle`` changes gear on ``plan``."""
     return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
+
+
+def travel_arrows(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
+    """Where arrows along ``plan`` stand, ``[n, 5]``: x, y, a vector of length 1 along the travel, the gear.
+
+    They are as far apart as the footprints of ``vehicle``, and between these. A stretch in one gear has one
+    in its middle even if it is as short as half of the body.
+    """
+    apart = footprint_spacing_m(vehicle)
+    gears, ends = gears_of(plan, vehicle), [0, *cusps_of(plan, vehicle).tolist(), len(plan.states) - 1]
+    arrows: list[Floats] = [np.empty((0, 5))]
+    for first, last in pairwise(ends):
+        way = plan.states[first : last + 1, :2]
+        steps = np.diff(way, axis=0)
+        lengths = np.hypot(*steps.T)
+        driven = np.cumsum(lengths)
+        if len(driven) == 0 or driven[-1] < 0.5 * (vehicle.front + vehicle.rear):
+            continue
+        count = max(1, int(driven[-1] / apart + 0.5))
+        rows = np.searchsorted(driven, driven[-1] * (np.arange(count) + 0.5) / count)
+        ahead = steps[rows] / lengths[rows, np.newaxis]
+        arrows.append(np.hstack([way[rows + 1], ahead, gears[first + rows, np.newaxis]]))
+    return np.concatenate(arrows)
+
+
+def scale_bar_m(width: float) -> float:
+    """How long the scale bar of a picture ``width`` m wide is: round, a tenth to a quarter of it."""
+    tens = 10.0 ** math.floor(math.log10(width / 4.0))
+    return max(step * tens for step in (1.0, 2.0, 5.0) if step * tens <= width / 4.0)
 
 
 def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[list[Floats], Floats]:

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 
+from dashboards.figures.marks import draw_travel_arrows
 from dashboards.palette import GREEN, INK, PURPLE, SKY
 from dashboards.world_outlines import cusps_of, gears_of, outlines
 from planners.world.arrays import Floats
@@ -24,7 +25,10 @@ _SWEPT: Final = (SKY, 0.28)
 
 
 def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
-    """Draw the way of the reference point along ``plan``, its ``vehicle`` at changes of gear and the end."""
+    """Draw the way of the reference point along ``plan``, with arrows, and what it sweeps.
+
+    The ``vehicle`` is drawn at changes of gear and the end.
+    """
     swept = PathPatch(_path_of(swept_by(plan.states, vehicle)), facecolor=_SWEPT, linewidth=0, zorder=2)
     axes.add_patch(swept)
     gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
@@ -32,6 +36,7 @@ def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     for gear, colour in ((1, FORWARDS), (-1, BACKWARDS)):
         driven = LineCollection(list(steps[gears == gear]), color=colour, linewidth=1.8, zorder=6.5)
         axes.add_collection(driven)
+    draw_travel_arrows(axes, plan, vehicle, {1: FORWARDS, -1: BACKWARDS})
     for row in [*cusps, *[len(gears)] * (len(gears) > 0)]:
         colour = FORWARDS if gears[row - 1] > 0 else BACKWARDS
         bodies, _ = outlines(plan.states[row : row + 1], vehicle)

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, manoeuvre_legend
+from dashboards.figures.marks import draw_scale_bar, draw_travel_arrows
 from dashboards.figures.style import legend_below, message_figure, new_figure
 from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
@@ -48,7 +49,7 @@ class Example(NamedTuple):
 
 
 def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
-    """Draw bounds, obstacles and goal of ``problem``, and the ``vehicle`` at its start, in metres.
+    """Draw bounds, obstacles and goal of ``problem``, the ``vehicle`` at its start, and a scale in metres.
 
     A goal pose is drawn as an outline of the vehicle, a speed at the start as the way of one second.
     """
@@ -84,11 +85,13 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     axes.set_ylim(lower, upper)
     axes.set_aspect("equal")
     axes.set_axis_off()
+    draw_scale_bar(axes, problem.bounds)
 
 
 def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, colour: str = GREEN) -> None:
-    """Draw the way of the reference point along ``plan`` and the ``vehicle`` every few metres."""
+    """Draw the way of the reference point along ``plan``, with arrows; the ``vehicle`` every few metres."""
     axes.plot(*plan.states[:, :2].T, color=colour, linewidth=1.8, zorder=4)
+    draw_travel_arrows(axes, plan, vehicle, {1: colour, -1: colour})
     shown = shown_states(plan, vehicle)
     _draw_bodies(axes, shown, vehicle, facecolor=(colour, 0.2), edgecolor=colour, linewidth=0.8, zorder=3)
 

@@ -7,15 +7,17 @@ from typing import Final
 
 import numpy as np
 
-from dashboards.web.svg import element, points, tooltip
+from dashboards.web.svg import element, points, text, tooltip
 from dashboards.world_outlines import (
     CheckedPlan,
     goal_state,
     goal_tip,
     heading_tip,
     outlines,
+    scale_bar_m,
     shown_states,
     speed_tip,
+    travel_arrows,
 )
 from planners.search.traces import Roads, Trace
 from planners.world.arrays import Floats
@@ -23,12 +25,19 @@ from planners.world.problem import Plan, Problem, start_state
 from planners.world.vehicles.vehicle import Vehicle
 
 _MARGIN_M: Final = 1.0
+_BELOW_M: Final = 2.4  # the frame, for the scale
 _MOST_EDGES: Final = 20_000  # of a tree or a roadmap: more is a blot
 _MOST_NODES: Final = 3_000
 
 
+def shown_size(problem: Problem) -> tuple[float, float]:
+    """Width and height of what ``world_svg`` shows of a ``problem``, in metres."""
+    x_min, y_min, x_max, y_max = problem.bounds
+    return x_max - x_min + 2.0 * _MARGIN_M, y_max - y_min + _MARGIN_M + _BELOW_M
+
+
 def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
-    """A ``problem`` with a ``vehicle`` at its start, and ``layers`` of markup over it; y points up."""
+    """A ``problem``, a ``vehicle`` at its start, ``layers`` of markup over it, and a scale; y points up."""
     x_min, y_min, x_max, y_max = problem.bounds
     place = {"x": x_min, "y": y_min, "width": x_max - x_min, "height": y_max - y_min}
     inner = f"M{x_min:g} {y_min:g}H{x_max:g}V{y_max:g}H{x_min:g}Z"
@@ -46,15 +55,24 @@ def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
         element("line", x1=x, y1=y, x2=tip_x, y2=tip_y, class_="heading"),
         element("g", class_="moving"),
     ]
-    width, height = (size + 2 * _MARGIN_M for size in (x_max - x_min, y_max - y_min))
+    width, height = shown_size(problem)
     return element(
         "svg",
         element("g", *marks, transform="scale(1 -1)"),
+        _scale_bar(problem),
         viewBox=f"{x_min - _MARGIN_M:g} {-y_max - _MARGIN_M:g} {width:g} {height:g}",
         class_="world",
         role="img",
         aria_label=f"World of problem {problem.id}",
     )
+
+
+def _scale_bar(problem: Problem) -> str:
+    """How long some metres are, below the right end of the frame; y points down."""
+    x_min, y_min, x_max, _ = problem.bounds
+    metres = scale_bar_m(x_max - x_min)
+    bar = element("path", d=f"M{x_max - metres:g} {0.9 - y_min:g}h{metres:g}", class_="scale")
+    return bar + text(f"{metres:g} m", x_max - metres - 0.6, 1.5 - y_min, class_="scale")
 
 
 def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
@@ -74,9 +92,16 @@ def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
 
 
 def answer_layer(plan: Plan, vehicle: Vehicle) -> str:
-    """The ``plan`` found: the way of the reference point, and the ``vehicle`` every few metres."""
+    """The ``plan`` found: the way of the reference point with arrows, the ``vehicle`` every few metres."""
     way = element("polyline", points=points(plan.states[:, :2]))
-    return element("g", _bodies(shown_states(plan, vehicle), vehicle, "bodies"), way, class_="found")
+    heads = "".join(
+        f"M{x - 0.5 * ahead - 0.6 * aside:.2f} {y - 0.5 * aside + 0.6 * ahead:.2f}"
+        f"L{x + 0.8 * ahead:.2f} {y + 0.8 * aside:.2f}"
+        f"L{x - 0.5 * ahead + 0.6 * aside:.2f} {y - 0.5 * aside - 0.6 * ahead:.2f}Z"
+        for x, y, ahead, aside, _ in travel_arrows(plan, vehicle).tolist()
+    )
+    bodies = _bodies(shown_states(plan, vehicle), vehicle, "bodies")
+    return element("g", bodies, way, element("path", d=heads), class_="found")
 
 
 def recalled_layer(recalled: CheckedPlan, number: int, order: int, is_answer: bool = False) -> str:

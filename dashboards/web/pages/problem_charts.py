@@ -10,7 +10,14 @@ import pandas as pd
 from dashboards.palette import SERIES
 from dashboards.web.charts import Chart, Drawing, Line, lines
 from dashboards.web.replay import Replay
-from dashboards.web.world_svg import answer_layer, recalled_layer, roadmap_layer, tree_layer, world_svg
+from dashboards.web.world_svg import (
+    answer_layer,
+    recalled_layer,
+    roadmap_layer,
+    shown_size,
+    tree_layer,
+    world_svg,
+)
 from dashboards.world_outlines import CheckedPlan
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
@@ -48,7 +55,8 @@ def world_chart(
         f"Bounds {width:.0f} × {height:.0f} m. The dark box is the vehicle at its start, its line the "
         "heading; the disc is the goal. The plan is that of the row, made again from the same seed."
     )
-    drawing = Drawing("", _SIZE, _SIZE * height / width, world_svg(problem, vehicle, *layers))
+    shown_width, shown_height = shown_size(problem)
+    drawing = Drawing("", _SIZE, _SIZE * shown_height / shown_width, world_svg(problem, vehicle, *layers))
     title = f"The world and its plan ({ended})"
     return Chart("world", title, note, [drawing], _states(plan, vehicle), legend)
 

@@ -22,7 +22,7 @@ function zoomable(svg) {
     text.parentNode.append(text); // above the marks
     return { text, x, y, staysAcross: !(isTick && isMiddle), staysUp: isMiddle || !(isTick || text.classList.contains("label")) };
   });
-  svg.setAttribute("preserveAspectRatio", "none");
+  if (isOfRows) svg.setAttribute("preserveAspectRatio", "none"); // what has a scale keeps its shape
   svg.style.aspectRatio = `${width} / ${height}`; // else the height would follow the part in view
   let times = 1, up = 1, x = left, y = top;
   const show = () => {

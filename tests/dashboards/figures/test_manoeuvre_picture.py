@@ -13,7 +13,7 @@ from shapely import affinity
 
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, swept_by
 from dashboards.figures.pictures import Example, gallery
-from dashboards.world_outlines import cusps_of, gears_of, outlines
+from dashboards.world_outlines import cusps_of, gears_of, outlines, scale_bar_m, travel_arrows
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
@@ -55,6 +55,40 @@ def test_there_and_back_has_one_cusp_where_it_stands() -> None:
     plan = there_and_back()
     assert cusps_of(plan).tolist() == [20]
     assert plan.states[20, 3] == pytest.approx(0.0, abs=1e-9)
+
+
+@given(st.floats(0.0, 7.0), st.floats(-0.5, 0.5), st.integers(0, 30), st.integers(0, 30))
+def test_arrows_stand_on_the_way_and_point_where_it_goes(
+    heading: float, steering: float, forwards: int, backwards: int
+) -> None:
+    states, controls = np.zeros(5), np.zeros((2 * (forwards + backwards), 2))
+    states[2], states[4] = heading, steering
+    for first, count, gear in ((0, forwards, 1.0), (2 * forwards, backwards, -1.0)):
+        controls[first : first + count, 0] = gear
+        controls[first + count : first + 2 * count, 0] = -gear
+    plan = Plan(simulate(states, controls, CAR), controls)
+    arrows = travel_arrows(plan)
+    assert np.allclose(np.hypot(*arrows[:, 2:4].T), 1.0)
+    for x, y, ahead, aside, gear in arrows.tolist():
+        row = np.flatnonzero((plan.states[:, :2] == (x, y)).all(axis=1))[0]
+        facing = plan.states[row, 2]
+        assert gear * (ahead * math.cos(facing) + aside * math.sin(facing)) > 0.9
+    for count, gear in ((forwards, 1), (backwards, -1)):
+        driven_m = (count * CAR.dt) ** 2
+        assert driven_m < CAR.front + CAR.rear or gear in arrows[:, 4]
+
+
+def test_a_plan_that_stands_has_no_arrows() -> None:
+    assert travel_arrows(driven([0.0, 0.0, 0.0])).shape == (0, 5)
+
+
+@given(st.floats(1e-3, 1e6))
+def test_a_scale_is_round_and_a_tenth_to_a_quarter_of_the_width(width: float) -> None:
+    metres = scale_bar_m(width)
+    assert 0.1 * width * (1.0 - 1e-9) <= metres <= 0.25 * width * (1.0 + 1e-9)
+    digits = f"{metres:.3e}"
+    assert digits[0] in "125"
+    assert float(digits[1:5]) == 0.0
 
 
 @given(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0), st.floats(-0.8, 0.8))

@@ -108,6 +108,15 @@ def test_the_vehicle_drives_the_plan_to_its_end(opened: Callable[[str], WebDrive
     wait(driver, lambda d: d.find_element(By.ID, "clock").text not in ("0.0 s", ""))
 
 
+def test_a_world_keeps_its_shape_on_every_screen(opened: Callable[[str], WebDriver]) -> None:
+    driver = opened(PAGES[4])
+    for size in (DESKTOP, PHONE):
+        shown_at(driver, size)
+        of_goal = "return document.querySelector('.world circle.goal').getBoundingClientRect()"
+        disc = driver.execute_script(of_goal)
+        assert disc["width"] == pytest.approx(disc["height"], rel=1e-3)
+
+
 def test_one_recalled_plan_can_be_seen_alone_and_the_tree_asked_for(
     opened: Callable[[str], WebDriver],
 ) -> None:

@@ -1,0 +1,36 @@
+"""Small marks of pictures: arrows along a drive, and the bar that says how long a metre is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from matplotlib.axes import Axes
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+from dashboards.palette import INK
+from dashboards.world_outlines import scale_bar_m, travel_arrows
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import Vehicle
+
+_TIP_M: Final = 1e-3  # between root and tip, so that of an arrow only the head is seen
+
+
+def draw_travel_arrows(axes: Axes, plan: Plan, vehicle: Vehicle, colours: Mapping[int, str]) -> None:
+    """Draw heads of arrows where ``vehicle`` travels along ``plan``, in the colour of the gear, 1 or -1."""
+    for x, y, ahead, aside, gear in travel_arrows(plan, vehicle).tolist():
+        style = {"arrowstyle": "-|>", "color": colours[int(gear)], "linewidth": 0.0, "mutation_scale": 11.0}
+        tip = (x + _TIP_M * ahead, y + _TIP_M * aside)
+        axes.annotate("", tip, (x, y), arrowprops=style | {"shrinkA": 0.0, "shrinkB": 0.0}, zorder=6.6)
+
+
+def draw_scale_bar(axes: Axes, bounds: tuple[float, float, float, float]) -> None:
+    """Draw below the right end of ``bounds`` (in metres) how long some metres are."""
+    metres = scale_bar_m(bounds[2] - bounds[0])
+    axes.add_artist(
+        AnchoredSizeBar(
+            axes.transData, metres, f"{metres:g} m", "upper right", pad=0.0, borderpad=0.3, sep=2.0,
+            frameon=False, color=INK, size_vertical=0.0, fontproperties={"size": 8.0},
+            bbox_to_anchor=(bounds[2], bounds[1]), bbox_transform=axes.transData,
+        )
+    )  # fmt: skip
