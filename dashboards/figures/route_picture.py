@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from dashboards.figures.map_picture import draw_map
 from dashboards.figures.style import legend_below, new_figure
 from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.world.arrays import Floats
 from planners.world.vehicles.vehicle import CAR, Vehicle
@@ -22,12 +24,13 @@ COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
 _OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
+GOAL_ARROW_M: Final = 8.0  # canonical metres, where a goal is a pose
 
 
 def route_picture(
     world: OccupancyMap,
     route: Route,
-    goals: list[tuple[float, float]],
+    stops: Sequence[Stop],
     scale: float,
     caption: str,
     vehicle: Vehicle = CAR,
@@ -37,7 +40,7 @@ def route_picture(
     Args:
         world: the map, in metres.
         route: the route, in canonical metres.
-        goals: x, y of each goal in metres of the map.
+        stops: the goals, in canonical metres.
         scale: metres of the map in a canonical metre.
         caption: text above the map.
         vehicle: the vehicle that drives the route.
@@ -62,8 +65,14 @@ def route_picture(
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
         axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=3.5, zorder=7)
         sources.append(leg.source)
-    several = len(goals) > 1
-    for number, goal in enumerate(goals, start=1):
+    several = len(stops) > 1
+    for number, stop in enumerate(stops, start=1):
+        goal = _placed(world, scale * np.array([stop.place]))[0]
+        if stop.arrival.heading is not None:
+            ahead = world.origin[2] + stop.arrival.heading
+            tip = goal + scale * GOAL_ARROW_M * np.array([math.cos(ahead), math.sin(ahead)])
+            arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6}
+            axes.annotate("", tip, goal, arrowprops=arrow, zorder=9, annotation_clip=False)
         axes.plot(
             *goal,
             marker="o" if several else "*",

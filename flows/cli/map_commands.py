@@ -167,6 +167,11 @@ def route(
     *,
     begin: Annotated[str, Parameter(name="--from", allow_leading_hyphen=True)],
     end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True, negative=())],
+    goal_tolerance: str | None = None,
+    start_speed: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    start_steering: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    start_turn_rate: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
+    start_hitch: Annotated[list[float] | None, Parameter(allow_leading_hyphen=True, negative=())] = None,
     format: str | None = None,
     assist: AssistName | None = None,
     out: Path | None = None,
@@ -179,7 +184,14 @@ def route(
     Args:
         path: A map: .map, .yaml (ROS), .npy, .npz.
         begin: Pose of the vehicle in the map's frame: x,y,heading, in metres and radians.
-        end: Goal: x,y in metres. Can be repeated: the drive then passes all goals in this order.
+        end: Goal: x,y in metres, or the pose x,y,heading, as of a slot. Can be repeated: the drive then stops
+            at all goals in this order.
+        goal_tolerance: How far from a pose the vehicle may stop: metres,radians. Default: 0.1,0.05, of which
+            the metres are times the scale.
+        start_speed: Speed at the start if the vehicle moves, m/s, below 0 backwards.
+        start_steering: How a car's wheels are steered at the start, radians.
+        start_turn_rate: How fast a differential drive turns at the start, rad/s.
+        start_hitch: Hitch angle of a trailer at the start, radians; once for each trailer.
         format: moving-ai, ros or numpy; by default recognised by the file's ending.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, fresh
             without.
@@ -189,12 +201,19 @@ def route(
         reading: How the map is read.
     """
     from tasks.requests.assistant import Assistant
-    from tasks.requests.drive_route import drive_route
+    from tasks.requests.drive_route import RouteRequest, drive_route
     from tasks.requests.import_worlds import import_settings
 
     assistant = Assistant(options.settings(assist, without_memory="fresh"))
     settings = import_settings(assistant.settings.vehicle, options.seed, **asdict(reading))
-    driven = drive_route(path, format, begin, end, assistant, settings, out, picture)
+    motion = {
+        "start_speed": start_speed,
+        "start_steering": start_steering,
+        "start_turn_rate": start_turn_rate,
+        "start_hitch": start_hitch,
+    }
+    request = RouteRequest(begin, end, goal_tolerance, motion)
+    driven = drive_route(path, format, request, assistant, settings, out, picture)
     write_for_people(options.vehicle_line(assistant.settings))
     write(driven.legs)
     write_answer(*driven.summary, **driven.answer)

@@ -1,4 +1,4 @@
-"""A route: one feasible drive from a pose to a distant goal, made of local plans that need not end at rest.
+"""A route: one feasible drive from a state to a distant goal, made of local plans that need not end at rest.
 
 The horizon recedes: from the state in which it drives, the vehicle plans to a local goal on the shortest
 path, drives a part of that plan, and plans on from the state that it then has. It changes from one plan to
@@ -10,7 +10,7 @@ a leg.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -21,8 +21,9 @@ from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
-from planners.routes.path_ahead import LocalGoal, PathAhead
+from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
 from planners.search.braking import free_stop, is_free_drive
+from planners.search.free_goal import has_free_goal, with_free_goal
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
@@ -30,13 +31,12 @@ from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
     GOAL_RADIUS,
-    Arrival,
     Plan,
     Problem,
     start_state,
 )
 from planners.world.vehicles.dynamics import control_limits, simulate
-from planners.world.vehicles.vehicle import CAR, Vehicle
+from planners.world.vehicles.vehicle import CAR, DifferentialDrive, Vehicle
 
 SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
@@ -44,7 +44,7 @@ ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and 
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
-AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
+OF_TOLERANCES: Final = 0.99  # that plans to a pose may use: rounding must not lead out of them
 
 Solve = Callable[[Problem], Attempt]
 
@@ -81,11 +81,11 @@ class Stuck(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Route:
-    """Legs from a start to the last of some goals."""
+    """Legs from a start to the last of some stops."""
 
-    problem: Problem  # the whole one: start, last goal, everything that is occupied
-    sections: list[list[Leg]]  # to each goal the legs of the drive from rest to rest
-    paths: list[Floats]  # to each goal the shortest path over the cells, [n, 2] metres
+    problem: Problem  # the whole one: start, last stop, everything that is occupied
+    sections: list[list[Leg]]  # to each stop the legs of the drive, all but the first from rest
+    paths: list[Floats]  # to each stop the shortest path over the cells, [n, 2] metres
 
     @property
     def legs(self) -> list[Leg]:
@@ -93,16 +93,16 @@ class Route:
         return [leg for section in self.sections for leg in section]
 
     def least_seconds(self, vehicle: Vehicle) -> float:
-        """Return how long as many metres take at full speed, from rest to rest at each goal."""
+        """Return how long as many metres take at full speed, from the start's to rest at each stop."""
         acceleration, _ = control_limits(vehicle)
-        top = vehicle.max_speed
-        seconds = 0.0
+        seconds, speed = 0.0, abs(float(start_state(self.problem, vehicle)[3]))
         for section in self.sections:
             metres = sum(Plan(leg.states(vehicle), leg.controls).length_m for leg in section)
-            if metres > top * top / acceleration:
-                seconds += metres / top + top / acceleration
-            else:
-                seconds += 2.0 * math.sqrt(metres / acceleration)
+            as_if_from_rest = metres + 0.5 * speed * speed / acceleration
+            highest = min(vehicle.max_speed, math.sqrt(acceleration * as_if_from_rest))
+            at_it = as_if_from_rest - highest * highest / acceleration
+            seconds += (2.0 * highest - speed) / acceleration + at_it / highest if highest > 0.0 else 0.0
+            speed = 0.0
         return seconds
 
     def plan(self, vehicle: Vehicle) -> Plan:
@@ -143,26 +143,39 @@ class Router:
         self._roomy_paths = GlobalPaths(roomy, 1.0)  # for where the shortest path is too narrow to drive
         self._attempts = self._most_attempts = 0
 
-    def route(self, start: Pose, goals: list[Point]) -> Route | Stuck:
-        """Find a route from a pose (m, m, rad) through all ``goals``, with a stop in the disc around each."""
-        whole = replace(self._whole, start=start, goal=goals[-1])
+    def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
+        """Find a route from a pose (m, m, rad) through all ``stops``.
+
+        Args:
+            start: where the drive begins.
+            stops: where the vehicle is to come to rest, in this order.
+            motion: the state at the start behind the pose, speed (m/s) first; what is missing is 0.
+        """
+        begun = replace(self._whole, start=start, start_motion=motion)
+        asked = [
+            replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
+        ]
+        whole = asked[-1]
         state = start_state(whole, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             return Stuck(start[:2], "the vehicle would stand in an obstacle or outside the map", 0)
-        for x, y in goals:
-            if not point_is_free(x, y, self._scene):
-                return Stuck((x, y), "the goal lies in an obstacle or outside the map", 0)
+        for stop, to_stop in zip(stops, asked, strict=True):
+            if not point_is_free(*stop.place, self._scene):
+                return Stuck(stop.place, "the goal lies in an obstacle or outside the map", 0)
+            aimed = with_free_goal(to_stop, self._vehicle, self._scene)
+            if not has_free_goal(aimed, self._vehicle, self._scene):
+                return Stuck(stop.place, "the vehicle has no room in the goal pose", 0)
         sections: list[list[Leg]] = []
         paths = []
         self._attempts = 0
-        for goal in goals:
-            ahead = PathAhead(self._paths, goal)
+        for stop in stops:
+            ahead = PathAhead(self._paths, stop, self._scene)
             path = ahead.path(state)
             if path is None:
-                return Stuck(goal, "the goal cannot be reached: no way over the map leads there", 0)
+                return Stuck(stop.place, "the goal cannot be reached: no way over the map leads there", 0)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
-                around = PathAhead(self._roomy_paths, goal)
+                around = PathAhead(self._roomy_paths, stop, self._scene)
                 again = more if around.path(state) is None else self._legs_to(around, state)
                 if isinstance(again, Stuck):
                     return more
@@ -173,13 +186,13 @@ class Router:
         return Route(whole, sections, paths)
 
     def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
-        """Search the legs from a state to rest at one goal, depth first."""
+        """Search the legs from a state to rest at one stop, depth first."""
         legs: list[Leg] = []
         options = [self._legs_from(ahead, state)]
         begun = self._attempts
         self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
         start = nearest = state
-        while not (ahead.arrived(state[np.newaxis])[0] and np.abs(state[3:5]).max() < RESTING):
+        while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
             leg = next(options[-1], None)
             if leg is not None:
                 legs.append(leg)
@@ -196,6 +209,11 @@ class Router:
             nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
         return legs
 
+    def _rests(self, state: Floats) -> bool:
+        """Whether the vehicle stands, however its wheels are steered."""
+        moving = state[3:5] if isinstance(self._vehicle, DifferentialDrive) else state[3:4]
+        return bool(np.abs(moving).max() < RESTING)
+
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
@@ -208,6 +226,9 @@ class Router:
                 continue
             states = simulate(state, attempt.plan.controls, self._vehicle)
             drive = _Drive(states, attempt.plan.controls, attempt, problem, goal)
+            if goal.final and ahead.stop.is_pose:
+                yield from self._arrivals(ahead, drive)
+                continue
             ends = [self._handovers(ahead, drive), self._stops(ahead, drive)]
             for legs in reversed(ends) if goal.final else ends:
                 yield from legs
@@ -231,10 +252,27 @@ class Router:
             window,
             start=place,
             goal=end,
+            goal_radius=goal.radius,
             start_motion=tuple(motion.tolist()),
-            arrival=AT_REST if goal.at_rest else None,
+            arrival=goal.arrival,
         )
+        if goal.arrival is not None and goal.arrival.heading is not None:
+            asked = replace(
+                asked,
+                goal_radius=OF_TOLERANCES * goal.radius,
+                arrival=goal.arrival._replace(
+                    heading=along + goal.arrival.heading - towards,
+                    heading_tolerance=OF_TOLERANCES * goal.arrival.heading_tolerance,
+                    hitch_tolerances=tuple(OF_TOLERANCES * each for each in goal.arrival.hitch_tolerances),
+                ),
+            )
         return to_canonical(asked)[0]
+
+    def _arrivals(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
+        """Yield a drive to a pose as a whole."""
+        last = drive.states[-1]
+        if is_free_drive(drive.states, self._vehicle, self._scene) and ahead.arrived(last[np.newaxis])[0]:
+            yield drive.leg(len(drive.controls), np.empty((0, 2)), last)
 
     def _handovers(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:
         """Yield the parts of a drive after which the next plan may begin: there the vehicle could brake."""

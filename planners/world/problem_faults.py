@@ -33,7 +33,7 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     """
     fault = (
         frame_fault(problem)
-        or _start_fault(problem, vehicle)
+        or motion_fault(problem, vehicle)
         or _arrival_fault(problem.arrival, problem.scale, vehicle)
     )
     if fault is not None:
@@ -61,8 +61,8 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     return None
 
 
-def _start_fault(problem: Problem, vehicle: Vehicle) -> str | None:
-    """What is wrong with the motion at the start, which the vehicle must be able to have."""
+def motion_fault(problem: Problem, vehicle: Vehicle) -> str | None:
+    """Return what is wrong with the motion at the start, which the vehicle must be able to have, or None."""
     names = state_names(vehicle)[3:]
     if len(problem.start_motion) > len(names):
         return f"the start has {len(problem.start_motion)} numbers of motion, expected {', '.join(names)}"

@@ -1,11 +1,11 @@
-"""The command ``route``: one drive across a map, from a pose through goals, made of local plans."""
+"""The command ``route``: one drive across a map, from a state through goals, made of local plans."""
 
 from __future__ import annotations
 
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,13 +15,17 @@ import numpy as np
 from dashboards.cells import CellTable, decimal
 from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.path_ahead import AT_REST, POSE_RADIUS, POSE_TOLERANCE, Stop
 from planners.routes.route import Leg, Route, Router, Stuck
 from planners.world.alignment import Alignment, from_canonical
-from planners.world.arrays import Point, Pose
+from planners.world.arrays import Pose
 from planners.world.authority.authority import faults
+from planners.world.checked_problem import NO_OBSTACLES
 from planners.world.problem import Plan, Problem
+from planners.world.problem_faults import motion_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
+from storage.exchange.question_fields import start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
@@ -67,22 +71,80 @@ class DrivenRoute(NamedTuple):
     answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of
 
 
-def _numbers_of(text: str, count: int, option: str, meaning: str) -> tuple[float, ...]:
-    """The numbers in a text like ``1,2``. Raises UsageError unless there are ``count``, all finite."""
+class RouteRequest(NamedTuple):
+    """From where to where, as texts of numbers with commas between them, in metres and radians of the map."""
+
+    start: str  # x,y,heading
+    goals: Sequence[str]  # x,y or x,y,heading each, in the order of the drive
+    goal_tolerance: str | None = None  # metres,radians by which poses may be missed; None: the usual
+    motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
+
+
+def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:
+    """The numbers in a text like ``1,2``. Raises UsageError unless they are finite, and as many as may be."""
     try:
         numbers = tuple(float(part) for part in text.split(","))
     except ValueError:
         numbers = ()
-    if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
-        raise UsageError(f"{option} {text!r}: give {meaning}, {count} numbers with commas between them.")
+    if len(numbers) not in counts or not all(math.isfinite(number) for number in numbers):
+        many = " or ".join(map(str, counts))
+        raise UsageError(f"{option} {text!r}: give {meaning}, {many} numbers with commas between them.")
     return numbers
+
+
+def _stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[Stop]:
+    """The goals of a request over a map, in canonical metres of its grid. Raises UsageError."""
+    radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
+    if request.goal_tolerance is not None:
+        radius, turn = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
+        if not (radius > 0.0 and turn > 0.0):
+            raise UsageError(
+                f"--goal-tolerance {request.goal_tolerance!r}: give numbers above 0, or leave it out for "
+                f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
+            )
+    stops = []
+    for goal in request.goals:
+        x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
+        right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
+        place = right / scale, up / scale
+        if heading:
+            _warn_of_degrees("The heading of --to", heading[0])
+            pose = AT_REST._replace(heading=facing, heading_tolerance=turn)
+            stops.append(Stop(place, radius / scale, pose))
+        else:
+            stops.append(Stop(place))
+    if not stops:
+        raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
+    if request.goal_tolerance is not None and not any(stop.is_pose for stop in stops):
+        raise UsageError("--goal-tolerance is for poses: give --to x,y,heading, or leave it out.")
+    return stops
+
+
+def _motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[float, ...]:
+    """The motion at the start in canonical metres a second, speed first. Raises UsageError."""
+    try:
+        given = start_motion_of(request.motion, vehicle)
+    except ValueError as error:
+        raise UsageError(f"The start {error}.") from None
+    motion = (given[0] / scale, *given[1:]) if given else ()
+    unbounded = (-math.inf, -math.inf, math.inf, math.inf)
+    start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, motion)
+    fault = motion_fault(start, vehicle)
+    if fault is not None:
+        raise UsageError(f"The {fault}.")
+    return motion
+
+
+def _warn_of_degrees(what: str, heading: float) -> None:
+    hint = degrees_hint(what, heading)
+    if hint is not None:
+        _LOG.warning("%s.", hint)
 
 
 def drive_route(
     path: Path,
     map_format: str | None,
-    start: str,
-    goals: list[str],
+    request: RouteRequest,
     assistant: Assistant,
     settings: ImportSettings,
     out: Path | None,
@@ -93,8 +155,7 @@ def drive_route(
     Args:
         path: the map's file.
         map_format: the file's format, or None to recognise it by the file's ending.
-        start: the first pose as ``x,y,heading``, in metres and radians, in the map's frame.
-        goals: the goals in the order of the drive, each as ``x,y`` in metres.
+        request: from where to where.
         assistant: solves the local problems.
         settings: how to read the map, and the metres of the map in a canonical metre.
         out: where to write the plan, or None.
@@ -109,13 +170,8 @@ def drive_route(
     check_plan_file(out)
     check_picture(drawing)
     check_known("format", [] if map_format is None else [map_format], FORMATS)
-    pose = _numbers_of(start, 3, "--from", "x,y,heading in metres and radians")
-    hint = degrees_hint("The heading of --from", pose[2])
-    if hint is not None:
-        _LOG.warning("%s.", hint)
-    goals_m = [(x, y) for x, y in (_numbers_of(goal, 2, "--to", "x,y in metres") for goal in goals)]
-    if not goals_m:
-        raise UsageError("There is no goal: give --to x,y once or more often.")
+    pose = _numbers_of(request.start, [3], "--from", "x,y,heading in metres and radians")
+    _warn_of_degrees("The heading of --from", pose[2])
     if assistant.vehicle.min_speed >= 0.0:
         raise UsageError(
             f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
@@ -126,6 +182,7 @@ def drive_route(
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = load_map(source, settings)
     scale = settings.scale
+    stops, motion = _stops_of(request, world, scale), _motion_of(request, assistant.vehicle, scale)
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
     if max(canonical.size) > WIDEST_M:
         raise UsageError(
@@ -140,13 +197,12 @@ def drive_route(
 
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
-    grid_goals = [world.grid_pose(*goal, 0.0)[:2] for goal in goals_m]
-    request = ((x / scale, y / scale, heading), [(right / scale, up / scale) for right, up in grid_goals])
-    _drive_mirrored(router_over, canonical, *request)
+    asked = (x / scale, y / scale, heading), stops, motion
+    _drive_mirrored(router_over, canonical, *asked)
     OtherWork()()
     solver.seconds.clear()
     began = time.perf_counter()
-    route = router.route(*request)
+    route = router.route(*asked)
     seconds = time.perf_counter() - began
     if isinstance(route, Stuck):
         raise _refusal(route, world, scale)
@@ -160,7 +216,7 @@ def drive_route(
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
         from dashboards.figures.style import save_picture
 
-        figure = route_picture(world, route, goals_m, scale, summary[0], assistant.vehicle)
+        figure = route_picture(world, route, stops, scale, summary[0], assistant.vehicle)
         save_picture(figure, drawing)
     more = {
         "legs": len(route.legs),
@@ -172,13 +228,28 @@ def drive_route(
 
 
 def _drive_mirrored(
-    router_over: Callable[[OccupancyMap], Router], world: OccupancyMap, start: Pose, goals: Sequence[Point]
+    router_over: Callable[[OccupancyMap], Router],
+    world: OccupancyMap,
+    start: Pose,
+    stops: Sequence[Stop],
+    motion: tuple[float, ...],
 ) -> None:
     """Find the route of the mirrored map: the code is ready then, but no problem of the route is known."""
     width = world.size[0]
     x, y, heading = start
     across = router_over(replace(world, occupied=world.occupied[:, ::-1].copy()))
-    across.route((width - x, y, math.pi - heading), [(width - goal_x, goal_y) for goal_x, goal_y in goals])
+    asked = [
+        Stop(
+            (width - stop.place[0], stop.place[1]),
+            stop.radius,
+            stop.arrival._replace(
+                heading=None if stop.arrival.heading is None else math.pi - stop.arrival.heading
+            ),
+        )
+        for stop in stops
+    ]
+    turned = motion[:1] + tuple(-each for each in motion[1:])
+    across.route((width - x, y, math.pi - heading), asked, turned)
 
 
 def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:

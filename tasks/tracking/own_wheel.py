@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import os
 import zipfile
 from importlib.metadata import distribution
 from importlib.util import find_spec
@@ -48,8 +49,9 @@ def _files() -> dict[str, bytes]:
         spec = find_spec(package)
         assert spec is not None  # the package that is running
         (root,) = map(Path, spec.submodule_search_locations or ())
-        for path in sorted(root.rglob("*")):
-            if path.is_file() and _CACHES not in path.parts:
+        for folder, folders, names in os.walk(root):
+            folders[:] = sorted(set(folders) - {_CACHES})  # which may hold thousands of compiled kernels
+            for path in (Path(folder, name) for name in sorted(names)):
                 files[str(path.relative_to(root.parent))] = path.read_bytes()
     return files
 

@@ -18,13 +18,13 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
-from planners.routes.path_ahead import PathAhead
+from planners.routes.path_ahead import POSE_RADIUS, POSE_TOLERANCE, PathAhead, Stop
 from planners.routes.route import Route, Router, Stuck
 from planners.search.braking import braking, is_free_drive
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
-from planners.world.problem import GOAL_RADIUS, Problem
+from planners.world.problem import GOAL_RADIUS, Arrival, Problem
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle
 from storage.vehicles.vehicle_files import read_vehicle
@@ -32,7 +32,7 @@ from tests.planners.maps.samples import town
 from tests.planners.memories import memory_of
 
 START = (12.0, 150.0, 2.0)
-GOALS = [(250.0, 262.0), (285.0, 40.0)]
+GOALS = [Stop((250.0, 262.0)), Stop((285.0, 40.0))]
 
 
 def searched(problem: Problem, vehicle: Vehicle = CAR) -> Attempt:
@@ -59,11 +59,18 @@ def check(found: Route | Stuck, vehicle: Vehicle = CAR) -> Route:
     return found
 
 
+def path_ahead(world: OccupancyMap, stop: Stop) -> PathAhead:
+    whole = Problem(
+        "", "", START, (0.0, 0.0), 1.0, (0.0, 0.0, *world.size), surroundings_of(world).obstacles()
+    )
+    return PathAhead(GlobalPaths(world, 1.0), stop, scene_of(whole))
+
+
 def test_a_route_is_one_feasible_plan_through_all_goals() -> None:
     found = check(Router(town(), searched).route(START, GOALS))
     assert [leg.source for leg in found.legs] == ["searched"] * len(found.legs)
     for goal, section in zip(GOALS, found.sections, strict=True):
-        assert math.dist(section[-1].end[:2], goal) <= GOAL_RADIUS
+        assert math.dist(section[-1].end[:2], goal.place) <= GOAL_RADIUS
         assert np.abs(section[-1].end[3:5]).max() < 1e-9  # it rests at each goal
     plan = found.plan(CAR)
     shortest = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in found.paths)
@@ -123,19 +130,19 @@ def test_legs_begin_exactly_as_those_before_end() -> None:
     router = Router(
         OccupancyMap("blocks", occupied[::-1].copy(), 1.0), partial(searched, vehicle=hunter), hunter
     )
-    found = check(router.route((20.0, 20.0, 0.8), [(200.0, 210.0)]), hunter)
+    found = check(router.route((20.0, 20.0, 0.8), [Stop((200.0, 210.0))]), hunter)
     for leg in found.legs:
         moving = np.where(np.abs(leg.begin[3:]) < 1e-8, 0.0, leg.begin[3:])
         assert leg.problem.start_motion == tuple(moving)
 
 
 def test_a_goal_that_is_near_takes_one_leg() -> None:
-    found = check(Router(town(), searched).route(START, [(30.0, 160.0)]))
+    found = check(Router(town(), searched).route(START, [Stop((30.0, 160.0))]))
     assert len(found.legs) == 1
 
 
 def test_who_is_there_already_drives_nowhere() -> None:
-    found = check(Router(town(), searched).route(START, [(START[0] + 1.0, START[1])]))
+    found = check(Router(town(), searched).route(START, [Stop((START[0] + 1.0, START[1]))]))
     assert found.legs == []
 
 
@@ -146,13 +153,13 @@ def test_occupied_and_unreachable_places_are_said() -> None:
     row, column = np.argwhere(world.occupied)[0].tolist()
     inside = (column + 0.5, row + 0.5)
     for asked, start, goal, why in (
-        (world, (*inside, 0.0), GOALS[0], "stand in an obstacle"),
+        (world, (*inside, 0.0), GOALS[0].place, "stand in an obstacle"),
         (world, START, inside, "the goal lies in an obstacle"),
-        (world, (-5.0, 3.0, 0.0), GOALS[0], "outside the map"),
+        (world, (-5.0, 3.0, 0.0), GOALS[0].place, "outside the map"),
         (world, START, (400.0, 3.0), "outside the map"),
-        (walled, START, GOALS[0], "cannot be reached"),
+        (walled, START, GOALS[0].place, "cannot be reached"),
     ):
-        found = Router(asked, searched).route(start, [goal])
+        found = Router(asked, searched).route(start, [Stop(goal)])
         assert isinstance(found, Stuck)
         assert why in found.why
         assert found.attempts == 0
@@ -171,7 +178,7 @@ def test_where_no_local_problem_is_solved_the_route_ends_with_a_place() -> None:
 def test_the_way_to_go_is_that_of_the_shortest_path() -> None:
     world = OccupancyMap("wall", np.zeros((100, 100), bool), 1.0)
     world.occupied[:90, 50] = True
-    ahead = PathAhead(GlobalPaths(world, 1.0), (80.5, 10.5))
+    ahead = path_ahead(world, Stop((80.5, 10.5)))
     poses = np.array([[20.5, 10.5, 0.0], [80.5, 40.5, 0.0], [80.0, 11.0, 0.0]])
     path = ahead.path(poses[0])
     assert path is not None
@@ -183,7 +190,7 @@ def test_the_way_to_go_is_that_of_the_shortest_path() -> None:
 def test_local_goals_lie_on_the_path_and_the_goal_comes_first_where_it_is_near() -> None:
     world = OccupancyMap("wall", np.zeros((100, 100), bool), 1.0)
     world.occupied[:90, 50] = True
-    ahead = PathAhead(GlobalPaths(world, 1.0), (80.5, 10.5))
+    ahead = path_ahead(world, Stop((80.5, 10.5)))
     far, near = np.array([20.5, 10.5, 0.0]), np.array([80.5, 50.5, 0.0])
     assert not any(goal.final for goal in ahead.local_goals(far))
     assert [goal.final for goal in ahead.local_goals(near)[:3]] == [True, True, False]
@@ -191,3 +198,69 @@ def test_local_goals_lie_on_the_path_and_the_goal_comes_first_where_it_is_near()
         metres = [ahead.to_go(np.array([goal.place]))[0] for goal in ahead.local_goals(pose)]
         assert metres == sorted(metres)
         assert max(metres) < ahead.to_go(pose[np.newaxis])[0]
+
+
+def slots(width: int = 10) -> OccupancyMap:
+    """Two rows of slots, ``width`` cells of 0.15 m wide, on either side of an aisle, and a street to it."""
+    occupied = np.ones((300, 800), bool)
+    occupied[60:95, 20:780] = False  # the aisle
+    occupied[20:280, 20:60] = False  # the street
+    for first in range(200, 760, width + 2):
+        occupied[95:112, first : first + width] = False
+        occupied[43:60, first : first + width] = False
+    return OccupancyMap("slots", occupied, 0.15)
+
+
+def into_slot(number: int, heading: float, width: int = 10) -> Stop:
+    """In the middle of the upper slot of that ``number``, facing up or down."""
+    x = 0.15 * (200 + number * (width + 2) + 0.5 * width)
+    y = 0.15 * (97.0 + 2.0 if heading > 0.0 else 97.0 + 11.0)
+    return Stop((x, y), POSE_RADIUS, Arrival(heading, POSE_TOLERANCE, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("heading", [0.5 * math.pi, -0.5 * math.pi])
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE])
+def test_a_route_ends_in_a_slot_and_leads_out_of_it(vehicle: Vehicle, heading: float) -> None:
+    into = into_slot(25, heading)
+    back = Stop((6.0, 6.0))
+    router = Router(slots(), partial(searched, vehicle=vehicle), vehicle)
+    found = check(router.route((6.0, 36.0, -0.5 * math.pi), [into, back]), vehicle)
+    there, _ = found.sections
+    parked = there[-1].end
+    assert math.dist(parked[:2], into.place) <= POSE_RADIUS
+    assert abs(parked[2] - heading) % math.tau <= POSE_TOLERANCE
+    assert parked[3] == pytest.approx(0.0, abs=1e-8)
+    alone = check(router.route((6.0, 36.0, -0.5 * math.pi), [into]), vehicle)
+    assert faults(alone.problem, alone.plan(vehicle), vehicle) == []
+
+
+def test_poses_without_room_are_said() -> None:
+    for narrow in (6, 2):
+        found = Router(slots(narrow), searched).route((6.0, 36.0, -1.57), [into_slot(9, 1.57, narrow)])
+        assert isinstance(found, Stuck)
+        assert "no room in the goal pose" in found.why
+
+
+@pytest.mark.parametrize("speed", [4.0, 2.0, -1.0])
+def test_a_route_goes_on_from_the_motion_of_the_start(speed: float) -> None:
+    motion = (speed, 0.2)
+    found = check(Router(town(), searched).route(START, GOALS, motion))
+    assert found.plan(CAR).states[0].tolist() == [*START, *motion]
+    assert found.legs[0].problem.start_motion == motion
+    assert found.least_seconds(CAR) <= found.plan(CAR).duration_s
+
+
+def test_who_is_there_but_moves_has_to_stop_first() -> None:
+    found = check(Router(town(), searched).route(START, [Stop((START[0] - 1.0, START[1]))], (3.0,)))
+    assert found.legs
+    end = found.plan(CAR).states[-1]
+    assert math.dist(end[:2], (START[0] - 1.0, START[1])) <= GOAL_RADIUS
+    assert end[3] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_a_train_parks_with_the_hitch_that_is_asked_for() -> None:
+    at = Stop((50.0, 11.5), POSE_RADIUS, Arrival(0.0, POSE_TOLERANCE, 0.0, 0.0, (0.0,), (0.1,)))
+    vehicle = CAR_1_TRAILER
+    router = Router(slots(), partial(searched, vehicle=vehicle), vehicle)
+    found = check(router.route((6.0, 36.0, -0.5 * math.pi), [at]), vehicle)
+    assert abs(found.plan(vehicle).states[-1, 5]) <= 0.1

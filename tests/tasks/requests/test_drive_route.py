@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from pathlib import Path
@@ -95,6 +96,23 @@ def test_a_route_at_a_scale_over_a_turned_map_can_be_driven(
     assert picture.stat().st_size > 10_000
 
 
+def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path) -> None:
+    out, picture = tmp_path / "plan.json", tmp_path / "route.png"
+    begin, end, heading = placed(8.0, 6.0), placed(150.0, 190.0), 1.0 + TURNED[2]
+    asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--goal-tolerance", "0.06,0.02"]
+    asked += ["--start-speed", "1.5", "--start-steering", "-0.1", "--picture", str(picture)]
+    asked += ["--from", f"{begin[0]},{begin[1]},{0.3 + TURNED[2]}", "--to", f"{end[0]},{end[1]},{heading}"]
+    assert call([*asked, "--out", str(out)]) == 0
+    written = json.loads(out.read_text())
+    assert written["states"][0][3:] == [1.5, -0.1]
+    last = written["states"][-1]
+    assert math.dist(last[:2], end) <= 0.06
+    assert abs(math.remainder(last[2] - heading, math.tau)) <= 0.02
+    assert last[3] == pytest.approx(0.0, abs=1e-8)
+    assert in_free_cells(np.array(written["states"]))
+    assert picture.stat().st_size > 10_000
+
+
 def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) -> None:
     out = tmp_path / "plan.json"
     asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", "150,190", "--to", "10,190"]
@@ -113,6 +131,13 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "8,6,nan", "--to", "150,190"], 2, "--from '8,6,nan': give x,y,heading"),
         (["--from", "8,6,0", "--to", "north"], 2, "--to 'north': give x,y"),
         (["--from", "8,6,0"], 2, "--to"),
+        (["--from", "8,6,0", "--to", "150,190,0,0"], 2, "--to '150,190,0,0': give x,y"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "1"], 2, "metres,radians, 2 numbers"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "0,1"], 2, "numbers above 0"),
+        (["--from", "8,6,0", "--to", "150,190", "--goal-tolerance", "1,1"], 2, "for poses: give --to x,y"),
+        (["--from", "8,6,0", "--to", "150,190", "--start-speed", "5"], 2, "start speed is 5 m/s; the veh"),
+        (["--from", "8,6,0", "--to", "150,190", "--start-turn-rate", "1"], 2, "has speed, steering"),
+        (["--from", "8,6,0", "--to", "150,190", "--start-hitch", "0.1"], 2, "has no trailer"),
         (["--from", "-8,6,0", "--to", "150,190"], 2, "outside the map, at (-8.0, 6.0)"),
         (["--from", "8,6,0", "--to", "150,1900"], 2, "outside the map, at (150.0, 1900.0)"),
         (["--from", "8,6,0", "--to", "150,190", "--scale", "0"], 2, "Scale is 0"),
