@@ -7,25 +7,44 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from flows.cli.choices import UnknownCells
 from flows.cli.run_options import worker_count
 from flows.cli.terminal import telling, write, write_answer, write_files
 
 
 def verify(
-    path: Path, *, problems: Path | None = None, sample: float = 0.02, workers: int | None = None
+    path: Path,
+    *,
+    problems: Path | None = None,
+    map: Path | None = None,
+    resolution: float | None = None,
+    unknown: UnknownCells = "occupied",
+    tolerance: float = 0.0,
+    sample: float = 0.02,
+    workers: int | None = None,
 ) -> None:
     """Judge the plans of a file or folder, or check a whole data folder and make some attempts again.
 
     Args:
         path: A plan's file, a folder of them, the folder of a memory or library, or a data folder.
         problems: With the files of plans: the file of their problems, in which each is judged.
+        map: With the files of routes: the map on which each is judged, .map, .yaml (ROS), .npy, .npz.
+        resolution: Metres in a cell of a .map or NumPy map; default 1.
+        unknown: What unknown cells of the map count as.
+        tolerance: Metres that outlines of obstacles of the map may move; as for the route.
         sample: With a data folder: share of the benchmark's problems that are attempted again, 0 to 1.
         workers: With a data folder: worker processes; default one for each core.
     """
+    from tasks.requests.import_worlds import import_settings
+    from tasks.requests.verify import VerifiedMap
     from tasks.requests.verify import verify as task
     from tasks.requests.verify_plans import NO_PLAN
 
-    checked = task(path, problems, sample, worker_count(workers))
+    reading = import_settings(
+        "car", 1, scale=None, resolution=resolution, unknown=unknown, tolerance=tolerance
+    )
+    on_map = None if map is None else VerifiedMap(map, reading)
+    checked = task(path, problems, sample, worker_count(workers), on_map)
     lines = [f"{count:9,} {what}" for what, count in checked.items()]
     was_judged = any(count for what, count in checked.items() if what != NO_PLAN)
     end = "No fault found." if was_judged else "There was no plan to judge."

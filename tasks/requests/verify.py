@@ -4,16 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 from storage.archives.libraries import HEADERS
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, is_remote, local_place
+from storage.worlds.importing import ImportSettings, load_map
+from storage.worlds.sources import source_at
+from tasks.requests.map_plans import MapJudge
 from tasks.requests.verify_plans import verify_plan_files, verify_stored_plans
 from tasks.servers.prefect_server import set_environment
 from tasks.settings.errors import RunError, UsageError
 
 
-def verify(path: Path, problems: Path | None, sample: float, workers: int) -> Counter[str]:
+class VerifiedMap(NamedTuple):
+    """The map on which plans are judged, and how it is read."""
+
+    path: Path
+    settings: ImportSettings
+
+
+def verify(
+    path: Path, problems: Path | None, sample: float, workers: int, on_map: VerifiedMap | None = None
+) -> Counter[str]:
     """Check the files of a data folder, of one memory or library, or plans.
 
     Args:
@@ -21,12 +34,13 @@ def verify(path: Path, problems: Path | None, sample: float, workers: int) -> Co
         problems: the file with the problems of plans in files, or None.
         sample: share of the benchmark's problems that are attempted again, 0 to 1.
         workers: the number of worker processes for a data folder.
+        on_map: the map of the routes in files, or None.
 
     Returns:
         how many of each kind were checked.
 
     Raises:
-        UsageError: the sample is not a share, or problems are named for what holds no plan files.
+        UsageError: the sample is not a share, or problems or a map are named for what holds no plan files.
         RunError: there is nothing at the path that can be checked, or it has a fault.
         StorageError: a file is damaged.
     """
@@ -34,8 +48,11 @@ def verify(path: Path, problems: Path | None, sample: float, workers: int) -> Co
         raise UsageError(f"--sample is {sample}: give a share from 0 to 1.")
     is_data = fetch(local_place(path) / MARK).is_file()
     is_stored = any((path / header).is_file() for header in HEADERS)
-    if problems is not None and (is_data or is_stored):
-        raise UsageError(f"--problems goes with the files of plans, and {path} is something else.")
+    for option, given in (("--problems", problems), ("--map", on_map)):
+        if given is not None and (is_data or is_stored):
+            raise UsageError(f"{option} goes with the files of plans, and {path} is something else.")
+    if problems is not None and on_map is not None:
+        raise UsageError("Give --problems for plans of problems or --map for routes, not both.")
     if is_data:
         set_environment(open_data_folder(path).path)
         from tasks.requests.verify_folder import verify_folder
@@ -45,10 +62,17 @@ def verify(path: Path, problems: Path | None, sample: float, workers: int) -> Co
         return verify_stored_plans(path)
     if not is_remote(path) and not path.exists():
         raise RunError(f"{path} does not exist; check the name.")
-    checked = verify_plan_files(path, problems)
+    checked = verify_plan_files(path, problems, on_map and _judge_of(on_map))
     if not checked:
         raise RunError(
             f"{path} is not a data folder (it has no {MARK}), not a memory or library, and not a plan's file "
             "or a folder of such files."
         )
     return checked
+
+
+def _judge_of(on_map: VerifiedMap) -> MapJudge:
+    source = source_at(on_map.path)
+    if not source.is_map:
+        raise UsageError(f"{on_map.path} holds worlds; --map needs a map: .map, .yaml (ROS), .npy or .npz.")
+    return MapJudge(load_map(source, on_map.settings), on_map.settings.tolerance_m)

@@ -19,14 +19,16 @@ from storage.exchange.problems import problems_or_faults
 from storage.fields import short
 from storage.places.files import read_json
 from tasks.fan_out.progress import progress
+from tasks.requests.map_plans import MapJudge
 from tasks.settings.errors import RunError, tell_faults
 
 _ROOM_M: Final = 1e6  # around a plan that is judged by itself
 _BY_ITSELF: Final = "plans driven again by their controls, within their vehicle's limits"
+_ON_MAP: Final = "plans driven again by their controls, and swept over the map"
 _IN_PROBLEM: Final = "plans driven again by their controls, from start to goal of their problems, and swept"
 _LOOKED_AT_LESS: Final = (
-    "Obstacles and goals were not looked at: for plans of problems, name the file of these with --problems. "
-    "A route was judged on its map when it was made; its file does not name the map."
+    "Obstacles and goals were not looked at: for plans of problems, name the file of these with --problems, "
+    "for routes their map with --map."
 )
 NO_PLAN: Final = "files that hold no plan, but say why there is none"
 
@@ -57,14 +59,15 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
     return Counter({_BY_ITSELF: len(stored.plans)})
 
 
-def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
-    """Judge each plan of a file, or of the files in a folder, in its problem or by itself.
+def verify_plan_files(path: Path, problems: Path | None, on_map: MapJudge | None = None) -> Counter[str]:
+    """Judge each plan of a file, or of the files in a folder, in its problem, on a map or by itself.
 
     Args:
         path: a plan's file, or a folder with such files at any depth. Damaged JSON files in a folder are
             faults, since they may have been plans; files that hold something else are left alone.
         problems: a file with the problem of each plan, found by its id; a single problem may have any id, if
             there is a single plan. None judges each plan by itself: no obstacles, no goal.
+        on_map: judges each plan on a map; None if there is none, or if there are problems.
 
     Returns:
         how many plans were judged, and how many files hold none; nothing if there are no such files.
@@ -97,6 +100,7 @@ def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
     if others:
         _LOG.warning("Left alone, since no plan is in them: %s", short(others))
     counts: Counter[str] = Counter()
+    judged = _ON_MAP if on_map is not None else _BY_ITSELF if problems is None else _IN_PROBLEM
     done = 0
     with progress("verify", count, end_is_told=False) as show:
         for vehicle, by_id in of_vehicles.items():
@@ -105,12 +109,17 @@ def verify_plan_files(path: Path, problems: Path | None) -> Counter[str]:
                 if record.plan is None:
                     counts[NO_PLAN] += 1
                 else:
-                    counts[_BY_ITSELF if problems is None else _IN_PROBLEM] += 1
-                    wrong += [f"{file}: {fault}" for fault in _faults(record, record.plan, problem)]
+                    counts[judged] += 1
+                    found = (
+                        on_map.faults(record, record.plan)
+                        if on_map is not None
+                        else _faults(record, record.plan, problem)
+                    )
+                    wrong += [f"{file}: {fault}" for fault in found]
                 done += 1
                 show(done)
     _refuse(wrong, f" in {count} files of plans")
-    if problems is None:
+    if judged == _BY_ITSELF:
         _LOG.info(_LOOKED_AT_LESS)
     return counts
 

@@ -110,7 +110,25 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert abs(math.remainder(last[2] - heading, math.tau)) <= 0.02
     assert last[3] == pytest.approx(0.0, abs=1e-8)
     assert in_free_cells(np.array(written["states"]))
+    assert call(["verify", str(out), "--map", str(town / "town.yaml")]) == 0
+    assert call(["verify", str(out), "--map", str(town / "town.map")]) == 1  # which lies elsewhere
     assert picture.stat().st_size > 10_000
+
+
+def test_a_route_is_refused_on_a_map_that_has_changed_in_its_way(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "plan.json"
+    asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", "150,190", "--out", str(out)]
+    assert call(asked) == 0
+    assert call(["verify", str(out), "--map", str(town / "town.map")]) == 0
+    x, y = json.loads(out.read_text())["states"][100][:2]
+    changed = CELLS.copy()
+    changed[-1 - int(y), int(x)] = True
+    write_map(tmp_path / "changed.map", changed)
+    capsys.readouterr()
+    assert call(["verify", str(out), "--map", str(tmp_path / "changed.map")]) == 1
+    assert "Collision" in capsys.readouterr().err
 
 
 def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) -> None:

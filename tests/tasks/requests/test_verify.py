@@ -106,8 +106,9 @@ def test_problems_are_refused_beside_what_holds_no_plan_files(
     write_memory(tmp_path / "memory", plans=4)
     write_problems(tmp_path / "room.json", [problem_of([], "room")])
     assert call(["verify", str(tmp_path / "memory"), "--problems", str(tmp_path / "room.json")]) == 2
+    assert call(["verify", str(tmp_path / "memory"), "--map", str(tmp_path / "room.map")]) == 2
     assert call(["verify", str(tmp_path / "room.json")]) == 1
-    assert capsys.readouterr().err.count("\n") == 2
+    assert capsys.readouterr().err.count("\n") == 3
 
 
 def test_of_a_route_it_is_told_that_its_map_is_not_looked_at(
@@ -117,4 +118,6 @@ def test_of_a_route_it_is_told_that_its_map_is_not_looked_at(
     np.save(town, np.zeros((160, 160), np.uint8))
     assert call(["route", town, "--from", "20,20,0", "--to", "120,120", "--out", drive]) == 0
     assert call(["verify", drive]) == 0
-    assert "A route was judged on its map when it was made" in capsys.readouterr().out
+    assert "--map" in capsys.readouterr().out
+    assert call(["verify", drive, "--map", town]) == 0
+    assert "--map" not in capsys.readouterr().out
