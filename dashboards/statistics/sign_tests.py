@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr  # scipy.stats takes half a second to import, and each worker would
 
 from planners.world.arrays import Floats
 
@@ -30,7 +30,7 @@ def signs(times: Floats, baseline: Floats) -> Signs:
         compared=len(mine),
         slower=float(slower.mean()) if len(mine) else np.nan,
         slowdown=float(np.median(mine[slower] / other[slower])) if slower.any() else np.nan,
-        p_value=min(1.0, 2.0 * float(binom.cdf(fewer, decided, 0.5))) if len(mine) else np.nan,
+        p_value=min(1.0, 2.0 * float(bdtr(fewer, decided, 0.5))) if len(mine) else np.nan,
     )
 
 

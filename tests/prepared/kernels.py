@@ -48,7 +48,7 @@ PIECES: Final = [
     *((name, 2) for name in VEHICLES),
     *((name, 1) for name in VEHICLES if name != FIRST),
     (FIRST, 3),
-    *((name, ARRIVE) for name in ("car", "differential-drive", "car-1-trailer")),  # as the tests ask for
+    *((name, ARRIVE) for name in VEHICLES),
 ]
 
 
