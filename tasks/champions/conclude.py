@@ -19,7 +19,7 @@ from dashboards.verdicts.promotion import (
 from storage.archives.memories import load_memory
 from storage.vehicles.vehicle_files import said_vehicle
 from tasks.champions.new_experience import RetrainingRun
-from tasks.champions.promote import promote
+from tasks.champions.promote import ChangedChampionError, promote
 from tasks.fan_out.chunk import run_folder
 from tasks.fan_out.keys import key_of
 from tasks.registry.champion_registry import (
@@ -32,6 +32,7 @@ from tasks.registry.champion_registry import (
     Version,
 )
 from tasks.registry.model_uris import memory_digest
+from tasks.settings.errors import RunError
 from tasks.settings.retraining_settings import number_of
 from tasks.stages.build_memory import BUILD_MEMORY
 from tasks.stages.judge import judged
@@ -67,23 +68,44 @@ def conclude(data: str, run: RetrainingRun, registry: Registry, approve: bool) -
         approve: whether better challengers wait for ``motion-memory promote``.
 
     Raises:
-        RunError: the registry cannot be reached, or somebody changed a champion meanwhile.
+        RunError: the registry cannot be reached, or somebody changed a champion meanwhile; the versions of
+            other memories have their verdicts then.
         StorageError: a memory is damaged.
     """
     judged_versions = [_register(data, run, registry, memory, approve) for memory in run.memories]
     _log(judged_versions)
-    for judged_version in judged_versions:
-        version, verdict = judged_version.version, judged_version.verdict
-        if verdict == FIRST and registry.aliased(version.name) is None:
-            registry.set_alias(version)
-        elif verdict == PROMOTED:
-            promote(registry, version)
-        elif verdict == AWAITING:
-            registry.set_alias(version, CHALLENGER)
-        registry.set_tags(version, {"verdict": verdict})
+    faults = settle(registry, [(each.version, each.verdict) for each in judged_versions])
     publish_judgements(
         run.settings.run_name, [(each.memory, each.summary, each.markdown) for each in judged_versions]
     )
+    if faults:
+        raise RunError(" ".join(faults))
+
+
+def settle(registry: Registry, judged_versions: Sequence[tuple[Version, str]]) -> list[str]:
+    """Do what each verdict says, and note it.
+
+    Args:
+        registry: where the versions are registered.
+        judged_versions: the versions and their verdicts.
+
+    Returns:
+        why some have no verdict: somebody has changed their champions meanwhile.
+    """
+    faults = []
+    for version, verdict in judged_versions:
+        try:
+            if verdict == FIRST and registry.aliased(version.name) is None:
+                registry.set_alias(version)
+            elif verdict == PROMOTED:
+                promote(registry, version)
+            elif verdict == AWAITING:
+                registry.set_alias(version, CHALLENGER)
+        except ChangedChampionError as error:
+            faults.append(str(error))
+            continue
+        registry.set_tags(version, {"verdict": verdict})
+    return faults
 
 
 def _register(data: str, run: RetrainingRun, registry: Registry, memory: str, approve: bool) -> JudgedVersion:

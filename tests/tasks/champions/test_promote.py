@@ -10,6 +10,7 @@ import pytest
 
 from storage.archives.memories import save_memory
 from storage.places.data_folder import open_data_folder
+from tasks.champions.conclude import settle
 from tasks.champions.new_experience import runs_to_make
 from tasks.champions.promote import ChampionChange, promote, promote_awaiting, roll_back
 from tasks.registry.champion_registry import (
@@ -135,6 +136,21 @@ def test_the_others_are_promoted_beside_one_whose_champion_has_changed(registere
     assert registry.aliased(NAME, CHALLENGER) is None
     with pytest.raises(RunError, match=rf"{NAME}-a version 2 "):
         promote_awaiting(registered.data, f"{NAME}-a")
+
+
+def test_other_memories_have_their_verdicts_beside_one_whose_champion_has_changed(
+    registered: Registered,
+) -> None:
+    registry, names = registered.registry, (f"{NAME}-a", NAME, f"{NAME}-b")
+    challengers = []
+    for name, against in zip(names, (2, 1, 1), strict=True):
+        registry.set_alias(registered.version("one", name, verdict=FIRST))
+        challengers.append(registered.version("two", name, against=against, retraining=1))
+    faults = settle(registry, [(each, PROMOTED) for each in challengers])
+    assert len(faults) == 1
+    assert f"{NAME}-a version 2" in faults[0]
+    assert [found and found.number for found in map(registry.aliased, names)] == [1, 2, 2]
+    assert [registry.versions(name)[-1].tag("verdict") for name in names] == ["", PROMOTED, PROMOTED]
 
 
 def test_a_rollback_that_was_killed_goes_back_by_one_version_when_it_is_given_again(
