@@ -141,10 +141,15 @@ def travel_arrows(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
     return np.concatenate(arrows)
 
 
-def scale_bar_m(width: float) -> float:
-    """How long the scale bar of a picture ``width`` m wide is: round, a tenth to a quarter of it."""
-    tens = 10.0 ** math.floor(math.log10(width / 4.0))
-    return max(step * tens for step in (1.0, 2.0, 5.0) if step * tens <= width / 4.0)
+def scale_bar(problem: Problem) -> tuple[float, float]:
+    """How many real metres the scale bar of a ``problem`` stands for, and how long it is in its own metres.
+
+    They are 1, 2 or 5 with zeros, and a tenth to a quarter of its width.
+    """
+    most = problem.scale * (problem.bounds[2] - problem.bounds[0]) / 4.0
+    tens = 10.0 ** math.floor(math.log10(most))
+    metres = max(step * tens for step in (1.0, 2.0, 5.0) if step * tens <= most)
+    return metres, metres / problem.scale
 
 
 def outlines(states: Floats, vehicle: Vehicle = CAR) -> tuple[list[Floats], Floats]:

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
 from dashboards.palette import INK
-from dashboards.world_outlines import scale_bar_m, travel_arrows
-from planners.world.problem import Plan
+from dashboards.world_outlines import scale_bar, travel_arrows
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 
 _TIP_M: Final = 1e-3  # between root and tip, so that of an arrow only the head is seen
@@ -24,12 +24,12 @@ def draw_travel_arrows(axes: Axes, plan: Plan, vehicle: Vehicle, colours: Mappin
         axes.annotate("", tip, (x, y), arrowprops=style | {"shrinkA": 0.0, "shrinkB": 0.0}, zorder=6.6)
 
 
-def draw_scale_bar(axes: Axes, bounds: tuple[float, float, float, float]) -> None:
-    """Draw below the right end of ``bounds`` (in metres) how long some metres are."""
-    metres = scale_bar_m(bounds[2] - bounds[0])
+def draw_scale_bar(axes: Axes, problem: Problem) -> None:
+    """Draw below the right end of the bounds of a ``problem`` how long some real metres are."""
+    bounds, (metres, shown) = problem.bounds, scale_bar(problem)
     axes.add_artist(
         AnchoredSizeBar(
-            axes.transData, metres, f"{metres:g} m", "upper right", pad=0.0, borderpad=0.3, sep=2.0,
+            axes.transData, shown, f"{metres:g} m", "upper right", pad=0.0, borderpad=0.3, sep=2.0,
             frameon=False, color=INK, size_vertical=0.0, fontproperties={"size": 8.0},
             bbox_to_anchor=(bounds[2], bounds[1]), bbox_transform=axes.transData,
         )

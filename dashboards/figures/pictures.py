@@ -85,7 +85,7 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
     axes.set_ylim(lower, upper)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    draw_scale_bar(axes, problem.bounds)
+    draw_scale_bar(axes, problem)
 
 
 def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, colour: str = GREEN) -> None:

@@ -14,7 +14,7 @@ from dashboards.world_outlines import (
     goal_tip,
     heading_tip,
     outlines,
-    scale_bar_m,
+    scale_bar,
     shown_states,
     speed_tip,
     travel_arrows,
@@ -68,11 +68,10 @@ def world_svg(problem: Problem, vehicle: Vehicle, *layers: str) -> str:
 
 
 def _scale_bar(problem: Problem) -> str:
-    """How long some metres are, below the right end of the frame; y points down."""
-    x_min, y_min, x_max, _ = problem.bounds
-    metres = scale_bar_m(x_max - x_min)
-    bar = element("path", d=f"M{x_max - metres:g} {0.9 - y_min:g}h{metres:g}", class_="scale")
-    return bar + text(f"{metres:g} m", x_max - metres - 0.6, 1.5 - y_min, class_="scale")
+    """How long some real metres are, below the right end of the frame; y points down."""
+    (_, y_min, x_max, _), (metres, shown) = problem.bounds, scale_bar(problem)
+    bar = element("path", d=f"M{x_max - shown:g} {0.9 - y_min:g}h{shown:g}", class_="scale")
+    return bar + text(f"{metres:g} m", x_max - shown - 0.6, 1.5 - y_min, class_="scale")
 
 
 def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,13 @@ from shapely import affinity
 
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, swept_by
 from dashboards.figures.pictures import Example, gallery
-from dashboards.world_outlines import cusps_of, gears_of, outlines, scale_bar_m, travel_arrows
+from dashboards.world_outlines import cusps_of, gears_of, outlines, scale_bar, travel_arrows
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER
 from storage.vehicles.vehicle_files import read_vehicle
+from tests.worlds import problem_of
 
 FORKLIFT = read_vehicle(Path("docs/vehicles/forklift.yaml"))
 TRACTOR = read_vehicle(Path("docs/vehicles/semitrailer.yaml"))
@@ -82,10 +84,13 @@ def test_a_plan_that_stands_has_no_arrows() -> None:
     assert travel_arrows(driven([0.0, 0.0, 0.0])).shape == (0, 5)
 
 
-@given(st.floats(1e-3, 1e6))
-def test_a_scale_is_round_and_a_tenth_to_a_quarter_of_the_width(width: float) -> None:
-    metres = scale_bar_m(width)
-    assert 0.1 * width * (1.0 - 1e-9) <= metres <= 0.25 * width * (1.0 + 1e-9)
+@given(st.floats(1e-3, 1e6), st.floats(1e-2, 1e2))
+def test_a_scale_is_of_round_real_metres_and_a_tenth_to_a_quarter_of_the_width(
+    width: float, scale: float
+) -> None:
+    metres, shown = scale_bar(replace(problem_of([]), bounds=(0.0, 0.0, width, 1.0), scale=scale))
+    assert metres == pytest.approx(scale * shown)
+    assert 0.1 * width * (1.0 - 1e-9) <= shown <= 0.25 * width * (1.0 + 1e-9)
     digits = f"{metres:.3e}"
     assert digits[0] in "125"
     assert float(digits[1:5]) == 0.0
