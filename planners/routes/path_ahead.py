@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from planners.maps.global_path import GlobalPaths
+from planners.maps.global_path import GlobalPaths, PathsTo
 from planners.world.arrays import Flags, Floats, Point
 from planners.world.geometry.collision import Scene, point_is_free
 from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival
@@ -16,7 +16,7 @@ from planners.world.problem import CANONICAL_DISTANCE, GOAL_RADIUS, Arrival
 REACHES_M: Final = (60.0, 35.0, 20.0, 10.0)  # along the path to the local goals, in the order of trial
 SOUGHT_M: Final = 10.0  # before the end of a reach: so far back a place with more room is looked for
 TIGHT_M: Final = 3.0  # of the path, given up for each metre of clearance that a place lacks
-BESIDE_POSE_M: Final = 5.0  # from a pose, as in a slot narrower than a cell: so far away a path may end
+BESIDE_M: Final = 10.0  # from a pose, as in a slot narrower than a cell: so far away a path may begin or end
 SIGHT_M: Final = 0.2  # between points that are looked at along a line
 AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
 POSE_RADIUS: Final = 0.1  # metres
@@ -48,20 +48,44 @@ class LocalGoal(NamedTuple):
 class PathAhead:
     """The shortest paths over a map's cells to one stop, from anywhere. Lengths are canonical metres."""
 
-    def __init__(self, paths: GlobalPaths, stop: Stop, scene: Scene) -> None:
-        """``paths`` are those over a map's cells, ``scene`` is what is occupied on it."""
-        self.stop = stop
-        self._paths = paths.paths_to(_free_point(paths, stop, scene))
+    def __init__(self, paths: GlobalPaths, stop: Stop, scene: Scene, start: Floats) -> None:
+        """Find the paths.
+
+        Args:
+            paths: those over a map's cells.
+            stop: where they lead. They end in the nearest free cell that is seen from it, of those that a
+                way leads to.
+            scene: what is occupied on the map.
+            start: ``[>= 2]`` from where the vehicle comes.
+        """
+        self.stop, self._scene, self._grid = stop, scene, paths.grid
         self._cell_m = paths.grid.resolution
         free = ~paths.grid.occupied
-        self._to_go = np.pad(self._paths.metres, 1, constant_values=math.inf)
         self._room = self._cell_m * np.pad(ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1], 1)
+        place = np.array(stop.place)
+        cells = self._free_cells(place, max(stop.radius, BESIDE_M * stop.is_pose))
+        seen = (cell for cell in cells if _in_sight(place, cell, scene))
+        self._lead(paths.paths_to(next(seen, cells[0] if len(cells) else place)))
+        for cell in seen:
+            if self.path(start) is not None:
+                break
+            if self._at(self._to_go, cell[:1], cell[1:])[0] == math.inf:  # in another part of the map
+                self._lead(paths.paths_to(cell))
+
+    def _lead(self, paths: PathsTo) -> None:
+        self._paths = paths
+        self._to_go = np.pad(paths.metres, 1, constant_values=math.inf)
         # a vehicle may stand free in a cell that is not free: then the path begins beside it
-        self._from_here = ndimage.minimum_filter(self._to_go, 3)
+        self._from_beside = ndimage.minimum_filter(self._to_go, 3)
 
     def to_go(self, poses: Floats) -> Floats:
         """Return the metres ``[n]`` of shortest paths from ``poses [n, >= 2]``; infinite: no path."""
-        metres: Floats = self._at(self._from_here, poses[:, 0], poses[:, 1])
+        metres: Floats = self._at(self._from_beside, poses[:, 0], poses[:, 1])
+        for i in np.flatnonzero(np.isinf(metres)):
+            place = poses[i, :2]
+            cells = self._free_cells(place, BESIDE_M)
+            ways = self._at(self._to_go, cells[:, 0], cells[:, 1]) + np.hypot(*(cells - place).T)
+            metres[i] = ways.min(initial=math.inf)
         return metres
 
     def path(self, pose: Floats) -> Floats | None:
@@ -71,7 +95,26 @@ class PathAhead:
         centres = self._cell_m * (np.array(around) + 0.5)
         to_go = self._at(self._to_go, centres[:, 0], centres[:, 1])
         best = int(to_go.argmin()) if to_go[0] == math.inf else 0
-        return None if to_go[best] == math.inf else self._paths.path(centres[best])
+        if to_go[best] < math.inf:
+            return self._paths.path(centres[best])
+        cells = self._free_cells(pose[:2], BESIDE_M)
+        cells = cells[np.isfinite(self._at(self._to_go, cells[:, 0], cells[:, 1]))]
+        seen = (cell for cell in cells if _in_sight(pose[:2], cell, self._scene))
+        begin = next(seen, None)
+        return None if begin is None else self._paths.path(begin)
+
+    def _free_cells(self, place: Floats, reach: float) -> Floats:
+        """The centres ``[n, 2]`` of free cells within some metres of a place ``[2]``, the nearest first."""
+        (left, low), (right, high) = (
+            np.floor((place + by) / self._cell_m).astype(int) for by in (-reach, reach)
+        )
+        left, low = max(left, 0), max(low, 0)
+        rows, columns = np.nonzero(~self._grid.occupied[low : high + 1, left : right + 1])
+        centres = self._cell_m * (np.column_stack((columns + left, rows + low)) + 0.5)
+        distances = np.hypot(*(centres - place).T)
+        order = np.argsort(distances, kind="stable")
+        nearest: Floats = centres[order[: np.searchsorted(distances[order], reach, side="right")]]
+        return nearest
 
     def distance(self, poses: Floats) -> Floats:
         """Return the metres ``[n]`` from ``poses [n, >= 2]`` to the place of the stop."""
@@ -103,7 +146,9 @@ class PathAhead:
         goals: list[LocalGoal] = []
         if along[-1] <= REACHES_M[0] and math.dist(pose[:2], self.stop.place) <= CANONICAL_DISTANCE:
             place, radius, arrival = self.stop
-            goals += [LocalGoal(place, radius, asked, True) for asked in (None, arrival)][self.stop.is_pose :]
+            if not self.stop.is_pose:
+                goals.append(LocalGoal(place, radius, None, True))
+            goals.append(LocalGoal(place, radius, arrival, True))
         for reach in REACHES_M:
             within = (along <= reach) & (along >= reach - SOUGHT_M) & (straight <= CANONICAL_DISTANCE)
             if reach < along[-1] and within.any():
@@ -118,21 +163,6 @@ class PathAhead:
         column = np.clip(np.floor(x / self._cell_m) + 1, 0, columns).astype(np.int64)
         of_cells: Floats = values[row, column]
         return of_cells
-
-
-def _free_point(paths: GlobalPaths, stop: Stop, scene: Scene) -> Floats:
-    """The centre of the nearest free cell, one in sight of the stop if there is any; else the stop itself."""
-    grid, place = paths.grid, np.array(stop.place)
-    rows, columns = np.nonzero(~grid.occupied)
-    centres = grid.resolution * (np.column_stack((columns, rows)) + 0.5)
-    distances = np.hypot(*(centres - place).T)
-    near = np.flatnonzero(distances <= (BESIDE_POSE_M if stop.is_pose else stop.radius))
-    near = near[np.argsort(distances[near], kind="stable")]
-    if len(near) == 0:
-        return place
-    seen = (i for i in near if _in_sight(place, centres[i], scene))
-    nearest: Floats = centres[next(seen, near[0])]
-    return nearest
 
 
 def _in_sight(place: Floats, other: Floats, scene: Scene) -> bool:

@@ -44,6 +44,7 @@ ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and 
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
+POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
 OF_TOLERANCES: Final = 0.99  # that plans to a pose may use: rounding must not lead out of them
 
 Solve = Callable[[Problem], Attempt]
@@ -83,9 +84,15 @@ class Stuck(NamedTuple):
 class Route:
     """Legs from a start to the last of some stops."""
 
-    problem: Problem  # the whole one: start, last stop, everything that is occupied
+    problems: list[Problem]  # to each stop: from where the vehicle then is, with everything that is occupied
     sections: list[list[Leg]]  # to each stop the legs of the drive, all but the first from rest
     paths: list[Floats]  # to each stop the shortest path over the cells, [n, 2] metres
+
+    @property
+    def problem(self) -> Problem:
+        """The whole one, from the start to the last stop."""
+        first, last = self.problems[0], self.problems[-1]
+        return replace(last, start=first.start, start_motion=first.start_motion)
 
     @property
     def legs(self) -> list[Leg]:
@@ -107,8 +114,16 @@ class Route:
 
     def plan(self, vehicle: Vehicle) -> Plan:
         """Join all legs to one plan."""
-        controls = np.concatenate([np.empty((0, 2)), *(leg.controls for leg in self.legs)])
-        return Plan(simulate(start_state(self.problem, vehicle), controls, vehicle), controls, vehicle.dt)
+        return _joined(self.problem, self.legs, vehicle)
+
+    def plans(self, vehicle: Vehicle) -> list[Plan]:
+        """To each stop the plan that solves its problem."""
+        return [_joined(*each, vehicle) for each in zip(self.problems, self.sections, strict=True)]
+
+
+def _joined(problem: Problem, legs: Sequence[Leg], vehicle: Vehicle) -> Plan:
+    controls = np.concatenate([np.empty((0, 2)), *(leg.controls for leg in legs)])
+    return Plan(simulate(start_state(problem, vehicle), controls, vehicle), controls, vehicle.dt)
 
 
 class Router:
@@ -141,7 +156,7 @@ class Router:
         self._paths = GlobalPaths(world, 1.0)
         roomy = replace(self._paths.grid, occupied=ndimage.binary_dilation(self._paths.grid.occupied))
         self._roomy_paths = GlobalPaths(roomy, 1.0)  # for where the shortest path is too narrow to drive
-        self._attempts = self._most_attempts = 0
+        self._attempts = self._most_attempts = self._pose_tries = 0
 
     def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
         """Find a route from a pose (m, m, rad) through all ``stops``.
@@ -155,8 +170,7 @@ class Router:
         asked = [
             replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
         ]
-        whole = asked[-1]
-        state = start_state(whole, self._vehicle)
+        state = start_state(begun, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             return Stuck(start[:2], "the vehicle would stand in an obstacle or outside the map", 0)
         for stop, to_stop in zip(stops, asked, strict=True):
@@ -168,28 +182,32 @@ class Router:
         sections: list[list[Leg]] = []
         paths = []
         self._attempts = 0
-        for stop in stops:
-            ahead = PathAhead(self._paths, stop, self._scene)
+        for number, stop in enumerate(stops):
+            ahead = PathAhead(self._paths, stop, self._scene, state)
             path = ahead.path(state)
+            goal = f"goal {number + 1}" if len(stops) > 1 else "the goal"
             if path is None:
-                return Stuck(stop.place, "the goal cannot be reached: no way over the map leads there", 0)
+                return Stuck(stop.place, f"{goal} cannot be reached: no way over the map leads there", 0)
+            asked[number] = replace(
+                asked[number], start=tuple(state[:3].tolist()), start_motion=tuple(state[3:].tolist())
+            )
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
-                around = PathAhead(self._roomy_paths, stop, self._scene)
+                around = PathAhead(self._roomy_paths, stop, self._scene, state)
                 again = more if around.path(state) is None else self._legs_to(around, state)
                 if isinstance(again, Stuck):
-                    return more
+                    return more._replace(why=more.why.replace("the goal", goal))
                 more = again
             sections.append(more)
             paths.append(path)
             state = more[-1].end if more else state
-        return Route(whole, sections, paths)
+        return Route(asked, sections, paths)
 
     def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""
         legs: list[Leg] = []
         options = [self._legs_from(ahead, state)]
-        begun = self._attempts
+        begun, self._pose_tries = self._attempts, 0
         self._most_attempts = begun + ATTEMPTS + int(ATTEMPTS_A_METRE * ahead.to_go(state[np.newaxis])[0])
         start = nearest = state
         while not (ahead.arrived(state[np.newaxis])[0] and self._rests(state)):
@@ -202,7 +220,9 @@ class Router:
                 if not options:
                     metres = ahead.to_go(nearest[np.newaxis])[0]
                     tried = self._attempts - begun
-                    why = f"no local goal could be reached {metres:.0f} m before the goal"
+                    why = f"no plan leads on from where it came nearest, {metres:.0f} m before the goal"
+                    if free_stop(start, self._vehicle, self._scene) is None:
+                        why = "the vehicle can neither stop in time nor drive on from its motion at the start"
                     return Stuck((float(nearest[0]), float(nearest[1])), why, max(tried, 1))
                 legs.pop()
             state = legs[-1].end if legs else start
@@ -210,15 +230,19 @@ class Router:
         return legs
 
     def _rests(self, state: Floats) -> bool:
-        """Whether the vehicle stands, however its wheels are steered."""
-        moving = state[3:5] if isinstance(self._vehicle, DifferentialDrive) else state[3:4]
-        return bool(np.abs(moving).max() < RESTING)
+        """Whether the vehicle stands, however its wheels are steered; of the first order it stops at once."""
+        turns_on = isinstance(self._vehicle, DifferentialDrive) and not self._vehicle.first_order
+        return bool(np.abs(state[3 : 4 + turns_on]).max() < RESTING)
 
     def _legs_from(self, ahead: PathAhead, state: Floats) -> Iterator[Leg]:
         """Yield legs from a state, each searched when needed: in motion first, unless it is the last."""
         for goal in ahead.local_goals(state):
             if self._attempts == self._most_attempts:
                 break
+            if goal.final and ahead.stop.is_pose:
+                if self._pose_tries == POSE_TRIES:
+                    continue
+                self._pose_tries += 1
             problem = self._problem(state, goal)
             self._attempts += 1
             attempt = self._solve(problem)

@@ -243,7 +243,8 @@ def _drive_mirrored(
             (width - stop.place[0], stop.place[1]),
             stop.radius,
             stop.arrival._replace(
-                heading=None if stop.arrival.heading is None else math.pi - stop.arrival.heading
+                heading=None if stop.arrival.heading is None else math.pi - stop.arrival.heading,
+                hitches=tuple(-hitch for hitch in stop.arrival.hitches),
             ),
         )
         for stop in stops
@@ -264,12 +265,12 @@ def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
 
 
 def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
-    """Raise PlanFaultError if the independent judge refuses the route as one plan."""
-    route_faults = faults(route.problem, plan, assistant.vehicle)
-    if route_faults:
-        raise PlanFaultError(
-            f"The route across {route.problem.id}, seed {assistant.settings.seed}: {route_faults[0]}"
-        )
+    """Raise PlanFaultError if the independent judge refuses the route, as one plan or to one of its stops."""
+    parts = zip(route.problems, route.plans(assistant.vehicle), strict=True)
+    for problem, part in [(route.problem, plan), *parts]:
+        found = faults(problem, part, assistant.vehicle)
+        if found:
+            raise PlanFaultError(f"The route across {problem.id}, seed {assistant.settings.seed}: {found[0]}")
 
 
 def _record(

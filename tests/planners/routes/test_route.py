@@ -63,7 +63,7 @@ def path_ahead(world: OccupancyMap, stop: Stop) -> PathAhead:
     whole = Problem(
         "", "", START, (0.0, 0.0), 1.0, (0.0, 0.0, *world.size), surroundings_of(world).obstacles()
     )
-    return PathAhead(GlobalPaths(world, 1.0), stop, scene_of(whole))
+    return PathAhead(GlobalPaths(world, 1.0), stop, scene_of(whole), np.array(START))
 
 
 def test_a_route_is_one_feasible_plan_through_all_goals() -> None:
@@ -200,45 +200,66 @@ def test_local_goals_lie_on_the_path_and_the_goal_comes_first_where_it_is_near()
         assert max(metres) < ahead.to_go(pose[np.newaxis])[0]
 
 
-def slots(width: int = 10) -> OccupancyMap:
-    """Two rows of slots, ``width`` cells of 0.15 m wide, on either side of an aisle, and a street to it."""
-    occupied = np.ones((300, 800), bool)
-    occupied[60:95, 20:780] = False  # the aisle
-    occupied[20:280, 20:60] = False  # the street
-    for first in range(200, 760, width + 2):
-        occupied[95:112, first : first + width] = False
-        occupied[43:60, first : first + width] = False
-    return OccupancyMap("slots", occupied, 0.15)
+def depot(width: float, depth: float, angle: float) -> OccupancyMap:
+    """A street into an aisle with a slot beside it, whose sides are at an ``angle`` to the aisle."""
+    rows, columns = np.indices((300, 600))
+    x, y = 0.1 * (columns + 0.5), 0.1 * (rows + 0.5)
+    free = (y > 8.0) & (y < 14.0) & (x > 2.0) & (x < 58.0)
+    free |= (x > 2.0) & (x < 8.0) & (y > 2.0) & (y < 28.0)
+    along = (x - SLOT[0]) * math.cos(angle) + (y - SLOT[1]) * math.sin(angle)
+    aside = (y - SLOT[1]) * math.cos(angle) - (x - SLOT[0]) * math.sin(angle)
+    free |= (np.abs(aside) < 0.5 * width) & (along > -3.0) & (along < depth) & (y > 8.0)
+    return OccupancyMap("depot", ~free, 0.1)
 
 
-def into_slot(number: int, heading: float, width: int = 10) -> Stop:
-    """In the middle of the upper slot of that ``number``, facing up or down."""
-    x = 0.15 * (200 + number * (width + 2) + 0.5 * width)
-    y = 0.15 * (97.0 + 2.0 if heading > 0.0 else 97.0 + 11.0)
-    return Stop((x, y), POSE_RADIUS, Arrival(heading, POSE_TOLERANCE, 0.0, 0.0))
+def in_slot(depth: float, angle: float, vehicle: Vehicle, backwards: bool = False) -> Stop:
+    """At the end of the slot of a ``depot``, with 0.2 m to spare, nose or tail first."""
+    inside = depth - 0.2 - (vehicle.rear if backwards else vehicle.front)
+    place = SLOT[0] + inside * math.cos(angle), SLOT[1] + inside * math.sin(angle)
+    heading = angle - math.pi * backwards
+    return Stop(place, POSE_RADIUS, Arrival(heading, POSE_TOLERANCE, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("heading", [0.5 * math.pi, -0.5 * math.pi])
-@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE])
-def test_a_route_ends_in_a_slot_and_leads_out_of_it(vehicle: Vehicle, heading: float) -> None:
-    into = into_slot(25, heading)
-    back = Stop((6.0, 6.0))
-    router = Router(slots(), partial(searched, vehicle=vehicle), vehicle)
-    found = check(router.route((6.0, 36.0, -0.5 * math.pi), [into, back]), vehicle)
-    there, _ = found.sections
-    parked = there[-1].end
-    assert math.dist(parked[:2], into.place) <= POSE_RADIUS
-    assert abs(parked[2] - heading) % math.tau <= POSE_TOLERANCE
-    assert parked[3] == pytest.approx(0.0, abs=1e-8)
-    alone = check(router.route((6.0, 36.0, -0.5 * math.pi), [into]), vehicle)
-    assert faults(alone.problem, alone.plan(vehicle), vehicle) == []
+SLOT = (40.3, 14.0)  # the middle of where it begins
+CREATE = read_vehicle(Path("docs/vehicles/create3.yaml"))
+STREET = (5.0, 25.0, -0.5 * math.pi)
 
 
-def test_poses_without_room_are_said() -> None:
-    for narrow in (6, 2):
-        found = Router(slots(narrow), searched).route((6.0, 36.0, -1.57), [into_slot(9, 1.57, narrow)])
-        assert isinstance(found, Stuck)
-        assert "no room in the goal pose" in found.why
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE, CREATE], ids=["car", "differential", "create3"])
+@pytest.mark.parametrize(
+    ("width", "depth", "angle"),
+    [(1.3, 2.3, 1.57), (1.6, 2.3, 1.05), (2.0, 2.6, 0.79), (1.4, 5.0, 1.57), (1.4, 9.0, 1.57)],
+)
+def test_routes_lead_into_slots_of_any_kind_and_out_of_them(
+    width: float, depth: float, angle: float, vehicle: Vehicle
+) -> None:
+    ahead, backwards = (in_slot(depth, angle, vehicle, each) for each in (False, True))
+    out = Stop((5.0, 5.0))
+    router = Router(
+        depot(width * vehicle.width / CAR.width, depth, angle), partial(searched, vehicle=vehicle), vehicle
+    )
+    found = check(router.route(STREET, [ahead, out, backwards, ahead]), vehicle)
+    for stop, section in zip((ahead, out, backwards), found.sections, strict=False):
+        end, heading = section[-1].end, stop.arrival.heading
+        assert math.dist(end[:2], stop.place) <= stop.radius
+        assert heading is None or abs(math.remainder(end[2] - heading, math.tau)) <= POSE_TOLERANCE
+    for problem, plan in zip(found.problems, found.plans(vehicle), strict=True):
+        assert faults(problem, plan, vehicle) == []
+
+
+def test_a_pose_without_room_and_a_start_that_cannot_be_stopped_are_said() -> None:
+    world = depot(0.7, 3.0, 1.57)
+    narrow = Router(world, searched).route(STREET, [in_slot(3.0, 1.57, CAR)])
+    assert isinstance(narrow, Stuck)
+    assert "no room in the goal pose" in narrow.why
+    before_the_wall = Router(world, searched).route((5.0, 4.5, -0.5 * math.pi), [Stop((40.0, 11.0))], (4.0,))
+    assert isinstance(before_the_wall, Stuck)
+    assert "neither stop in time" in before_the_wall.why
+    there, nowhere = Stop((40.0, 11.0)), Stop((20.0, 20.0))
+    world.occupied[190:210, 190:210] = False  # a room without doors
+    closed = Router(world, searched).route(STREET, [there, nowhere])
+    assert isinstance(closed, Stuck)
+    assert "goal 2 cannot be reached" in closed.why
 
 
 @pytest.mark.parametrize("speed", [4.0, 2.0, -1.0])
@@ -261,6 +282,6 @@ def test_who_is_there_but_moves_has_to_stop_first() -> None:
 def test_a_train_parks_with_the_hitch_that_is_asked_for() -> None:
     at = Stop((50.0, 11.5), POSE_RADIUS, Arrival(0.0, POSE_TOLERANCE, 0.0, 0.0, (0.0,), (0.1,)))
     vehicle = CAR_1_TRAILER
-    router = Router(slots(), partial(searched, vehicle=vehicle), vehicle)
-    found = check(router.route((6.0, 36.0, -0.5 * math.pi), [at]), vehicle)
+    router = Router(depot(1.0, 1.0, 1.0), partial(searched, vehicle=vehicle), vehicle)
+    found = check(router.route(STREET, [at]), vehicle)
     assert abs(found.plan(vehicle).states[-1, 5]) <= 0.1
