@@ -118,13 +118,13 @@ def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
     return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
 
 
-def travel_arrows(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
+def travel_arrows(plan: Plan, vehicle: Vehicle = CAR, apart: float | None = None) -> Floats:
     """Where arrows along ``plan`` stand, ``[n, 5]``: x, y, a vector of length 1 along the travel, the gear.
 
-    They are as far apart as the footprints of ``vehicle``, and between these. A stretch in one gear has one
-    in its middle even if it is as short as half of the body.
+    They are at most ``apart`` m from each other, by default as far as the footprints of ``vehicle``, and
+    between these. A stretch in one gear has one in its middle even if it is as short as half of the body.
     """
-    apart = footprint_spacing_m(vehicle)
+    apart = apart or footprint_spacing_m(vehicle)
     gears, ends = gears_of(plan, vehicle), [0, *cusps_of(plan, vehicle).tolist(), len(plan.states) - 1]
     arrows: list[Floats] = [np.empty((0, 5))]
     for first, last in pairwise(ends):
@@ -134,7 +134,7 @@ def travel_arrows(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
         driven = np.cumsum(lengths)
         if len(driven) == 0 or driven[-1] < 0.5 * (vehicle.front + vehicle.rear):
             continue
-        count = max(1, int(driven[-1] / apart + 0.5))
+        count = 1 + int(driven[-1] / apart)
         rows = np.searchsorted(driven, driven[-1] * (np.arange(count) + 0.5) / count)
         ahead = steps[rows] / lengths[rows, np.newaxis]
         arrows.append(np.hstack([way[rows + 1], ahead, gears[first + rows, np.newaxis]]))

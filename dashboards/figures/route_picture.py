@@ -7,24 +7,28 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from dashboards.figures.map_picture import draw_map
+from dashboards.figures.marks import draw_travel_arrows
 from dashboards.figures.style import legend_below, new_figure
 from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.world.arrays import Floats
+from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
 _OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
-GOAL_ARROW_M: Final = 8.0  # canonical metres, where a goal is a pose
+_ARROW: Final = 0.05  # of the map's longer side: the arrow of a heading
+_APART: Final = 0.1  # of it: arrows along the drive
 
 
 def route_picture(
@@ -46,6 +50,7 @@ def route_picture(
         vehicle: the vehicle that drives the route.
     """
     width, height = _extent(world)
+    longest = max(width, height)
     figure = new_figure(_WIDTH, min(_WIDTH * height / width, _TALLEST) + 0.9, f"Route over {world.name}")
     axes = figure.add_subplot()
     draw_map(axes, world, _OCCUPIED)
@@ -64,15 +69,15 @@ def route_picture(
             axes.plot(*drawn.T, color="white", linewidth=linewidth + 1.6, zorder=4)
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
         axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=3.5, zorder=7)
+        way = Plan(np.column_stack([points, states[:, 2:]]), leg.controls)
+        colour = COLOURS[leg.source]
+        draw_travel_arrows(axes, way, vehicle, {1: colour, -1: colour}, _APART * longest, 17.0)
         sources.append(leg.source)
     several = len(stops) > 1
     for number, stop in enumerate(stops, start=1):
         goal = _placed(world, scale * np.array([stop.place]))[0]
         if stop.arrival.heading is not None:
-            ahead = world.origin[2] + stop.arrival.heading
-            tip = goal + scale * GOAL_ARROW_M * np.array([math.cos(ahead), math.sin(ahead)])
-            arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6}
-            axes.annotate("", tip, goal, arrowprops=arrow, zorder=9, annotation_clip=False)
+            _draw_heading(axes, (goal[0], goal[1]), world.origin[2] + stop.arrival.heading, GREEN, longest)
         axes.plot(
             *goal,
             marker="o" if several else "*",
@@ -87,9 +92,10 @@ def route_picture(
                           fontsize=9, fontweight="bold", annotation_clip=False)  # fmt: skip
     x, y, heading = route.problem.start
     x, y, heading = world.pose(scale * x, scale * y, heading)
-    axes.plot(x, y, marker=(3, 0, math.degrees(heading) - 90.0), color=INK, markersize=12, zorder=9)
+    axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
+    _draw_heading(axes, (x, y), heading, INK, longest)
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=INK, marker=(3, 0, -90), linestyle="none", markersize=9, label="start"),
+        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
         Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
                markersize=10, label="goals in order" if several else "goal"),
         Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
@@ -104,6 +110,16 @@ def route_picture(
     ]  # fmt: skip
     legend_below(figure, handles, 4)
     return figure
+
+
+def _draw_heading(
+    axes: Axes, place: tuple[float, float], heading: float, colour: str, longest: float
+) -> None:
+    """An arrow from a ``place`` on a map along a heading."""
+    reach = _ARROW * longest
+    tip = place[0] + reach * math.cos(heading), place[1] + reach * math.sin(heading)
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0.0}
+    axes.annotate("", tip, place, arrowprops=arrow, zorder=9, annotation_clip=True, clip_on=True)
 
 
 def _legend_of(source: str, legs: int) -> str:

@@ -167,7 +167,7 @@ def route(
     *,
     begin: Annotated[str, Parameter(name="--from", allow_leading_hyphen=True)],
     end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True, negative=())],
-    goal_tolerance: str | None = None,
+    goal_tolerance: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     start_speed: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     start_steering: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     start_turn_rate: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
@@ -183,9 +183,10 @@ def route(
 
     Args:
         path: A map: .map, .yaml (ROS), .npy, .npz.
-        begin: Pose of the vehicle in the map's frame: x,y,heading, in metres and radians.
-        end: Goal: x,y in metres, or the pose x,y,heading, as of a slot. Can be repeated: the drive then stops
-            at all goals in this order.
+        begin: Pose of the vehicle in the map's frame: x,y,heading, in metres and radians, of the reference
+            point: a car's rear axle.
+        end: Goal: x,y in metres, or the pose x,y,heading of the reference point, as in a slot. Can be
+            repeated: the drive then stops at all goals in this order.
         goal_tolerance: How far from a pose the vehicle may stop: metres,radians. Default: 0.1,0.05, of which
             the metres are times the scale.
         start_speed: Speed at the start if the vehicle moves, m/s, below 0 backwards.

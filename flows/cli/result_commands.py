@@ -17,6 +17,7 @@ def verify(
     *,
     problems: Path | None = None,
     map: Path | None = None,
+    format: str | None = None,
     resolution: float | None = None,
     unknown: UnknownCells = "occupied",
     tolerance: float = 0.0,
@@ -29,6 +30,7 @@ def verify(
         path: A plan's file, a folder of them, the folder of a memory or library, or a data folder.
         problems: With the files of plans: the file of their problems, in which each is judged.
         map: With the files of routes: the map on which each is judged, .map, .yaml (ROS), .npy, .npz.
+        format: Format of the map: moving-ai, ros or numpy; by default recognised by its ending.
         resolution: Metres in a cell of a .map or NumPy map; default 1.
         unknown: What unknown cells of the map count as.
         tolerance: Metres that outlines of obstacles of the map may move; as for the route.
@@ -39,11 +41,16 @@ def verify(
     from tasks.requests.verify import VerifiedMap
     from tasks.requests.verify import verify as task
     from tasks.requests.verify_plans import NO_PLAN
+    from tasks.settings.errors import UsageError
 
     reading = import_settings(
         "car", 1, scale=None, resolution=resolution, unknown=unknown, tolerance=tolerance
     )
-    on_map = None if map is None else VerifiedMap(map, reading)
+    if map is None and (format, resolution, unknown, tolerance) != (None, None, "occupied", 0.0):
+        raise UsageError(
+            "--format, --resolution, --unknown and --tolerance are of a map; name it with --map."
+        )
+    on_map = None if map is None else VerifiedMap(map, format, reading)
     checked = task(path, problems, sample, worker_count(workers), on_map)
     lines = [f"{count:9,} {what}" for what, count in checked.items()]
     was_judged = any(count for what, count in checked.items() if what != NO_PLAN)

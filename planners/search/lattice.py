@@ -214,7 +214,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         longest = settings.longest, query.limits.further
         left = manoeuvring.further(settings.further, longest, settings.for_one, left, ends)
         kept = manoeuvring.kept
-        if joining is not None:
+        if joining is not None and joined:  # else what is known does not fit here
             joining.further(settings.further, (0, 0), settings.further, left, ends)
             kept += joining.kept
         outcome = replace(

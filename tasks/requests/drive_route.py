@@ -25,7 +25,7 @@ from planners.world.problem import Plan, Problem
 from planners.world.problem_faults import motion_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
-from storage.exchange.question_fields import start_motion_of
+from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, source_at
@@ -102,13 +102,14 @@ def _stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[
                 f"--goal-tolerance {request.goal_tolerance!r}: give numbers above 0, or leave it out for "
                 f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
             )
+        _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
     stops = []
     for goal in request.goals:
         x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
         right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
         place = right / scale, up / scale
         if heading:
-            _warn_of_degrees("The heading of --to", heading[0])
+            _warn(degrees_hint("The heading of --to", heading[0]))
             pose = AT_REST._replace(heading=facing, heading_tolerance=turn)
             stops.append(Stop(place, radius / scale, pose))
         else:
@@ -135,8 +136,7 @@ def _motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[f
     return motion
 
 
-def _warn_of_degrees(what: str, heading: float) -> None:
-    hint = degrees_hint(what, heading)
+def _warn(hint: str | None) -> None:
     if hint is not None:
         _LOG.warning("%s.", hint)
 
@@ -171,7 +171,7 @@ def drive_route(
     check_picture(drawing)
     check_known("format", [] if map_format is None else [map_format], FORMATS)
     pose = _numbers_of(request.start, [3], "--from", "x,y,heading in metres and radians")
-    _warn_of_degrees("The heading of --from", pose[2])
+    _warn(degrees_hint("The heading of --from", pose[2]))
     if assistant.vehicle.min_speed >= 0.0:
         raise UsageError(
             f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
@@ -258,7 +258,7 @@ def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
     line = f"No route across {world.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
     if stuck.attempts == 0:
-        return UsageError(f"{line}; choose another place.")
+        return UsageError(f"{line}; choose another place or heading.")
     return RunError(
         f"{line} ({stuck.attempts} local problems tried); try another --seed, heading or planner."
     )

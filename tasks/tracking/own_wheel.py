@@ -52,7 +52,8 @@ def _files() -> dict[str, bytes]:
         for folder, folders, names in os.walk(root):
             folders[:] = sorted(set(folders) - {_CACHES})  # which may hold thousands of compiled kernels
             for path in (Path(folder, name) for name in sorted(names)):
-                files[str(path.relative_to(root.parent))] = path.read_bytes()
+                if path.is_file():  # no broken link, as editors leave
+                    files[str(path.relative_to(root.parent))] = path.read_bytes()
     return files
 
 

@@ -50,7 +50,7 @@ def world_chart(
         layers.append(answer_layer(plan, vehicle))
     ended = replayed.attempt.source if plan is not None else f"no plan: {replayed.attempt.status}"
     x_min, y_min, x_max, y_max = problem.bounds
-    width, height = x_max - x_min, y_max - y_min
+    width, height = (problem.scale * each for each in (x_max - x_min, y_max - y_min))
     note = (
         f"Bounds {width:.0f} × {height:.0f} m. The dark box is the vehicle at its start, its line the "
         "heading; the disc is the goal. The plan is that of the row, made again from the same seed."
