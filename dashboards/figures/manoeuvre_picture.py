@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -67,12 +68,15 @@ def _path_of(ground: shapely.Geometry) -> Path:
     return Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
 
 
-def manoeuvre_legend() -> list[Line2D | Patch]:
-    """What ``draw_manoeuvre`` draws."""
-    return [
-        Line2D([], [], color=FORWARDS, linewidth=1.8, label="forwards"),
-        Line2D([], [], color=BACKWARDS, linewidth=1.8, label="backwards"),
-        Line2D([], [], color="white", marker="o", markeredgecolor=INK, markersize=5, linestyle="none",
-               label="change of gear"),
-        Patch(facecolor=_SWEPT, label="swept by its bodies"),
+def manoeuvre_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Patch]:
+    """What ``draw_manoeuvre`` draws of these ``drives``, plans and who drives them."""
+    gears = {gear for plan, vehicle in drives for gear in gears_of(plan, vehicle).tolist()}
+    changes = any(len(cusps_of(plan, vehicle)) for plan, vehicle in drives)
+    shown: list[tuple[bool, Line2D | Patch]] = [
+        (1 in gears, Line2D([], [], color=FORWARDS, linewidth=1.8, label="forwards")),
+        (-1 in gears, Line2D([], [], color=BACKWARDS, linewidth=1.8, label="backwards")),
+        (changes, Line2D([], [], color="white", marker="o", markeredgecolor=INK, markersize=5,
+                         linestyle="none", label="change of gear")),
+        (True, Patch(facecolor=_SWEPT, label="swept by its bodies")),
     ]  # fmt: skip
+    return [entry for occurs, entry in shown if occurs]

@@ -228,8 +228,9 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
             Line2D([], [], marker="s", markerfacecolor="none", markeredgecolor=ORANGE, markersize=8,
                    linestyle="none", label="goal pose")
         )  # fmt: skip
-    if any(example.answer is not None for example in to_poses):
-        handles += manoeuvre_legend()
+    drives = [(each.answer, each.vehicle) for each in to_poses if each.answer is not None]
+    if drives:
+        handles += manoeuvre_legend(drives)
     if any(example.moved is not None for example in examples):
         handles.append(Line2D([], [], **_MOVED, label="stored drive, before it was moved"))
     if not any(example.recalled for example in examples):

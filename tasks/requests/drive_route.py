@@ -126,7 +126,8 @@ def _motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[f
     try:
         given = start_motion_of(request.motion, vehicle)
     except ValueError as error:
-        raise UsageError(f"The start {error}.") from None
+        begins = "The start " if str(error).startswith("has ") else ""
+        raise UsageError(f"{begins}{error}.") from None
     motion = (given[0] / scale, *given[1:]) if given else ()
     unbounded = (-math.inf, -math.inf, math.inf, math.inf)
     start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, motion)
