@@ -167,13 +167,13 @@ class Router:
             motion: the state at the start behind the pose, speed (m/s) first; what is missing is 0.
         """
         begun = replace(self._whole, start=start, start_motion=motion)
-        asked = [
+        problems = [
             replace(begun, goal=stop.place, goal_radius=stop.radius, arrival=stop.arrival) for stop in stops
         ]
         state = start_state(begun, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
             return Stuck(start[:2], "the vehicle would stand in an obstacle or outside the map", 0)
-        for stop, to_stop in zip(stops, asked, strict=True):
+        for stop, to_stop in zip(stops, problems, strict=True):
             if not point_is_free(*stop.place, self._scene):
                 return Stuck(stop.place, "the goal lies in an obstacle or outside the map", 0)
             aimed = with_free_goal(to_stop, self._vehicle, self._scene)
@@ -188,9 +188,8 @@ class Router:
             goal = f"goal {number + 1}" if len(stops) > 1 else "the goal"
             if path is None:
                 return Stuck(stop.place, f"{goal} cannot be reached: no way over the map leads there", 0)
-            asked[number] = replace(
-                asked[number], start=tuple(state[:3].tolist()), start_motion=tuple(state[3:].tolist())
-            )
+            pose, moving = tuple(state[:3].tolist()), tuple(state[3:].tolist())
+            problems[number] = replace(problems[number], start=pose, start_motion=moving)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
                 around = PathAhead(self._roomy_paths, stop, self._scene, state)
@@ -201,7 +200,7 @@ class Router:
             sections.append(more)
             paths.append(path)
             state = more[-1].end if more else state
-        return Route(asked, sections, paths)
+        return Route(problems, sections, paths)
 
     def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""

@@ -267,8 +267,9 @@ def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
 
 def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
     """Raise PlanFaultError if the independent judge refuses the route, as one plan or to one of its stops."""
-    parts = zip(route.problems, route.plans(assistant.vehicle), strict=True)
-    for problem, part in [(route.problem, plan), *parts]:
+    parts = list(zip(route.problems, route.plans(assistant.vehicle), strict=True))
+    several = parts if len(parts) > 1 else []
+    for problem, part in [(route.problem, plan), *several]:
         found = faults(problem, part, assistant.vehicle)
         if found:
             raise PlanFaultError(f"The route across {problem.id}, seed {assistant.settings.seed}: {found[0]}")
