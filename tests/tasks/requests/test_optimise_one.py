@@ -29,7 +29,8 @@ def test_a_straight_line_becomes_a_plan_and_its_plan_a_beginning(
     first, second, drawing = (tmp_path / name for name in ("first.json", "second.json", "plan.png"))
     told = ["--out", str(first), "--picture", str(drawing)]
     assert call(["optimise", str(problem), "--straight", *told]) == 0
-    driver, answer, *lines = capsys.readouterr().out.splitlines()
+    told_lines = capsys.readouterr().out.splitlines()
+    driver, answer, *lines = (line for line in told_lines if not line.startswith("Still "))  # if it is slow
     assert driver.startswith("vehicle  car, ")
     assert answer.startswith("converged, ")
     assert lines == [f"plan     {first}", f"picture  {drawing}"]
