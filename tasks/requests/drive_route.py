@@ -324,6 +324,8 @@ def _summary(
 ) -> list[str]:
     """Lines: the whole route, the share that came from memory, the planning times."""
     legs = route.legs
+    if not legs:
+        return ["The vehicle is there already: nothing has to be driven."]
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
     }
@@ -340,17 +342,14 @@ def _summary(
     parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
     share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
     lines.append("; ".join(parts))
-    if legs:
-        lines.append(
-            f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
-            "(a repaired leg counts whole)"
-        )
-        lines.append(_pace(route, plan, assistant.vehicle, scale))
-    lines.append(
+    return [
+        *lines,
+        f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
+        "(a repaired leg counts whole)",
+        _pace(route, plan, assistant.vehicle, scale),
         f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
-        f"route with its checks {seconds:.2f} s"
-    )
-    return lines
+        f"route with its checks {seconds:.2f} s",
+    ]
 
 
 def _from_memory(route: Route) -> int:

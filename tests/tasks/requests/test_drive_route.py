@@ -115,6 +115,18 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert picture.stat().st_size > 10_000
 
 
+def test_who_is_there_already_is_told_so_and_gets_a_plan_that_stands(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "plan.json"
+    for goal in ("8,6.5", "8,6,0.3"):
+        asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", goal, "--out", str(out)]
+        assert call(asked) == 0
+        assert "there already" in capsys.readouterr().out
+        assert len(json.loads(out.read_text())["states"]) == 1
+        assert call(["verify", str(out), "--map", str(town / "town.map")]) == 0
+
+
 def test_a_route_is_refused_on_a_map_that_has_changed_in_its_way(
     town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
