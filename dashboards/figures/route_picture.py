@@ -75,9 +75,11 @@ def route_picture(
         sources.append(leg.source)
     several = len(stops) > 1
     for number, stop in enumerate(stops, start=1):
-        goal = _placed(world, scale * np.array([stop.place]))[0]
-        if stop.arrival.heading is not None:
-            _draw_heading(axes, (goal[0], goal[1]), world.origin[2] + stop.arrival.heading, GREEN, longest)
+        right, up = stop.place
+        x, y, heading = world.pose(scale * right, scale * up, stop.arrival.heading or 0.0)
+        goal = (x, y)
+        if stop.is_pose:
+            _draw_heading(axes, goal, heading, GREEN, longest)
         axes.plot(
             *goal,
             marker="o" if several else "*",

@@ -202,8 +202,9 @@ def route(
         reading: How the map is read.
     """
     from tasks.requests.assistant import Assistant
-    from tasks.requests.drive_route import RouteRequest, drive_route
+    from tasks.requests.drive_route import drive_route
     from tasks.requests.import_worlds import import_settings
+    from tasks.requests.route_request import RouteRequest
 
     assistant = Assistant(options.settings(assist, without_memory="fresh"))
     settings = import_settings(assistant.settings.vehicle, options.seed, **asdict(reading))

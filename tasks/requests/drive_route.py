@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -15,25 +14,21 @@ import numpy as np
 from dashboards.cells import CellTable, decimal
 from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.maps.occupancy_map import OccupancyMap
-from planners.routes.path_ahead import AT_REST, POSE_RADIUS, POSE_TOLERANCE, Stop
+from planners.routes.path_ahead import Stop
 from planners.routes.route import Leg, Route, Router, Stuck
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Pose
 from planners.world.authority.authority import faults
-from planners.world.checked_problem import NO_OBSTACLES
 from planners.world.problem import Plan, Problem
-from planners.world.problem_faults import motion_fault
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
-from storage.exchange.question_fields import ANY_HEADING, start_motion_of
-from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
-from storage.worlds.sources import FORMATS, source_at
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import plan_answer
-from tasks.settings.checks import check_known, check_outputs, check_picture, check_plan_file
+from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of
+from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
 SOURCES: Final = ("recalled", "repaired", "searched")
@@ -44,7 +39,6 @@ FIELDS: Final = (
     *("duration_s", "first_speed_mps", "planning_ms", "retrieval_ms"),
 )
 RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of planning that a memory takes
-_LOG: Final = logging.getLogger(__name__)
 
 
 @dataclass
@@ -69,77 +63,6 @@ class DrivenRoute(NamedTuple):
     legs: CellTable
     summary: list[str]  # lines: length and duration, the share that came from memory, the planning times
     answer: dict[str, Any]  # for programs: the fields of ``plan_answer``, and what the route is made of
-
-
-class RouteRequest(NamedTuple):
-    """From where to where, as texts of numbers with commas between them, in metres and radians of the map."""
-
-    start: str  # x,y,heading
-    goals: Sequence[str]  # x,y or x,y,heading each, in the order of the drive
-    goal_tolerance: str | None = None  # metres,radians by which poses may be missed; None: the usual
-    motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
-
-
-def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:
-    """The numbers in a text like ``1,2``. Raises UsageError unless they are finite, and as many as may be."""
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) not in counts or not all(math.isfinite(number) for number in numbers):
-        many = " or ".join(map(str, counts))
-        raise UsageError(f"{option} {text!r}: give {meaning}, {many} numbers with commas between them.")
-    return numbers
-
-
-def _stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[Stop]:
-    """The goals of a request over a map, in canonical metres of its grid. Raises UsageError."""
-    radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
-    if request.goal_tolerance is not None:
-        radius, turn = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
-        if not (radius > 0.0 and turn > 0.0):
-            raise UsageError(
-                f"--goal-tolerance {request.goal_tolerance!r}: give numbers above 0, or leave it out for "
-                f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
-            )
-        _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
-    stops = []
-    for goal in request.goals:
-        x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
-        right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
-        place = right / scale, up / scale
-        if heading:
-            _warn(degrees_hint("The heading of --to", heading[0]))
-            pose = AT_REST._replace(heading=facing, heading_tolerance=turn)
-            stops.append(Stop(place, radius / scale, pose))
-        else:
-            stops.append(Stop(place))
-    if not stops:
-        raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
-    if request.goal_tolerance is not None and not any(stop.is_pose for stop in stops):
-        raise UsageError("--goal-tolerance is for poses: give --to x,y,heading, or leave it out.")
-    return stops
-
-
-def _motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[float, ...]:
-    """The motion at the start in canonical metres a second, speed first. Raises UsageError."""
-    try:
-        given = start_motion_of(request.motion, vehicle)
-    except ValueError as error:
-        begins = "The start " if str(error).startswith("has ") else ""
-        raise UsageError(f"{begins}{error}.") from None
-    motion = (given[0] / scale, *given[1:]) if given else ()
-    unbounded = (-math.inf, -math.inf, math.inf, math.inf)
-    start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, motion)
-    fault = motion_fault(start, vehicle)
-    if fault is not None:
-        raise UsageError(f"The {fault}.")
-    return motion
-
-
-def _warn(hint: str | None) -> None:
-    if hint is not None:
-        _LOG.warning("%s.", hint)
 
 
 def drive_route(
@@ -170,20 +93,16 @@ def drive_route(
     """
     check_plan_file(out)
     check_picture(drawing)
-    check_known("format", [] if map_format is None else [map_format], FORMATS)
-    pose = _numbers_of(request.start, [3], "--from", "x,y,heading in metres and radians")
-    _warn(degrees_hint("The heading of --from", pose[2]))
+    pose = start_of(request)
     if assistant.vehicle.min_speed >= 0.0:
         raise UsageError(
             f"A route needs a vehicle that can drive backwards; {name_of(assistant.vehicle)} cannot."
         )
-    source = source_at(path, map_format)
-    if not source.is_map:
-        raise UsageError(f"{path} holds worlds; a route needs a map: .map, .yaml (ROS), .npy or .npz.")
+    source = map_source(path, map_format, "a route")
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = load_map(source, settings)
     scale = settings.scale
-    stops, motion = _stops_of(request, world, scale), _motion_of(request, assistant.vehicle, scale)
+    stops, motion = stops_of(request, world, scale), motion_of(request, assistant.vehicle, scale)
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
     if max(canonical.size) > WIDEST_M:
         raise UsageError(

@@ -1,17 +1,30 @@
-"""Judges plans on a map: whatever is occupied on it is in their way."""
+"""What is in the way of a plan that is judged without its problem: nothing, or what is occupied on a map."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cache
+from typing import Final
 
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.authority.authority import faults
-from planners.world.problem import GOAL_RADIUS, Obstacles, Plan, Problem
+from planners.world.problem import GOAL_RADIUS, Obstacles, Plan, Problem, obstacles_of
 from storage.exchange.plans import PlanRecord
+
+ROOM_M: Final = 1e6  # around a plan that is judged by itself
+
+
+def by_itself(plan: Plan) -> Problem:
+    """The problem that a plan answers where nothing is in its way."""
+    x, y, heading, *motion = plan.states[0].tolist()
+    goal = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
+    bounds = (x - ROOM_M, y - ROOM_M, x + ROOM_M, y + ROOM_M)
+    start = (x, y, heading)
+    return Problem(
+        "stored", "stored", start, goal, GOAL_RADIUS, bounds, obstacles_of([]), start_motion=tuple(motion)
+    )
 
 
 class MapJudge:
@@ -25,22 +38,11 @@ class MapJudge:
 
     def faults(self, record: PlanRecord, plan: Plan) -> list[str]:
         """What is wrong with the ``plan`` of a ``record``, driven from its first state, goals left aside."""
-        scale, (left, bottom, turn) = record.scale, self._world.origin
-        x, y = (left - record.offset[0]) / scale, (bottom - record.offset[1]) / scale
-        cos, sin = math.cos(turn), math.sin(turn)
-        on_grid = from_canonical(plan, Alignment((-cos * x - sin * y, sin * x - cos * y), turn))
-        first, last = on_grid.states[0].tolist(), on_grid.states[-1].tolist()
+        scale, (x, y, turn) = record.scale, self._world.grid_pose(*record.offset, 0.0)
+        on_grid = from_canonical(plan, Alignment((x / scale, y / scale), -turn))
         width, height = self._world.size
-        whole = Problem(
-            self._world.name,
-            self._world.name,
-            (first[0], first[1], first[2]),
-            (last[0], last[1]),
-            GOAL_RADIUS,
-            (0.0, 0.0, width / scale, height / scale),
-            self._obstacles(scale),
-            start_motion=tuple(first[3:]),
-        )
+        bounds = (0.0, 0.0, width / scale, height / scale)
+        whole = replace(by_itself(on_grid), bounds=bounds, obstacles=self._obstacles(scale))
         return faults(whole, on_grid, record.vehicle)
 
     def _obstacles_at(self, scale: float) -> Obstacles:

@@ -11,11 +11,10 @@ from storage.archives.libraries import HEADERS
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, is_remote, local_place
 from storage.worlds.importing import ImportSettings, load_map
-from storage.worlds.sources import FORMATS, source_at
 from tasks.requests.map_plans import MapJudge
+from tasks.requests.route_request import map_source
 from tasks.requests.verify_plans import verify_plan_files, verify_stored_plans
 from tasks.servers.prefect_server import set_environment
-from tasks.settings.checks import check_known
 from tasks.settings.errors import RunError, UsageError
 
 _LOG = logging.getLogger(__name__)
@@ -77,11 +76,7 @@ def verify(
 
 
 def _judge_of(on_map: VerifiedMap) -> MapJudge:
-    check_known("format", [] if on_map.format is None else [on_map.format], FORMATS)
-    source = source_at(on_map.path, on_map.format)
-    if not source.is_map:
-        raise UsageError(f"{on_map.path} holds worlds; --map needs a map: .map, .yaml (ROS), .npy or .npz.")
-    world = load_map(source, on_map.settings)
+    world = load_map(map_source(on_map.path, on_map.format, "--map"), on_map.settings)
     width, height = world.size
     _LOG.info("map      %g x %g m, cells of %g m", width, height, world.resolution)
     return MapJudge(world, on_map.settings.tolerance_m)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from planners.world.authority.authority import faults
-from planners.world.problem import GOAL_RADIUS, Plan, Problem, obstacles_of
+from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.archives.libraries import load_memory_or_library, vehicle_of
 from storage.errors import StorageError
@@ -19,10 +19,9 @@ from storage.exchange.problems import problems_or_faults
 from storage.fields import short
 from storage.places.files import read_json
 from tasks.fan_out.progress import progress
-from tasks.requests.map_plans import MapJudge
+from tasks.requests.map_plans import MapJudge, by_itself
 from tasks.settings.errors import RunError, tell_faults
 
-_ROOM_M: Final = 1e6  # around a plan that is judged by itself
 _BY_ITSELF: Final = "plans driven again by their controls, within their vehicle's limits"
 _ON_MAP: Final = "plans driven again by their controls, and swept over the map"
 _IN_PROBLEM: Final = "plans driven again by their controls, from start to goal of their problems, and swept"
@@ -53,7 +52,7 @@ def verify_stored_plans(folder: Path) -> Counter[str]:
     wrong = [
         f"{folder}: plan {number}: {fault}"
         for number, plan in enumerate(stored.plans)
-        for fault in faults(_by_itself(plan), plan, vehicle)
+        for fault in faults(by_itself(plan), plan, vehicle)
     ]
     _refuse(wrong, f" in {folder}; make it again")
     return Counter({_BY_ITSELF: len(stored.plans)})
@@ -170,24 +169,13 @@ def _with_problems(
 def _faults(record: PlanRecord, plan: Plan, problem: Problem | str | None) -> list[str]:
     """What is wrong with the ``plan`` of a ``record``; arguments as of ``_with_problems``."""
     if problem is None:
-        alone = replace(_by_itself(plan), scale=record.scale, offset=record.offset)
+        alone = replace(by_itself(plan), scale=record.scale, offset=record.offset)
         return faults(alone, plan, record.vehicle)
     if isinstance(problem, str):
         return [problem]
     if record.scale != problem.scale:
         return [f"Scale: it is {record.scale:g}, that of the problem {problem.scale:g}."]
     return faults(problem, record.plan_in_frame_of(problem) or plan, record.vehicle)
-
-
-def _by_itself(plan: Plan) -> Problem:
-    """The problem that a plan answers where nothing is in its way."""
-    x, y, heading, *motion = plan.states[0].tolist()
-    goal = (float(plan.states[-1, 0]), float(plan.states[-1, 1]))
-    bounds = (x - _ROOM_M, y - _ROOM_M, x + _ROOM_M, y + _ROOM_M)
-    start = (x, y, heading)
-    return Problem(
-        "stored", "stored", start, goal, GOAL_RADIUS, bounds, obstacles_of([]), start_motion=tuple(motion)
-    )
 
 
 def _refuse(wrong: Sequence[str], where: str) -> None:

@@ -1,0 +1,111 @@
+"""What the command ``route`` is asked for, as texts and as what the router takes."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.path_ahead import AT_REST, POSE_RADIUS, POSE_TOLERANCE, Stop
+from planners.world.arrays import Pose
+from planners.world.checked_problem import NO_OBSTACLES
+from planners.world.problem import Problem
+from planners.world.problem_faults import motion_fault
+from planners.world.vehicles.vehicle import Vehicle
+from storage.exchange.question_fields import ANY_HEADING, start_motion_of
+from storage.fields import degrees_hint
+from storage.worlds.sources import FORMATS, Source, source_at
+from tasks.settings.checks import check_known
+from tasks.settings.errors import UsageError
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class RouteRequest(NamedTuple):
+    """From where to where, as texts of numbers with commas between them, in metres and radians of the map."""
+
+    start: str  # x,y,heading
+    goals: Sequence[str]  # x,y or x,y,heading each, in the order of the drive
+    goal_tolerance: str | None = None  # metres,radians by which poses may be missed; None: the usual
+    motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
+
+
+def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:
+    """The numbers in a text like ``1,2``. Raises UsageError unless they are finite, and as many as may be."""
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) not in counts or not all(math.isfinite(number) for number in numbers):
+        many = " or ".join(map(str, counts))
+        raise UsageError(f"{option} {text!r}: give {meaning}, {many} numbers with commas between them.")
+    return numbers
+
+
+def start_of(request: RouteRequest) -> Pose:
+    """The pose at the start, in metres and radians of the map. Raises UsageError."""
+    x, y, heading = _numbers_of(request.start, [3], "--from", "x,y,heading in metres and radians")
+    _warn(degrees_hint("The heading of --from", heading))
+    return x, y, heading
+
+
+def stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[Stop]:
+    """The goals of a request over a map, in canonical metres of its grid. Raises UsageError."""
+    radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
+    if request.goal_tolerance is not None:
+        radius, turn = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
+        if not (radius > 0.0 and turn > 0.0):
+            raise UsageError(
+                f"--goal-tolerance {request.goal_tolerance!r}: give numbers above 0, or leave it out for "
+                f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
+            )
+        _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
+    stops = []
+    for goal in request.goals:
+        x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
+        right, up, facing = world.grid_pose(x, y, heading[0] if heading else 0.0)
+        place = right / scale, up / scale
+        if heading:
+            _warn(degrees_hint("The heading of --to", heading[0]))
+            pose = AT_REST._replace(heading=facing, heading_tolerance=turn)
+            stops.append(Stop(place, radius / scale, pose))
+        else:
+            stops.append(Stop(place))
+    if not stops:
+        raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
+    if request.goal_tolerance is not None and not any(stop.is_pose for stop in stops):
+        raise UsageError("--goal-tolerance is for poses: give --to x,y,heading, or leave it out.")
+    return stops
+
+
+def motion_of(request: RouteRequest, vehicle: Vehicle, scale: float) -> tuple[float, ...]:
+    """The motion at the start in canonical metres a second, speed first. Raises UsageError."""
+    try:
+        given = start_motion_of(request.motion, vehicle)
+    except ValueError as error:
+        begins = "The start " if str(error).startswith("has ") else ""
+        raise UsageError(f"{begins}{error}.") from None
+    motion = (given[0] / scale, *given[1:]) if given else ()
+    unbounded = (-math.inf, -math.inf, math.inf, math.inf)
+    start = Problem("", "", (0.0, 0.0, 0.0), (0.0, 0.0), 1.0, unbounded, NO_OBSTACLES, scale, motion)
+    fault = motion_fault(start, vehicle)
+    if fault is not None:
+        raise UsageError(f"The {fault}.")
+    return motion
+
+
+def _warn(hint: str | None) -> None:
+    if hint is not None:
+        _LOG.warning("%s.", hint)
+
+
+def map_source(path: Path, map_format: str | None, who: str) -> Source:
+    """The files of a map; ``who`` needs it. Raises UsageError if the format is unknown or there is no map."""
+    check_known("format", [] if map_format is None else [map_format], FORMATS)
+    source = source_at(path, map_format)
+    if not source.is_map:
+        raise UsageError(f"{path} holds worlds; {who} needs a map: .map, .yaml (ROS), .npy or .npz.")
+    return source
