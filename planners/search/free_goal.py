@@ -1,7 +1,8 @@
 """Aims at a pose that is free within what is tolerated, where the pose that is asked for is not.
 
 Planners aim at the pose itself, and drive to it with a margin, so a goal a centimetre from a wall would be
-out of their reach although they may end beside it.
+out of their reach although they may end beside it. Where no pose that is tolerated has room, there is
+nothing to search for.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from typing import Final
 
 import numpy as np
 
-from planners.world.arrays import Floats
-from planners.world.geometry.collision import Scene, count_free_prefix
+from planners.world.arrays import Flags, Floats
+from planners.world.geometry.collision import Scene, count_free_prefix, note_free
 from planners.world.problem import Problem
 from planners.world.vehicles.dynamics import control_limits
-from planners.world.vehicles.vehicle import Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import Trailer, Vehicle, state_size, trailers_of
 from planners.world.view import View
 from planners.world.workspace import Workspace
 
@@ -25,6 +26,9 @@ from planners.world.workspace import Workspace
 OFF: Final = (0.25, 0.5, 0.75, 0.9)
 BEARINGS: Final = 16  # of these poses
 TURNED: Final = (0.0, 0.5, -0.5)  # shares of the tolerated angle by which they are turned
+STEP: Final = math.radians(1.0)  # between angles at which bodies are looked at for a proof
+SLACK_M: Final = 1e-6  # for roundings
+MOST_LOOKS: Final = 100_000  # at a body, some 5 ms; who would need more proves nothing
 
 
 def with_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> Problem:
@@ -70,19 +74,86 @@ def aimed_view(problem: Problem, vehicle: Vehicle, workspace: Workspace | None =
 
 
 def has_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether the goal pose of a problem is free, or the problem asks for none; arguments as before."""
+    """Whether the goal pose of a problem is free, however trailers are folded; arguments as before."""
     last = _last(problem, vehicle)
-    return last is None or _is_free(last, vehicle, scene)
+    return not lacks_room(problem, vehicle, scene) if last is None else _is_free(last, vehicle, scene)
+
+
+def lacks_room(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether it is certain that the vehicle has no room in any pose that is tolerated, however it is folded.
+
+    Bodies are looked at in steps of an angle, each smaller on all sides by as much as it may stand elsewhere
+    than where it is looked at.
+
+    Args:
+        problem: in any frame; of one that asks for no heading nothing is certain.
+        vehicle: what is driven.
+        scene: ``scene_of(problem)``.
+    """
+    arrival, unfolded = problem.arrival, _unfolded(problem, vehicle)
+    if arrival is None or arrival.heading is None or unfolded is None:
+        return False
+    if _is_free(unfolded, vehicle, scene):
+        return False
+    trailers = trailers_of(vehicle)
+    hitches = arrival.hitches or (0.0,) * len(trailers)
+    free = arrival.hitch_tolerances or tuple(trailer.max_hitch for trailer in trailers)
+    headings = _angles(arrival.heading, arrival.heading_tolerance)
+    poses = np.column_stack((np.tile(problem.goal, (len(headings), 1)), headings))
+    elsewhere, turned = problem.goal_radius + SLACK_M, 0.5 * STEP  # by how much an axle may be off
+    poses = poses[_may_stand(poses, vehicle, elsewhere, turned, scene)]
+    for trailer, hitch, tolerance in zip(trailers, hitches, free, strict=True):
+        angles = _angles(hitch, tolerance)
+        if len(poses) * len(angles) > MOST_LOOKS:
+            return False
+        headings = (poses[:, 2:] - angles).ravel()
+        back = trailer.hitch_length * np.column_stack((np.cos(headings), np.sin(headings)))
+        poses = np.column_stack((np.repeat(poses[:, :2], len(angles), axis=0) - back, headings))
+        turned += 0.5 * STEP
+        elsewhere += trailer.hitch_length * turned
+        poses = poses[_may_stand(poses, trailer, elsewhere, turned, scene)]
+    return len(poses) == 0
+
+
+def _angles(middle: float, tolerance: float) -> Floats:
+    """Angles of which one lies within half a ``STEP`` of any that is tolerated, at most a turn."""
+    tolerance = min(tolerance, math.pi)
+    return middle + np.linspace(-tolerance, tolerance, 2 * math.ceil(tolerance / STEP) + 1)
+
+
+def _may_stand(
+    poses: Floats, body: Vehicle | Trailer, elsewhere: float, turned: float, scene: Scene
+) -> Flags:
+    """Whether a body may be free that stands as much elsewhere (m), and turned (rad), as given; ``[n]``."""
+    shrunk = elsewhere + turned * math.hypot(max(body.front, body.rear), 0.5 * body.width)
+    half_length, half_width = 0.5 * (body.front + body.rear) - shrunk, 0.5 * body.width - shrunk
+    free = np.ones(len(poses), bool)
+    if min(half_length, half_width) <= 0.0 or body.about.outline:  # it may not fill its box
+        return free
+    x, y, headings = poses.T
+    ahead = 0.5 * (body.front - body.rear)
+    cos, sin = np.cos(headings), np.sin(headings)
+    halves = np.tile((half_length, half_width), (len(poses), 1))
+    note_free(np.column_stack((x + ahead * cos, y + ahead * sin, cos, sin, halves)), scene, free)
+    return free
 
 
 def _last(problem: Problem, vehicle: Vehicle) -> Floats | None:
     """The state ``[S]`` that is asked for at the end, as slow as may be; None if that is not one pose."""
     arrival = problem.arrival
-    if arrival is None or arrival.heading is None or (trailers_of(vehicle) and not arrival.hitches):
+    if arrival is not None and trailers_of(vehicle) and not arrival.hitches:
+        return None
+    return _unfolded(problem, vehicle)
+
+
+def _unfolded(problem: Problem, vehicle: Vehicle) -> Floats | None:
+    """The same, with trailers straight behind if their angles are free; None if no heading is asked."""
+    arrival = problem.arrival
+    if arrival is None or arrival.heading is None:
         return None
     last = np.zeros(state_size(vehicle))
     last[:4] = *problem.goal, arrival.heading, min(max(0.0, arrival.least_speed), arrival.most_speed)
-    last[5:] = arrival.hitches
+    last[5 : 5 + len(arrival.hitches)] = arrival.hitches
     return last
 
 

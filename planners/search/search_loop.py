@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from planners.search.free_goal import lacks_room
 from planners.search.outcome import Outcome, Status, work_of
 from planners.search.query import Query, prefix_of
 from planners.search.structures import tree as trees
@@ -74,6 +75,8 @@ def attempt(
     trees.plant(tree, first, np.ascontiguousarray(prefix.controls), scene.bounds, limits.bound_s)
     counts = tree.counts
     status = _FIRST[_first_status(first, goal, vehicle, scene)]
+    if status is Status.BUDGET_SPENT and lacks_room(problem, vehicle, scene):
+        status = Status.GOAL_BLOCKED
     roadmap_seconds = 0.0
     found: Plan | None = None
     if status is Status.SOLVED:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planners.world.arrays import Bounds, Box, Floats, Integers
+from planners.world.arrays import Bounds, Box, Flags, Floats, Integers
 from planners.world.jit import inlined, jit, lean
 from planners.world.problem import Problem
 from planners.world.trigonometry import length
@@ -202,6 +202,14 @@ def box_is_free(box: Box, scene: Scene) -> bool:
         if box_meets_piece(box, pieces[k, FIRST], pieces[k, LAST], edges):
             return False
     return True
+
+
+@lean
+def note_free(boxes: Floats, scene: Scene, free: Flags) -> None:
+    """Note in ``free [n]`` whether each of ``boxes [n, 6]`` is free, as ``box_is_free`` says."""
+    for i in range(boxes.shape[0]):
+        box = boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3], boxes[i, 4], boxes[i, 5]
+        free[i] = box_is_free(box, scene)
 
 
 @inlined

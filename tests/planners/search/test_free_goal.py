@@ -7,20 +7,33 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from planners.attempt import DRIVES
 from planners.explanation import drive_found
 from planners.memory.library.plan_library import gathered_library
-from planners.search.free_goal import has_free_goal, with_free_goal
+from planners.search.free_goal import has_free_goal, lacks_room, with_free_goal
 from planners.search.outcome import MEANINGS, Status
+from planners.search.registry import PLANNERS, plan
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Arrival, Problem
-from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, DIFFERENTIAL_DRIVE, Vehicle
+from planners.world.randomness import generator
+from planners.world.vehicles.bodies import footprints
+from planners.world.vehicles.vehicle import (
+    CAR,
+    CAR_1_TRAILER,
+    CAR_2_TRAILERS,
+    DIFFERENTIAL_DRIVE,
+    Vehicle,
+    state_size,
+    trailers_of,
+)
+from tests.planners.world.strategies import seeds
 from tests.worlds import box, problem_of
 
 WALL_X = 30.0  # metres: the face that looks to the left
@@ -94,3 +107,72 @@ def test_whether_a_goal_has_room_is_known_once_it_is_aimed_at() -> None:
 
 def test_every_way_to_end_without_a_plan_has_a_meaning() -> None:
     assert set(MEANINGS) == set(Status) - {Status.SOLVED}
+
+
+TRAINS = {"car": CAR, "one trailer": CAR_1_TRAILER, "two trailers": CAR_2_TRAILERS}
+
+
+@given(
+    x=st.floats(18.0, 34.0),
+    y=st.floats(18.0, 34.0),
+    turned=st.floats(-math.pi, math.pi),
+    gap=st.floats(0.3, 3.0),
+    tolerance=st.floats(0.0, 0.4),
+    train=st.sampled_from(list(TRAINS)),
+    seed=seeds,
+)
+def test_who_is_said_to_have_no_room_is_in_an_obstacle_however_it_is_folded(
+    x: float, y: float, turned: float, gap: float, tolerance: float, train: str, seed: int
+) -> None:
+    vehicle = TRAINS[train]
+    walls = [box(25.0, 25.0 + sign * (1.5 + 0.5 * gap), 0.3, 6.0, 1.5) for sign in (-1.0, 1.0)]
+    asked = replace(
+        problem_of(walls),
+        goal=(x, y),
+        goal_radius=0.5 * tolerance,
+        arrival=Arrival(turned, tolerance, 0.0, 0.0),
+    )
+    if not lacks_room(asked, vehicle, scene_of(asked)):
+        return
+    rng = generator(seed)
+    states = np.zeros((200, state_size(vehicle)))
+    angle, off = rng.uniform(0.0, math.tau, 200), asked.goal_radius * np.sqrt(rng.uniform(0.0, 1.0, 200))
+    states[:, 0], states[:, 1] = x + off * np.cos(angle), y + off * np.sin(angle)
+    states[:, 2] = turned + rng.uniform(-tolerance, tolerance, 200)
+    for i, trailer in enumerate(trailers_of(vehicle)):
+        states[:, 5 + i] = rng.uniform(-trailer.max_hitch, trailer.max_hitch, 200)
+    obstacles = shapely.union_all([shapely.Polygon(wall) for wall in walls])
+    bodies = shapely.union_all(shapely.polygons(footprints(states, vehicle)), axis=1)
+    inside = shapely.covers(shapely.box(*asked.bounds), bodies)
+    assert not (inside & ~shapely.intersects(bodies, obstacles)).any()
+
+
+@pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.parametrize("train", TRAINS)
+def test_where_trailers_have_no_room_nothing_is_searched(train: str, planner: str) -> None:
+    vehicle = TRAINS[train]
+    behind = vehicle.rear + 0.5 if train != "car" else 0.0
+    asked = replace(
+        problem_of([box(25.0 - behind - 2.0, 25.0, 0.0, 2.0, 4.0)]),
+        start=(40.0, 10.0, 0.0),
+        goal=(25.0, 25.0),
+        goal_radius=0.05,
+        arrival=Arrival(0.0, 0.02, 0.0, 0.0),
+    )
+    outcome = plan(planner, to_canonical(asked)[0], generator(1), vehicle=vehicle)
+    assert outcome.status is Status.GOAL_BLOCKED
+    assert outcome.expansions == 0
+
+
+def test_a_body_that_does_not_fill_its_box_may_have_room_beside_an_obstacle() -> None:
+    wedge = (((-0.5, 0.0), (1.2, -0.4), (1.2, 0.4)),)
+    behind = CAR_1_TRAILER.trailers[0]._replace(about=CAR_1_TRAILER.trailers[0].about._replace(outline=wedge))
+    posts = [box(21.9, y, 0.0, 0.2, 0.2) for y in (24.7, 25.3)]
+    asked = replace(
+        problem_of(posts),
+        goal=(24.0, 25.0),
+        goal_radius=0.01,
+        arrival=Arrival(0.0, 0.01, 0.0, 0.0, (0.0,), (0.01,)),
+    )
+    assert lacks_room(asked, CAR_1_TRAILER, scene_of(asked))
+    assert not lacks_room(asked, CAR_1_TRAILER._replace(trailers=(behind,)), scene_of(asked))
