@@ -7,8 +7,10 @@ their own would never run.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
+import shutil
 import uuid
 from collections.abc import Callable
 from pathlib import Path
@@ -44,6 +46,7 @@ def _digest_of_sources() -> str:
 
 
 _config: Any = numba.config
+KEPT_BESIDE = 2  # folders of kernels of other states of the sources, for who goes back to one
 _CACHE = Path(_config.CACHE_DIR or _SOURCES / "__pycache__") / f"kernels-{_digest_of_sources()}"
 
 
@@ -57,6 +60,20 @@ class _KernelLocator(InTreeCacheLocator):
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
         self._cache_path = str(_CACHE / self.get_suitable_cache_subpath(file))
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder; if it is the first of a new state, delete those of states long ago."""
+        if not _CACHE.exists():
+            forget_old_kernels(_CACHE.parent)
+        super().ensure_cache_path()
+
+
+def forget_old_kernels(folder: Path) -> None:
+    """Delete all kernels in a folder but those of the newest ``KEPT_BESIDE`` states of the sources."""
+    with contextlib.suppress(FileNotFoundError):  # if another process does the same
+        states = sorted(folder.glob("kernels-*"), key=lambda state: state.stat().st_mtime)
+        for state in states[:-KEPT_BESIDE]:
+            shutil.rmtree(state, ignore_errors=True)
 
 
 class _KernelCacheImpl(CompileResultCacheImpl):

@@ -1,6 +1,7 @@
 """What importing the kernels leaves alone: Numba, for all other code of the process."""
 
 import gc
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from numba import TypingError
 
-from planners.world.jit import KernelFiles, jit
+from planners.world.jit import KernelFiles, forget_old_kernels, jit
 
 OTHERS = """
 import numba, numpy as np
@@ -115,6 +116,16 @@ def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(t
     mine.save("one trailer", "code for one trailer")
     for kind in ("one trailer", "two trailers"):
         assert later.load(kind) in (None, f"code for {kind}")
+
+
+def test_kernels_of_the_newest_states_of_the_sources_are_kept(tmp_path: Path) -> None:
+    for age in range(5):
+        state = tmp_path / f"kernels-{age}"
+        (state / "world").mkdir(parents=True)
+        os.utime(state, (1e9 - age, 1e9 - age))
+    (tmp_path / "module.pyc").touch()
+    forget_old_kernels(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"kernels-0", "kernels-1", "module.pyc"}
 
 
 def test_the_working_clock_does_not_count_compiling(tmp_path, monkeypatch):
