@@ -1,9 +1,13 @@
-"""A route as a picture: the map, the shortest way, and the legs, coloured by where they came from."""
+"""A route as a picture: the map, the shortest way, and the legs, coloured by where they came from.
+
+On a map a vehicle is a few dots, so of goals that are poses there are close-ups of how it gets in.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,15 +16,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from dashboards.figures.manoeuvre_picture import draw_manoeuvre, manoeuvre_legend
 from dashboards.figures.map_picture import draw_map
 from dashboards.figures.marks import draw_travel_arrows
+from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below, new_figure
 from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
+from dashboards.world_outlines import footprint_spacing_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.world.arrays import Floats
-from planners.world.problem import Plan
+from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
 COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
@@ -29,6 +36,8 @@ _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
 _ARROW: Final = 0.05  # of the map's longer side: the arrow of a heading
 _APART: Final = 0.1  # of it: arrows along the drive
+_CLOSE_UPS: Final = 3  # at most, side by side
+_LENGTHS: Final = 1.5  # of the vehicle to each side of the goal that a close-up shows
 
 
 def route_picture(
@@ -51,8 +60,19 @@ def route_picture(
     """
     width, height = _extent(world)
     longest = max(width, height)
-    figure = new_figure(_WIDTH, min(_WIDTH * height / width, _TALLEST) + 0.9, f"Route over {world.name}")
-    axes = figure.add_subplot()
+    arrivals = _arrivals(route, stops, scale, vehicle)
+    tall, below = min(_WIDTH * height / width, _TALLEST), _WIDTH / _CLOSE_UPS * bool(arrivals)
+    figure = new_figure(_WIDTH, tall + below + 0.9, f"Route over {world.name}")
+    if arrivals:
+        grid = figure.add_gridspec(2, _CLOSE_UPS, height_ratios=[tall, below])
+        axes = figure.add_subplot(grid[0, :])
+        for column, (name, problem, plan) in enumerate(arrivals):
+            close_up = figure.add_subplot(grid[1, column])
+            draw_problem(close_up, problem, vehicle)
+            draw_manoeuvre(close_up, plan, vehicle)
+            close_up.set_title(name, fontsize=9, color=INK, loc="left", pad=4)
+    else:
+        axes = figure.add_subplot()
     draw_map(axes, world, _OCCUPIED)
     axes.set_title(caption, fontsize=9, color=INK, loc="left", pad=6)
     for path in route.paths:
@@ -109,9 +129,44 @@ def route_picture(
         ),
         Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
         Patch(facecolor=_OCCUPIED, label="occupied"),
+        *manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals]),
     ]  # fmt: skip
     legend_below(figure, handles, 4)
     return figure
+
+
+def _arrivals(
+    route: Route, stops: Sequence[Stop], scale: float, vehicle: Vehicle
+) -> list[tuple[str, Problem, Plan]]:
+    """Of the first goals that are poses a title, what is around, and the last part of the drive there."""
+    reach = _LENGTHS * footprint_spacing_m(vehicle)
+    arrivals: list[tuple[str, Problem, Plan]] = []
+    drives = zip(stops, route.problems, route.plans(vehicle), strict=True)
+    for number, (stop, problem, plan) in enumerate(drives, start=1):
+        if not stop.is_pose or len(arrivals) == _CLOSE_UPS:
+            continue
+        x, y = stop.place
+        outside = np.abs(plan.states[:, :2] - (x, y)).max(axis=1) > reach
+        first = int(np.flatnonzero(outside)[-1]) + 1 if outside.any() else 0
+        last = Plan(plan.states[first:], plan.controls[first:], plan.dt)
+        bounds = (x - reach, y - reach, x + reach, y + reach)
+        near = [
+            piece
+            for piece in problem.obstacles.pieces()
+            if (piece.max(axis=0) > bounds[:2]).all() and (piece.min(axis=0) < bounds[2:]).all()
+        ]
+        x, y, heading, _, *others = last.states[0].tolist()
+        around = replace(
+            problem,
+            start=(x, y, heading),
+            start_motion=(0.0, *others),  # no arrow for its speed
+            bounds=bounds,
+            obstacles=obstacles_of([near]),
+            scale=scale,
+        )
+        title = f"into goal {number}" if len(stops) > 1 else "into the goal"
+        arrivals.append((title, around, last))
+    return arrivals
 
 
 def _draw_heading(

@@ -34,7 +34,7 @@ def problem_fault(problem: Problem, vehicle: Vehicle = CAR) -> str | None:
     fault = (
         frame_fault(problem)
         or motion_fault(problem, vehicle)
-        or _arrival_fault(problem.arrival, problem.scale, vehicle)
+        or arrival_fault(problem.arrival, problem.scale, vehicle)
     )
     if fault is not None:
         return fault
@@ -90,8 +90,11 @@ def _sliding(start: Floats, vehicle: Vehicle) -> tuple[bool, float]:
     return slides(state, vehicle), abs(lateral_acceleration(state, vehicle)[0])
 
 
-def _arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> str | None:
-    """What is wrong with what is asked at the goal."""
+def arrival_fault(arrival: Arrival | None, scale: float, vehicle: Vehicle) -> str | None:
+    """What is wrong with what is asked of a ``vehicle`` at the goal, as a clause; None if nothing is.
+
+    Real metres are ``scale`` times those of the ``arrival``.
+    """
     if arrival is None:
         return None
     if arrival.heading is not None and not arrival.heading_tolerance > 0.0:

@@ -102,7 +102,8 @@ def drive_route(
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
     world = load_map(source, settings)
     scale = settings.scale
-    stops, motion = stops_of(request, world, scale), motion_of(request, assistant.vehicle, scale)
+    stops = stops_of(request, world, assistant.vehicle, scale)
+    motion = motion_of(request, assistant.vehicle, scale)
     canonical = OccupancyMap(world.name, world.occupied, world.resolution / scale)
     if max(canonical.size) > WIDEST_M:
         raise UsageError(

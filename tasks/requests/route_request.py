@@ -13,7 +13,7 @@ from planners.routes.path_ahead import AT_REST, POSE_RADIUS, POSE_TOLERANCE, Sto
 from planners.world.arrays import Pose
 from planners.world.checked_problem import NO_OBSTACLES
 from planners.world.problem import Problem
-from planners.world.problem_faults import motion_fault
+from planners.world.problem_faults import arrival_fault, motion_fault
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
@@ -31,6 +31,7 @@ class RouteRequest(NamedTuple):
     goals: Sequence[str]  # x,y or x,y,heading each, in the order of the drive
     goal_tolerance: str | None = None  # metres,radians by which poses may be missed; None: the usual
     motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
+    goal_hitch: Sequence[float] = ()  # how each trailer stands in poses; none: as they come
 
 
 def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:
@@ -52,8 +53,8 @@ def start_of(request: RouteRequest) -> Pose:
     return x, y, heading
 
 
-def stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[Stop]:
-    """The goals of a request over a map, in canonical metres of its grid. Raises UsageError."""
+def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale: float) -> list[Stop]:
+    """The goals of a request for a vehicle over a map, in canonical metres of its grid. Raises UsageError."""
     radius, turn = scale * POSE_RADIUS, POSE_TOLERANCE
     if request.goal_tolerance is not None:
         radius, turn = _numbers_of(request.goal_tolerance, [2], "--goal-tolerance", "metres,radians")
@@ -63,6 +64,13 @@ def stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[S
                 f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
             )
         _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
+    hitches = tuple(request.goal_hitch)
+    posed = AT_REST._replace(
+        heading_tolerance=turn, hitches=hitches, hitch_tolerances=tuple(turn for _ in hitches)
+    )
+    fault = arrival_fault(posed, scale, vehicle)
+    if fault is not None:
+        raise UsageError(f"--goal-hitch: {fault}.")
     stops = []
     for goal in request.goals:
         x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
@@ -70,14 +78,14 @@ def stops_of(request: RouteRequest, world: OccupancyMap, scale: float) -> list[S
         place = right / scale, up / scale
         if heading:
             _warn(degrees_hint("The heading of --to", heading[0]))
-            pose = AT_REST._replace(heading=facing, heading_tolerance=turn)
-            stops.append(Stop(place, radius / scale, pose))
+            stops.append(Stop(place, radius / scale, posed._replace(heading=facing)))
         else:
             stops.append(Stop(place))
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
-    if request.goal_tolerance is not None and not any(stop.is_pose for stop in stops):
-        raise UsageError("--goal-tolerance is for poses: give --to x,y,heading, or leave it out.")
+    for option, given in (("tolerance", request.goal_tolerance is not None), ("hitch", bool(hitches))):
+        if given and not any(stop.is_pose for stop in stops):
+            raise UsageError(f"--goal-{option} is for poses: give --to x,y,heading, or leave it out.")
     return stops
 
 

@@ -115,6 +115,17 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert picture.stat().st_size > 10_000
 
 
+def test_a_trailer_stands_in_a_pose_as_it_is_asked_to(town: Path, tmp_path: Path) -> None:
+    out, picture = tmp_path / "plan.json", tmp_path / "route.png"
+    asked = ["route", str(town / "town.map"), "--vehicle", "car-1-trailer", "--goal-tolerance", "0.1,0.03"]
+    asked += ["--from", "8,6,0.3", "--to", "20,12,2.5", "--goal-hitch", "-0.2", "--picture", str(picture)]
+    assert call([*asked, "--out", str(out)]) == 0
+    last = json.loads(out.read_text())["states"][-1]
+    assert abs(last[5] + 0.2) <= 0.03
+    assert abs(math.remainder(last[2] - 2.5, math.tau)) <= 0.03
+    assert picture.stat().st_size > 10_000
+
+
 def test_who_is_there_already_is_told_so_and_gets_a_plan_that_stands(
     town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -165,6 +176,11 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "1"], 2, "metres,radians, 2 numbers"),
         (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "0,1"], 2, "numbers above 0"),
         (["--from", "8,6,0", "--to", "150,190", "--goal-tolerance", "1,1"], 2, "for poses: give --to x,y"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-hitch", "0"], 2, "there are no trailers"),
+        (["--from", "8,6,0", "--to", "150,190", "--goal-hitch", "0", "--vehicle", "car-1-trailer"], 2,
+         "for poses: give --to x,y"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-hitch", "2", "--vehicle", "car-1-trailer"], 2,
+         "expected up to 1"),
         (["--from", "8,6,0", "--to", "150,190", "--start-speed", "5"], 2, "start speed is 5 m/s; the veh"),
         (["--from", "8,6,0", "--to", "150,190", "--start-turn-rate", "1"], 2, "has speed, steering"),
         (["--from", "8,6,0", "--to", "150,190", "--start-hitch", "0.1"], 2, "has no trailer"),

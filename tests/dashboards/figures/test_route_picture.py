@@ -1,0 +1,27 @@
+"""The picture of a route shows close up how the vehicle gets into each pose."""
+
+from __future__ import annotations
+
+from dashboards.figures.route_picture import route_picture
+from planners.routes.path_ahead import AT_REST, Stop
+from planners.routes.route import Route, Router
+from tests.planners.maps.samples import town
+from tests.planners.routes.test_route import START, searched
+
+PLACE = Stop((60.0, 200.0))
+POSE = Stop((30.0, 170.0), 0.2, AT_REST._replace(heading=1.0, heading_tolerance=0.1))
+
+
+def test_every_pose_is_in_the_middle_of_a_close_up_and_no_place_has_one() -> None:
+    world = town()
+    for stops in ([PLACE], [POSE], [PLACE, POSE]):
+        found = Router(world, searched).route(START, stops)
+        assert isinstance(found, Route)
+        overview, *close_ups = route_picture(world, found, stops, 1.0, "").axes
+        assert overview.get_xlim() == (0.0, world.size[0])
+        assert len(close_ups) == sum(stop.is_pose for stop in stops)
+        for axes in close_ups:
+            left, right = axes.get_xlim()
+            low, high = axes.get_ylim()
+            assert abs(0.5 * (left + right) - POSE.place[0]) < 0.1 * (right - left)
+            assert abs(0.5 * (low + high) - POSE.place[1]) < 0.1 * (high - low)
