@@ -10,7 +10,7 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, point_is_free, scene_of
-from planners.world.problem import GOAL_RADIUS, Arrival, Problem, start_state
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem, start_state
 from planners.world.randomness import generator
 from planners.world.vehicles.dynamics import simulate, turn_limit
 from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
@@ -18,8 +18,6 @@ from planners.world.vehicles.vehicle import CAR, Vehicle, state_size
 DISTANCES_M: Final = (2.0, 70.0)  # from start to goal
 STEERED: Final = 0.5  # share of the largest steering angle or turn rate, at most, at the start
 BENT: Final = 0.3  # radians, at most, of each hitch at the start
-POSE_RADIUS: Final = 0.1  # metres
-POSE_TOLERANCE: Final = 0.05  # radians
 BRAKING_STEPS: Final = 10_000  # whoever needs more to stand is too fast anywhere
 TRIES: Final = 1_000  # draws until a world is given up
 

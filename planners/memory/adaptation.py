@@ -32,6 +32,8 @@ from planners.world.problem import (
     CANONICAL_GOAL,
     CANONICAL_START,
     GOAL_RADIUS,
+    POSE_RADIUS,
+    POSE_TOLERANCE,
     Arrival,
     Plan,
     Problem,
@@ -43,7 +45,6 @@ from planners.world.workspace import Workspace
 
 SAME: Final = 1e-6  # metres, radians, m/s: a drive that is so near to the stored one is the stored one
 OPEN_M: Final = 30.0  # around a plan on open ground
-POSE: Final = (0.1, 0.05)  # metres, radians: what a pose on open ground tolerates
 SPOT_RAD: Final = 0.05  # a larger turn in a step that leads nowhere is one on the spot
 _NAMED: Final = re.compile(r"([a-z]+)-([a-z]+)-(\d+)-(\d+)")
 
@@ -245,4 +246,4 @@ def _asked(
         return replace(place, start=CANONICAL_START, goal=CANONICAL_GOAL, bounds=BOUNDS, start_motion=())
     if abs(states[-1, 3]) >= STANDS:
         return place
-    return replace(place, goal_radius=POSE[0], arrival=Arrival(heading, POSE[1], 0.0, 0.0))
+    return replace(place, goal_radius=POSE_RADIUS, arrival=Arrival(heading, POSE_TOLERANCE, 0.0, 0.0))

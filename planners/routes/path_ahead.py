@@ -19,8 +19,6 @@ TIGHT_M: Final = 3.0  # of the path, given up for each metre of clearance that a
 BESIDE_M: Final = 10.0  # from a pose, as in a slot narrower than a cell: so far away a path may begin or end
 SIGHT_M: Final = 0.2  # between points that are looked at along a line
 AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
-POSE_RADIUS: Final = 0.1  # metres
-POSE_TOLERANCE: Final = 0.05  # radians
 
 
 class Stop(NamedTuple):

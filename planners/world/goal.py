@@ -9,7 +9,7 @@ import numpy as np
 
 from planners.world.arrays import Floats
 from planners.world.jit import inlined
-from planners.world.problem import Arrival, Problem
+from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem
 from planners.world.trigonometry import length, wrapped
 from planners.world.vehicles.dynamics import State
 from planners.world.vehicles.vehicle import DifferentialDrive, Vehicle
@@ -80,4 +80,4 @@ def asks_for_more(goal: Floats) -> bool:
 
 def goal_of_pose(x: float, y: float, heading: float) -> Floats:
     """Make the goal ``[8]`` of whoever is to stand at a pose (metres, radians), with the usual tolerances."""
-    return np.array([x, y, 0.1, heading, 0.05, -SLACK, SLACK, math.inf])
+    return np.array([x, y, POSE_RADIUS, heading, POSE_TOLERANCE, -SLACK, SLACK, math.inf])

@@ -16,6 +16,8 @@ CANONICAL_START = (0.0, 0.0, math.pi / 4)  # metres, metres, radians: facing the
 CANONICAL_GOAL = (50.0, 50.0)  # metres
 CANONICAL_DISTANCE = math.hypot(*CANONICAL_GOAL)
 GOAL_RADIUS = 2.0  # metres
+POSE_RADIUS = 0.1  # metres: the usual tolerances of a goal pose
+POSE_TOLERANCE = 0.05  # radians
 BOUNDS = (-7.0, -7.0, 57.0, 57.0)  # x_min, y_min, x_max, y_max in metres
 
 

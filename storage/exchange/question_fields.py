@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 from planners.world.arrays import Point
-from planners.world.problem import GOAL_RADIUS, Arrival, Problem
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of, state_names
 from storage.fields import degrees_hint, number_of, short
 
 STARTS: Final = {"start_speed": "speed", "start_steering": "steering", "start_turn_rate": "turn_rate"}
 ENDS: Final = ("goal_tolerance", "goal_speed", "goal_hitch", "goal_hitch_tolerance")
 QUESTION_FIELDS: Final = (*STARTS, "start_hitch", *ENDS)
-POSE_TOLERANCE: Final = [0.1, 0.05]  # metres, radians
+USUAL_POSE: Final = [POSE_RADIUS, POSE_TOLERANCE]  # metres, radians
 _NAME_IT: Final = "name the vehicle that the problem is for (--vehicle, in Python vehicle=)"
 ANY_HEADING: Final = 3.15  # rad; half a turn, rounded up, allows any heading
 ANY_SPEED: Final = 1e6  # m/s, stands for no limit in a file
@@ -76,7 +76,7 @@ def goal_of(fields: Mapping[str, Any]) -> Goal:
     x, y, *heading = numbers_of(fields, "goal", len(goal))
     if heading:
         _refuse(fields, "goal_radius", "a pose has goal_tolerance, [metres, radians]")
-        radius, tolerance = numbers_of(fields, "goal_tolerance", 2, POSE_TOLERANCE)
+        radius, tolerance = numbers_of(fields, "goal_tolerance", 2, USUAL_POSE)
         pose: dict[str, Any] = {"heading": heading[0], "heading_tolerance": tolerance}
         speeds = numbers_of(fields, "goal_speed", 2, [0.0, 0.0])
     else:
@@ -145,7 +145,7 @@ def hint_of_tolerance(fields: Mapping[str, Any], vehicle: Vehicle) -> str | None
     """What to say if it is left out how near to end, and the usual is far for the vehicle, or None."""
     is_pose = len(fields["goal"]) == 3
     field, usual, lengths = (
-        ("goal_tolerance", POSE_TOLERANCE[0], 0.5) if is_pose else ("goal_radius", GOAL_RADIUS, 2.0)
+        ("goal_tolerance", POSE_RADIUS, 0.5) if is_pose else ("goal_radius", GOAL_RADIUS, 2.0)
     )
     length = vehicle.scale * (vehicle.front + vehicle.rear)
     if fields.get(field) is not None or usual <= lengths * length:

@@ -22,12 +22,12 @@ from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
-from storage.worlds.importing import ImportSettings, load_map
+from storage.worlds.importing import ImportSettings
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import plan_answer
-from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of
+from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
@@ -100,7 +100,7 @@ def drive_route(
         )
     source = map_source(path, map_format, "a route")
     check_outputs([*source.contents(), *assistant.files], [out, drawing])
-    world = load_map(source, settings)
+    world = told_map(source, settings)
     scale = settings.scale
     stops = stops_of(request, world, assistant.vehicle, scale)
     motion = motion_of(request, assistant.vehicle, scale)

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from planners.maps.occupancy_map import OccupancyMap
-from planners.routes.path_ahead import AT_REST, POSE_RADIUS, POSE_TOLERANCE, Stop
+from planners.routes.path_ahead import AT_REST, Stop
 from planners.world.arrays import Pose
 from planners.world.checked_problem import NO_OBSTACLES
-from planners.world.problem import Problem
+from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE, Problem
 from planners.world.problem_faults import arrival_fault, motion_fault
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
+from storage.worlds.importing import ImportSettings, load_map
 from storage.worlds.sources import FORMATS, Source, source_at
 from tasks.settings.checks import check_known
 from tasks.settings.errors import UsageError
@@ -117,3 +118,11 @@ def map_source(path: Path, map_format: str | None, who: str) -> Source:
     if not source.is_map:
         raise UsageError(f"{path} holds worlds; {who} needs a map: .map, .yaml (ROS), .npy or .npz.")
     return source
+
+
+def told_map(source: Source, settings: ImportSettings) -> OccupancyMap:
+    """The map of a source; how large it and its cells are is told. Raises StorageError."""
+    world = load_map(source, settings)
+    width, height = world.size
+    _LOG.info("map      %g x %g m, cells of %g m", width, height, world.resolution)
+    return world

@@ -10,9 +10,9 @@ from typing import NamedTuple
 from storage.archives.libraries import HEADERS
 from storage.places.data_folder import MARK, open_data_folder
 from storage.places.mirror import fetch, is_remote, local_place
-from storage.worlds.importing import ImportSettings, load_map
+from storage.worlds.importing import ImportSettings
 from tasks.requests.map_plans import MapJudge
-from tasks.requests.route_request import map_source
+from tasks.requests.route_request import map_source, told_map
 from tasks.requests.verify_plans import verify_plan_files, verify_stored_plans
 from tasks.servers.prefect_server import set_environment
 from tasks.settings.errors import RunError, UsageError
@@ -76,7 +76,5 @@ def verify(
 
 
 def _judge_of(on_map: VerifiedMap) -> MapJudge:
-    world = load_map(map_source(on_map.path, on_map.format, "--map"), on_map.settings)
-    width, height = world.size
-    _LOG.info("map      %g x %g m, cells of %g m", width, height, world.resolution)
+    world = told_map(map_source(on_map.path, on_map.format, "--map"), on_map.settings)
     return MapJudge(world, on_map.settings.tolerance_m)

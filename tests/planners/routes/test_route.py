@@ -18,13 +18,13 @@ from planners.maps.global_path import GlobalPaths
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.memory.memory import Memory
-from planners.routes.path_ahead import POSE_RADIUS, POSE_TOLERANCE, PathAhead, Stop
+from planners.routes.path_ahead import PathAhead, Stop
 from planners.routes.route import Route, Router, Stuck
 from planners.search.braking import braking, is_free_drive
 from planners.solve import solve
 from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
-from planners.world.problem import GOAL_RADIUS, Arrival, Problem
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Arrival, Problem
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER, CAR_2_TRAILERS, DIFFERENTIAL_DRIVE, Vehicle
 from storage.vehicles.vehicle_files import read_vehicle
