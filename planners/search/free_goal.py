@@ -16,7 +16,7 @@ import numpy as np
 
 from planners.world.arrays import Flags, Floats
 from planners.world.geometry.collision import Scene, count_free_prefix, note_free
-from planners.world.problem import Problem
+from planners.world.problem import Problem, counter_clockwise
 from planners.world.vehicles.dynamics import control_limits
 from planners.world.vehicles.vehicle import Trailer, Vehicle, state_size, trailers_of
 from planners.world.view import View
@@ -28,7 +28,7 @@ BEARINGS: Final = 16  # of these poses
 TURNED: Final = (0.0, 0.5, -0.5)  # shares of the tolerated angle by which they are turned
 STEP: Final = math.radians(1.0)  # between angles at which bodies are looked at for a proof
 SLACK_M: Final = 1e-6  # for roundings
-MOST_LOOKS: Final = 100_000  # at a body, some 5 ms; who would need more proves nothing
+MOST_LOOKS: Final = 100_000  # at a body, some 15 ms; who would need more proves nothing
 
 
 def with_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> Problem:
@@ -73,17 +73,11 @@ def aimed_view(problem: Problem, vehicle: Vehicle, workspace: Workspace | None =
     return view
 
 
-def has_free_goal(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:
-    """Whether the goal pose of a problem is free, however trailers are folded; arguments as before."""
-    last = _last(problem, vehicle)
-    return not lacks_room(problem, vehicle, scene) if last is None else _is_free(last, vehicle, scene)
-
-
 def lacks_room(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:
     """Whether it is certain that the vehicle has no room in any pose that is tolerated, however it is folded.
 
-    Bodies are looked at in steps of an angle, each smaller on all sides by as much as it may stand elsewhere
-    than where it is looked at.
+    Boxes inside of the bodies are looked at in steps of an angle, each smaller on all sides by as much as it
+    may stand elsewhere than where it is looked at.
 
     Args:
         problem: in any frame; of one that asks for no heading nothing is certain.
@@ -125,17 +119,40 @@ def _may_stand(
     poses: Floats, body: Vehicle | Trailer, elsewhere: float, turned: float, scene: Scene
 ) -> Flags:
     """Whether a body may be free that stands as much elsewhere (m), and turned (rad), as given; ``[n]``."""
-    shrunk = elsewhere + turned * math.hypot(max(body.front, body.rear), 0.5 * body.width)
-    half_length, half_width = 0.5 * (body.front + body.rear) - shrunk, 0.5 * body.width - shrunk
-    free = np.ones(len(poses), bool)
-    if min(half_length, half_width) <= 0.0 or body.about.outline:  # it may not fill its box
-        return free
+    may = np.ones(len(poses), bool)
     x, y, headings = poses.T
-    ahead = 0.5 * (body.front - body.rear)
     cos, sin = np.cos(headings), np.sin(headings)
-    halves = np.tile((half_length, half_width), (len(poses), 1))
-    note_free(np.column_stack((x + ahead * cos, y + ahead * sin, cos, sin, halves)), scene, free)
-    return free
+    for ahead, aside, half_length, half_width in _inner_boxes(body):
+        reach = math.hypot(abs(ahead) + half_length, abs(aside) + half_width)
+        halves = np.array([half_length, half_width]) - (elsewhere + turned * reach)
+        if halves.min() <= 0.0:
+            continue
+        middles = x + ahead * cos - aside * sin, y + ahead * sin + aside * cos
+        free = np.empty(len(poses), bool)
+        note_free(np.column_stack((*middles, cos, sin, np.tile(halves, (len(poses), 1)))), scene, free)
+        may &= free
+    return may
+
+
+def _inner_boxes(body: Vehicle | Trailer) -> list[tuple[float, float, float, float]]:
+    """Boxes inside of a body: middle ahead of the reference point and aside, half length, half width (m).
+
+    They are its own box, or one in each part of its outline, as long for its width as the part.
+    """
+    if not body.about.outline:
+        return [
+            (0.5 * (body.front - body.rear), 0.0, 0.5 * (body.front + body.rear), 0.5 * body.width),
+        ]
+    boxes = []
+    for part in body.about.outline:
+        corners = counter_clockwise(np.array(part))
+        middle, halves = corners.mean(axis=0), 0.5 * np.ptp(corners, axis=0)
+        along = np.roll(corners, -1, axis=0) - corners
+        outwards = np.column_stack((along[:, 1], -along[:, 0]))
+        gaps = ((corners - middle) * outwards).sum(axis=1)
+        share = float((gaps / (np.abs(outwards) @ halves)).min())
+        boxes.append((*middle.tolist(), *(share * halves).tolist()))
+    return boxes
 
 
 def _last(problem: Problem, vehicle: Vehicle) -> Floats | None:

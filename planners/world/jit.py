@@ -46,8 +46,10 @@ def _digest_of_sources() -> str:
 
 
 _config: Any = numba.config
+_OWN = _SOURCES / "__pycache__"
+_CACHE = Path(_config.CACHE_DIR or _OWN) / f"kernels-{_digest_of_sources()}"
+_STATES = "kernels-" + 16 * "[0-9a-f]"
 KEPT_BESIDE = 2  # folders of kernels of other states of the sources, for who goes back to one
-_CACHE = Path(_config.CACHE_DIR or _SOURCES / "__pycache__") / f"kernels-{_digest_of_sources()}"
 
 
 class _KernelLocator(InTreeCacheLocator):
@@ -62,16 +64,16 @@ class _KernelLocator(InTreeCacheLocator):
         self._cache_path = str(_CACHE / self.get_suitable_cache_subpath(file))
 
     def ensure_cache_path(self) -> None:
-        """Make the folder; if it is the first of a new state, delete those of states long ago."""
-        if not _CACHE.exists():
-            forget_old_kernels(_CACHE.parent)
+        """Make the folder; if it is a new one beside the sources, delete those of states long ago."""
+        if not _CACHE.exists() and _CACHE.parent == _OWN:
+            forget_old_kernels(_OWN)
         super().ensure_cache_path()
 
 
 def forget_old_kernels(folder: Path) -> None:
-    """Delete all kernels in a folder but those of the newest ``KEPT_BESIDE`` states of the sources."""
+    """Delete all kernels in a folder but those of the ``KEPT_BESIDE`` states of the sources made last."""
     with contextlib.suppress(FileNotFoundError):  # if another process does the same
-        states = sorted(folder.glob("kernels-*"), key=lambda state: state.stat().st_mtime)
+        states = sorted(folder.glob(_STATES), key=lambda state: state.stat().st_mtime)
         for state in states[:-KEPT_BESIDE]:
             shutil.rmtree(state, ignore_errors=True)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dashboards.world_outlines import cusps_of
-from planners.search.free_goal import has_free_goal, with_free_goal
+from planners.search.free_goal import lacks_room
 from planners.search.outcome import MEANINGS, Status
 from planners.world.alignment import to_canonical
 from planners.world.geometry.collision import scene_of
@@ -32,8 +32,7 @@ def no_plan(name: str, summary: str, out: Path | None, written: Path | None) -> 
 def meaning_of(problem: Problem, status: str, vehicle: Vehicle) -> str:
     """What it means, in words, that an attempt at a problem ended with a status and without a plan."""
     canonical, _ = to_canonical(problem)
-    scene = scene_of(canonical)
-    if has_free_goal(with_free_goal(canonical, vehicle, scene), vehicle, scene):
+    if not lacks_room(canonical, vehicle, scene_of(canonical)):
         return MEANINGS[Status(status)]
     return (
         "at the goal pose, and beside it as far as is tolerated, the vehicle meets an obstacle or the bounds"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dashboards.world_outlines import outlines
 from planners.attempt import DRIVES
 from planners.explanation import drive_found
 from planners.memory.library.plan_library import gathered_library
-from planners.search.free_goal import has_free_goal, lacks_room, with_free_goal
+from planners.search.free_goal import lacks_room, with_free_goal
 from planners.search.outcome import MEANINGS, Status
 from planners.search.registry import PLANNERS, plan
 from planners.solve import solve
@@ -23,7 +25,6 @@ from planners.world.authority.authority import faults
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Arrival, Problem
 from planners.world.randomness import generator
-from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import (
     CAR,
     CAR_1_TRAILER,
@@ -33,6 +34,7 @@ from planners.world.vehicles.vehicle import (
     state_size,
     trailers_of,
 )
+from storage.vehicles.vehicle_files import read_vehicle
 from tests.planners.world.strategies import seeds
 from tests.worlds import box, problem_of
 
@@ -96,20 +98,17 @@ def test_a_pose_within_a_wall_stays_as_it_is() -> None:
     assert with_free_goal(asked, CAR, scene_of(asked)) is asked
 
 
-def test_whether_a_goal_has_room_is_known_once_it_is_aimed_at() -> None:
-    for gap, has_room in ((0.2, True), (-0.1, True), (-0.9, False)):
-        asked = beside_a_wall(gap, CAR)
-        scene = scene_of(asked)
-        assert has_free_goal(with_free_goal(asked, CAR, scene), CAR, scene) == has_room
-    anywhere = replace(asked, arrival=None)
-    assert has_free_goal(anywhere, CAR, scene)
-
-
 def test_every_way_to_end_without_a_plan_has_a_meaning() -> None:
     assert set(MEANINGS) == set(Status) - {Status.SOLVED}
 
 
-TRAINS = {"car": CAR, "one trailer": CAR_1_TRAILER, "two trailers": CAR_2_TRAILERS}
+TRAINS = {
+    "car": CAR,
+    "one trailer": CAR_1_TRAILER,
+    "two trailers": CAR_2_TRAILERS,
+    "forklift": read_vehicle(Path("docs/vehicles/forklift.yaml")),
+    "create3": read_vehicle(Path("docs/vehicles/create3.yaml")),
+}
 
 
 @given(
@@ -142,13 +141,15 @@ def test_who_is_said_to_have_no_room_is_in_an_obstacle_however_it_is_folded(
     for i, trailer in enumerate(trailers_of(vehicle)):
         states[:, 5 + i] = rng.uniform(-trailer.max_hitch, trailer.max_hitch, 200)
     obstacles = shapely.union_all([shapely.Polygon(wall) for wall in walls])
-    bodies = shapely.union_all(shapely.polygons(footprints(states, vehicle)), axis=1)
+    parts, _ = outlines(states, vehicle)
+    polygons = np.array([shapely.Polygon(part) for part in parts]).reshape(200, -1)
+    bodies = shapely.union_all(polygons, axis=1)
     inside = shapely.covers(shapely.box(*asked.bounds), bodies)
     assert not (inside & ~shapely.intersects(bodies, obstacles)).any()
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-@pytest.mark.parametrize("train", TRAINS)
+@pytest.mark.parametrize("train", ["car", "one trailer", "two trailers"])
 def test_where_trailers_have_no_room_nothing_is_searched(train: str, planner: str) -> None:
     vehicle = TRAINS[train]
     behind = vehicle.rear + 0.5 if train != "car" else 0.0
@@ -162,6 +163,31 @@ def test_where_trailers_have_no_room_nothing_is_searched(train: str, planner: st
     outcome = plan(planner, to_canonical(asked)[0], generator(1), vehicle=vehicle)
     assert outcome.status is Status.GOAL_BLOCKED
     assert outcome.expansions == 0
+
+
+def test_a_folded_trailer_may_have_room_where_the_angle_asked_for_has_not() -> None:
+    post = box(23.1, 25.0, 0.0, 0.3, 0.3)
+    asked = replace(
+        problem_of([post]),
+        goal=(25.0, 25.0),
+        goal_radius=0.1,
+        arrival=Arrival(0.0, 0.6, 0.0, 0.0, (0.0,), (0.6,)),
+    )
+    scene = scene_of(asked)
+    assert with_free_goal(asked, CAR_1_TRAILER, scene) is asked  # no pose that is looked at is free
+    assert not lacks_room(asked, CAR_1_TRAILER, scene)
+
+
+def test_a_wall_through_a_body_of_several_parts_is_seen() -> None:
+    forklift = TRAINS["forklift"]
+    for x in (-0.5, 0.5):  # through its forks, and through its body
+        asked = replace(
+            problem_of([box(25.0 + x, 25.0, 0.0, 0.1, 6.0)]),
+            goal=(25.0, 25.0),
+            goal_radius=0.01,
+            arrival=Arrival(0.0, 0.01, 0.0, 0.0),
+        )
+        assert lacks_room(asked, forklift, scene_of(asked))
 
 
 def test_a_body_that_does_not_fill_its_box_may_have_room_beside_an_obstacle() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from numba import TypingError
 
-from planners.world.jit import KernelFiles, forget_old_kernels, jit
+from planners.world.jit import KEPT_BESIDE, KernelFiles, forget_old_kernels, jit
 
 OTHERS = """
 import numba, numpy as np
@@ -120,12 +120,15 @@ def test_what_two_processes_compile_at_a_time_is_never_given_to_the_other_kind(t
 
 def test_kernels_of_the_newest_states_of_the_sources_are_kept(tmp_path: Path) -> None:
     for age in range(5):
-        state = tmp_path / f"kernels-{age}"
+        state = tmp_path / f"kernels-{age:016x}"
         (state / "world").mkdir(parents=True)
         os.utime(state, (1e9 - age, 1e9 - age))
-    (tmp_path / "module.pyc").touch()
+    others = {"module.pyc", "kernels-of-mine", "kernels-data.txt"}
+    for name in others:
+        (tmp_path / name).touch()
     forget_old_kernels(tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"kernels-0", "kernels-1", "module.pyc"}
+    kept = {f"kernels-{age:016x}" for age in range(KEPT_BESIDE)}
+    assert {path.name for path in tmp_path.iterdir()} == kept | others
 
 
 def test_the_working_clock_does_not_count_compiling(tmp_path, monkeypatch):
