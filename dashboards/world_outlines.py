@@ -13,7 +13,15 @@ from planners.world.arrays import Flags, Floats, Integers
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Plan, Problem
 from planners.world.vehicles.bodies import footprints
-from planners.world.vehicles.vehicle import CAR, Corners, Vehicle, state_size, trailers_of
+from planners.world.vehicles.vehicle import (
+    CAR,
+    Car,
+    CarWithTrailers,
+    Corners,
+    Vehicle,
+    state_size,
+    trailers_of,
+)
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
 _STANDING: Final = 1e-6  # m/s, below which a vehicle stands
@@ -70,15 +78,20 @@ def speed_tip(problem: Problem) -> tuple[float, float] | None:
     return x + speed * math.cos(heading), y + speed * math.sin(heading)
 
 
-def goal_state(problem: Problem, vehicle: Vehicle = CAR) -> Floats | None:
-    """The state ``[1, S]`` of ``vehicle`` in the goal pose of ``problem``; None if any heading will do."""
+def asked_pose(problem: Problem, vehicle: Vehicle = CAR) -> tuple[Floats, Vehicle] | None:
+    """The state ``[1, S]`` of ``vehicle`` in the goal pose of ``problem``, and what of it is to stand so.
+
+    That is all of it, or without its trailers if their angles are free; None if any heading will do.
+    """
     arrival = problem.arrival
     if arrival is None or arrival.heading is None:
         return None
     state = np.zeros((1, state_size(vehicle)))
     state[0, :3] = *problem.goal, arrival.heading
     state[0, 5 : 5 + len(arrival.hitches)] = arrival.hitches
-    return state
+    if isinstance(vehicle, CarWithTrailers) and not arrival.hitches:
+        return state, Car._make(vehicle[: len(Car._fields)])
+    return state, vehicle
 
 
 def footprint_spacing_m(vehicle: Vehicle) -> float:

@@ -19,8 +19,8 @@ from dashboards.figures.style import legend_below, message_figure, new_figure
 from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
     CheckedPlan,
+    asked_pose,
     checked,
-    goal_state,
     goal_tip,
     heading_tip,
     outlines,
@@ -48,24 +48,25 @@ class Example(NamedTuple):
     moved: Plan | None = None  # a stored drive as it was before it was moved and became the answer
 
 
-def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR) -> None:
+def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: str = OBSTACLE) -> None:
     """Draw bounds, obstacles and goal of ``problem``, the ``vehicle`` at its start, and a scale in metres.
 
-    A goal pose is drawn as an outline of the vehicle, a speed at the start as the way of one second.
+    Obstacles are drawn in a ``colour``, a goal pose as an outline of the vehicle, a speed at the start as the
+    way of one second.
     """
     x_min, y_min, x_max, y_max = problem.bounds
     frame = Rectangle((x_min, y_min), x_max - x_min, y_max - y_min, fill=False, edgecolor=INK, linewidth=1.2)
     axes.add_patch(frame)
     # The edge closes the seams between the convex pieces of one obstacle.
-    pieces = PolyCollection(problem.obstacles.pieces(), facecolor=OBSTACLE, edgecolor=OBSTACLE, linewidth=0.3)
+    pieces = PolyCollection(problem.obstacles.pieces(), facecolor=colour, edgecolor=colour, linewidth=0.3)
     axes.add_collection(pieces)
     pieces.set_clip_path(frame)
-    asked = goal_state(problem, vehicle)
+    asked = asked_pose(problem, vehicle)
     if asked is None:
         disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
         axes.add_patch(disc).set_zorder(0.5)  # below obstacles, which it may meet
     else:
-        _draw_bodies(axes, asked, vehicle, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=6)
+        _draw_bodies(axes, *asked, facecolor="none", edgecolor=ORANGE, linewidth=1.4, zorder=6)
     standing = start_state(problem, vehicle)[np.newaxis]
     _draw_bodies(axes, standing, vehicle, facecolor=INK, edgecolor=INK, linewidth=1.0, zorder=5)
     start = problem.start[:2]
@@ -198,7 +199,7 @@ def _draw_example(axes: Axes, example: Example) -> None:
 
 def _is_pose(example: Example) -> bool:
     """Whether the goal is a pose, and the drive a manoeuvre."""
-    return goal_state(example.problem, example.vehicle) is not None
+    return goal_tip(example.problem, example.vehicle) is not None
 
 
 def _height_share(problem: Problem) -> float:

@@ -26,6 +26,7 @@ from dashboards.world_outlines import footprint_spacing_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
+from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Floats
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR, Vehicle
@@ -36,8 +37,12 @@ _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
 _ARROW: Final = 0.05  # of the map's longer side: the arrow of a heading
 _APART: Final = 0.1  # of it: arrows along the drive
-_CLOSE_UPS: Final = 3  # at most, side by side
+_CLOSE_UPS: Final = 3  # side by side, at most
 _LENGTHS: Final = 1.5  # of the vehicle to each side of the goal that a close-up shows
+_CLOSE_UP_ENTRIES: Final = [
+    Patch(facecolor=INK, label="the vehicle where a close-up begins"),
+    Patch(facecolor="none", edgecolor=ORANGE, linewidth=1.4, label="goal pose"),
+]
 
 
 def route_picture(
@@ -60,19 +65,18 @@ def route_picture(
     """
     width, height = _extent(world)
     longest = max(width, height)
-    arrivals = _arrivals(route, stops, scale, vehicle)
-    tall, below = min(_WIDTH * height / width, _TALLEST), _WIDTH / _CLOSE_UPS * bool(arrivals)
-    figure = new_figure(_WIDTH, tall + below + 0.9, f"Route over {world.name}")
-    if arrivals:
-        grid = figure.add_gridspec(2, _CLOSE_UPS, height_ratios=[tall, below])
-        axes = figure.add_subplot(grid[0, :])
-        for column, (name, problem, plan) in enumerate(arrivals):
-            close_up = figure.add_subplot(grid[1, column])
-            draw_problem(close_up, problem, vehicle)
-            draw_manoeuvre(close_up, plan, vehicle)
-            close_up.set_title(name, fontsize=9, color=INK, loc="left", pad=4)
-    else:
-        axes = figure.add_subplot()
+    arrivals = _arrivals(world, route, stops, scale, vehicle)
+    columns = min(max(len(arrivals), 2), _CLOSE_UPS)
+    rows, side = math.ceil(len(arrivals) / columns), _WIDTH / columns
+    tall = min(_WIDTH * height / width, _TALLEST)
+    figure = new_figure(_WIDTH, tall + rows * side + 0.9, f"Route over {world.name}")
+    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[tall, *[side] * rows])
+    axes = figure.add_subplot(grid[0, :])
+    for number, (name, problem, plan) in enumerate(arrivals):
+        close_up = figure.add_subplot(grid[1 + number // columns, number % columns])
+        draw_problem(close_up, problem, vehicle, _OCCUPIED)
+        draw_manoeuvre(close_up, plan, vehicle)
+        close_up.set_title(name, fontsize=9, color=INK, loc="left", pad=4)
     draw_map(axes, world, _OCCUPIED)
     axes.set_title(caption, fontsize=9, color=INK, loc="left", pad=6)
     for path in route.paths:
@@ -116,12 +120,13 @@ def route_picture(
     x, y, heading = world.pose(scale * x, scale * y, heading)
     axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
     _draw_heading(axes, (x, y), heading, INK, longest)
+    brakes = any(leg.driving < len(leg.controls) for leg in route.legs)
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
         Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
                markersize=10, label="goals in order" if several else "goal"),
         Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
-               label="brakes, or the next leg begins"),
+               label="brakes, or the next leg begins" if brakes else "the next leg begins"),
         *(
             Line2D([], [], color=colour, linewidth=2.6, label=_legend_of(source, sources.count(source)))
             for source, colour in COLOURS.items()
@@ -129,37 +134,44 @@ def route_picture(
         ),
         Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
         Patch(facecolor=_OCCUPIED, label="occupied"),
-        *manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals]),
     ]  # fmt: skip
+    if arrivals:
+        handles += [*_CLOSE_UP_ENTRIES, *manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals])]
     legend_below(figure, handles, 4)
     return figure
 
 
 def _arrivals(
-    route: Route, stops: Sequence[Stop], scale: float, vehicle: Vehicle
+    world: OccupancyMap, route: Route, stops: Sequence[Stop], scale: float, vehicle: Vehicle
 ) -> list[tuple[str, Problem, Plan]]:
-    """Of the first goals that are poses a title, what is around, and the last part of the drive there."""
-    reach = _LENGTHS * footprint_spacing_m(vehicle)
-    arrivals: list[tuple[str, Problem, Plan]] = []
+    """Of goals that are poses a title, what is around, and the last part of the drive there.
+
+    All is turned as the map's frame is, in canonical metres.
+    """
+    length = footprint_spacing_m(vehicle)
+    reach = _LENGTHS * length
+    (left, bottom, turn), arrivals = world.origin, list[tuple[str, Problem, Plan]]()
+    frame = Alignment((left / scale, bottom / scale), -turn)
     drives = zip(stops, route.problems, route.plans(vehicle), strict=True)
-    for number, (stop, problem, plan) in enumerate(drives, start=1):
-        if not stop.is_pose or len(arrivals) == _CLOSE_UPS:
+    for number, (stop, problem, driven) in enumerate(drives, start=1):
+        if not stop.is_pose:
             continue
-        x, y = stop.place
-        outside = np.abs(plan.states[:, :2] - (x, y)).max(axis=1) > reach
-        first = int(np.flatnonzero(outside)[-1]) + 1 if outside.any() else 0
+        plan = from_canonical(driven, frame)
+        goal = _placed(world, scale * np.array([stop.place]))[0] / scale
+        outside = np.abs(plan.states[:, :2] - goal).max(axis=1) > reach - 0.5 * length
+        first = int(np.flatnonzero(outside)[-1]) + 1 if outside[:-1].any() else 0
         last = Plan(plan.states[first:], plan.controls[first:], plan.dt)
-        bounds = (x - reach, y - reach, x + reach, y + reach)
-        near = [
-            piece
-            for piece in problem.obstacles.pieces()
-            if (piece.max(axis=0) > bounds[:2]).all() and (piece.min(axis=0) < bounds[2:]).all()
-        ]
+        bounds = (*(goal - reach).tolist(), *(goal + reach).tolist())
+        pieces = (_placed(world, scale * piece) / scale for piece in problem.obstacles.pieces())
+        near = [piece for piece in pieces if (piece.max(axis=0) > bounds[:2]).all()
+                and (piece.min(axis=0) < bounds[2:]).all()]  # fmt: skip
         x, y, heading, _, *others = last.states[0].tolist()
         around = replace(
             problem,
             start=(x, y, heading),
             start_motion=(0.0, *others),  # no arrow for its speed
+            goal=tuple(goal.tolist()),
+            arrival=stop.arrival._replace(heading=(stop.arrival.heading or 0.0) + turn),
             bounds=bounds,
             obstacles=obstacles_of([near]),
             scale=scale,

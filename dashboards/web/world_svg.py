@@ -10,7 +10,7 @@ import numpy as np
 from dashboards.web.svg import element, points, text, tooltip
 from dashboards.world_outlines import (
     CheckedPlan,
-    goal_state,
+    asked_pose,
     goal_tip,
     heading_tip,
     outlines,
@@ -76,10 +76,10 @@ def _scale_bar(problem: Problem) -> str:
 
 def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
     """The vehicle in a goal pose, and the way of the first second at the speed of the start."""
-    pose, tip = goal_state(problem, vehicle), speed_tip(problem)
+    asked, tip = asked_pose(problem, vehicle), speed_tip(problem)
     (x, y, _), marks = problem.start, []
-    if pose is not None:
-        marks.append(_bodies(pose, vehicle, "goal pose"))
+    if asked is not None:
+        marks.append(_bodies(*asked, "goal pose"))
     ahead = goal_tip(problem, vehicle)
     if ahead is not None:
         (x1, y1), (x2, y2) = problem.goal, ahead

@@ -17,9 +17,9 @@ from dashboards.figures.pictures import Example, draw_plan, draw_recalled, galle
 from dashboards.figures.style import save
 from dashboards.world_outlines import (
     CheckedPlan,
+    asked_pose,
     checked,
     footprint_spacing_m,
-    goal_state,
     goal_tip,
     speed_tip,
 )
@@ -37,7 +37,7 @@ from planners.world.problem import (
 )
 from planners.world.vehicles.bodies import body_count, footprints
 from planners.world.vehicles.dynamics import simulate
-from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle
+from planners.world.vehicles.vehicle import CAR, VEHICLES, Vehicle, trailers_of
 
 WALL = np.array([[20.0, 30.0], [30.0, 20.0], [31.0, 21.0], [21.0, 31.0]])
 
@@ -153,8 +153,10 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
     assert math.atan2(tip[1] - CANONICAL_GOAL[1], tip[0] - CANONICAL_GOAL[0]) == pytest.approx(1.0)
     assert math.dist(tip, CANONICAL_GOAL) > vehicle.front + 0.4 * vehicle.width  # or the body hides it
     assert goal_tip(plain, vehicle) is None
-    state = goal_state(asked, vehicle)
-    assert state is not None
+    pose = asked_pose(asked, vehicle)
+    assert pose is not None
+    state, standing = pose
+    assert trailers_of(standing) == ()  # their angles are free
     assert state[0, :3] == pytest.approx((*CANONICAL_GOAL, 1.0))
     assert speed_tip(asked) == pytest.approx((math.sqrt(2.0), math.sqrt(2.0)))
 
