@@ -137,6 +137,12 @@ def _record(fields: dict[str, Any], vehicle: Vehicle) -> PlanRecord:
                 f"has a state or control that is not a finite number up to {LARGEST_COORDINATE_M:.0f}; "
                 "write the plan again"
             )
+        told = fields.get("duration_s")
+        if told is not None and abs(number_of(told, "duration_s") - plan.duration_s) > 1e-6:
+            raise ValueError(
+                f"says that it takes {told:g} s, but its {len(controls)} steps take {plan.duration_s:g} s: a "
+                "part of it is missing; write the plan again"
+            )
     return PlanRecord(
         text_of(fields["problem_id"], "problem_id"),
         text_of(fields["status"], "status"),

@@ -25,6 +25,7 @@ from tasks.settings.errors import RunError, tell_faults
 _BY_ITSELF: Final = "plans driven again by their controls, within their vehicle's limits"
 _ON_MAP: Final = "plans driven again by their controls, and swept over the map"
 _IN_PROBLEM: Final = "plans driven again by their controls, from start to goal of their problems, and swept"
+_NO_GOALS: Final = "Goals were not looked at: files of routes do not say where these were to lead."
 _LOOKED_AT_LESS: Final = (
     "Obstacles and goals were not looked at: for plans of problems, name the file of these with --problems, "
     "for routes their map with --map."
@@ -118,8 +119,8 @@ def verify_plan_files(path: Path, problems: Path | None, on_map: MapJudge | None
                 done += 1
                 show(done)
     _refuse(wrong, f" in {count} files of plans")
-    if judged == _BY_ITSELF:
-        _LOG.info(_LOOKED_AT_LESS)
+    if judged != _IN_PROBLEM:
+        _LOG.info(_LOOKED_AT_LESS if judged == _BY_ITSELF else _NO_GOALS)
     return counts
 
 
