@@ -99,7 +99,7 @@ def cut_scenarios(
         vehicle: what is to be driven.
     """
     blocks = blocks_of(world.size, surroundings.scale * WINDOW)
-    paths = GlobalPaths(world, surroundings.scale)
+    paths = GlobalPaths(world.coarser(surroundings.scale))
     workspace = Workspace()
     for number, (start, goal) in enumerate(ends):
         path = paths.path(start, goal)

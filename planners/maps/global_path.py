@@ -7,22 +7,32 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-from scipy import sparse
+from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from planners.maps.occupancy_map import OccupancyMap
+from planners.maps.occupancy_map import OccupancyMap, blocks
 from planners.world.arrays import Floats, Integers
 from planners.world.problem import CANONICAL_DISTANCE
 
+NEARLY: Final = 0.9  # of the width of a disc, so that no oblique gap is lost between cells
+OFF_MIDDLE: Final = 0.25  # cells by which the clearance of a middle may fall short of that of a point beside
 _STEPS: Final = ((0, 1), (1, 0), (1, 1), (1, -1))  # row, column; the other four go backwards
 
 
 class GlobalPaths:
     """Shortest paths between free cells. A diagonal step needs the cells on both sides free."""
 
-    def __init__(self, world: OccupancyMap, cell_m: float) -> None:
-        """Use cells of about ``cell_m`` metres, each free if the map is free in all of it."""
-        self.grid = world.coarser(cell_m)
+    def __init__(self, grid: OccupancyMap, spots: Floats | None = None) -> None:
+        """Find paths over the cells of a map.
+
+        Args:
+            grid: the map.
+            spots: ``[rows, columns, 2]`` where paths lead through each cell (metres); None: its middle.
+        """
+        if spots is None:
+            rows, columns = np.indices(grid.occupied.shape)
+            spots = grid.resolution * (np.stack((columns, rows), axis=-1) + 0.5)
+        self.grid, self.spots = grid, spots
 
     @cached_property
     def _edges(self) -> sparse.csr_array:
@@ -39,7 +49,7 @@ class GlobalPaths:
         return sparse.csr_array((np.concatenate(lengths), (tails, heads)), shape=(free.size, free.size))
 
     def path(self, start: Floats, goal: Floats) -> Floats | None:
-        """Return the centres ``[n, 2]`` (grid metres) of the cells on a shortest path, or None."""
+        """Return the spots ``[n, 2]`` (grid metres) of the cells on a shortest path, or None."""
         return self.paths_to(goal).path(start)
 
     def paths_to(self, goal: Floats) -> PathsTo:
@@ -48,20 +58,42 @@ class GlobalPaths:
         metres, after = csgraph.dijkstra(
             self._edges, directed=False, indices=np.array(cell), return_predecessors=True
         )
-        return PathsTo(self.grid, cell, self.grid.resolution * metres, after)
+        return PathsTo(self, cell, self.grid.resolution * metres, after)
+
+
+def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
+    """Return the shortest paths through all gaps that let a disc through.
+
+    Args:
+        world: the map.
+        width: of the disc, metres. Cells are at most half as wide, if those of the map are.
+        cell_m: width of a cell at most, metres, if those of the map are no wider.
+    """
+    clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]  # cells between middles
+    factor = max(1, math.floor(min(cell_m, 0.5 * width) / world.resolution + 1e-9))
+    squares = np.moveaxis(blocks(clear, factor, 0.0), 2, 1)  # [rows, columns, factor, factor]
+    rows, columns = squares.shape[:2]
+    squares = squares.reshape(rows, columns, -1)
+    best = squares.argmax(axis=2)
+    roomy = np.take_along_axis(squares, best[..., np.newaxis], axis=2)[..., 0]
+    fits = roomy >= 0.5 * NEARLY * width / world.resolution - OFF_MIDDLE
+    row, column = np.indices((rows, columns))
+    spots = np.stack((factor * column + best % factor, factor * row + best // factor), axis=-1) + 0.5
+    grid = OccupancyMap(world.name, ~fits, factor * world.resolution, world.origin)
+    return GlobalPaths(grid, world.resolution * spots)
 
 
 class PathsTo:
     """The shortest paths from everywhere to one goal."""
 
-    def __init__(self, grid: OccupancyMap, cell: int, metres: Floats, after: Integers) -> None:
+    def __init__(self, paths: GlobalPaths, cell: int, metres: Floats, after: Integers) -> None:
         """``metres`` and ``after`` hold the metres to go and the next cell, with a border of one cell."""
-        rows, columns = grid.occupied.shape
-        self._grid, self._last, self._after = grid, cell, after
+        rows, columns = paths.grid.occupied.shape
+        self._grid, self._spots, self._last, self._after = paths.grid, paths.spots, cell, after
         self.metres: Floats = metres.reshape(rows + 2, columns + 2)[1:-1, 1:-1]  # [rows, columns] to the goal
 
     def path(self, start: Floats) -> Floats | None:
-        """Return the centres ``[n, 2]`` (grid metres) of cells from ``start [2]`` to the goal, or None."""
+        """Return the spots ``[n, 2]`` (grid metres) of cells from ``start [2]`` to the goal, or None."""
         first = _cell(self._grid, start)
         if first != self._last and self._after[first] < 0:
             return None
@@ -69,7 +101,9 @@ class PathsTo:
         while cells[-1] != self._last:
             cells.append(int(self._after[cells[-1]]))
         rows, columns = np.divmod(np.array(cells), self._grid.occupied.shape[1] + 2)
-        return self._grid.resolution * (np.column_stack((columns, rows)) - 0.5)
+        beyond = np.pad(self._spots, ((1, 1), (1, 1), (0, 0)), mode="edge")
+        spots: Floats = beyond[rows, columns]
+        return spots
 
 
 def local_goal(path: Floats, start: Floats, scale: float) -> float | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.world.arrays import Floats, Pose
+from planners.world.arrays import Array, Floats, Pose
 
 Cells = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -56,8 +56,12 @@ class OccupancyMap:
     def coarser(self, cell_m: float) -> OccupancyMap:
         """Return the same map in cells of about ``cell_m`` metres, each occupied if any cell in it is."""
         factor = max(1, math.floor(cell_m / self.resolution + 1e-9))
-        rows, columns = self.occupied.shape
-        padded = np.pad(self.occupied, ((0, -rows % factor), (0, -columns % factor)), constant_values=True)
-        blocks = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
-        occupied: Cells = np.any(blocks, axis=(1, 3))
+        occupied: Cells = np.any(blocks(self.occupied, factor, True), axis=(1, 3))
         return OccupancyMap(self.name, occupied, factor * self.resolution, self.origin)
+
+
+def blocks(cells: Array, factor: int, beyond: float) -> Array:
+    """Cells in squares, ``[rows, factor, columns, factor]``; where there are none they are ``beyond``."""
+    rows, columns = cells.shape
+    padded = np.pad(cells, ((0, -rows % factor), (0, -columns % factor)), constant_values=beyond)
+    return padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)

@@ -17,6 +17,7 @@ REACHES_M: Final = (60.0, 35.0, 20.0, 10.0)  # along the path to the local goals
 SOUGHT_M: Final = 10.0  # before the end of a reach: so far back a place with more room is looked for
 TIGHT_M: Final = 3.0  # of the path, given up for each metre of clearance that a place lacks
 BESIDE_M: Final = 10.0  # from a pose, as in a slot narrower than a cell: so far away a path may begin or end
+NEAR_M: Final = 12.0  # of the path to a pose, which is then asked for as long as need be
 SIGHT_M: Final = 0.2  # between points that are looked at along a line
 AT_REST: Final = Arrival(least_speed=0.0, most_speed=0.0)
 
@@ -41,6 +42,7 @@ class LocalGoal(NamedTuple):
     radius: float  # metres
     arrival: Arrival | None  # what the plan itself has to keep; None: nothing
     final: bool  # it is where the route stops
+    brief: bool = False  # it is asked for in vain before long: it is far, so something nearer comes next
 
 
 class PathAhead:
@@ -52,18 +54,18 @@ class PathAhead:
         Args:
             paths: those over a map's cells.
             stop: where they lead. They end in the nearest free cell that is seen from it, of those that a
-                way leads to.
+                way leads to; if none is seen there is no path.
             scene: what is occupied on the map.
             start: ``[>= 2]`` from where the vehicle comes.
         """
-        self.stop, self._scene, self._grid = stop, scene, paths.grid
+        self.stop, self._scene, self._grid, self._spots = stop, scene, paths.grid, paths.spots
         self._cell_m = paths.grid.resolution
         free = ~paths.grid.occupied
         self._room = self._cell_m * np.pad(ndimage.distance_transform_edt(np.pad(free, 1))[1:-1, 1:-1], 1)
         place = np.array(stop.place)
         cells = self._free_cells(place, max(stop.radius, BESIDE_M * stop.is_pose))
         seen = (cell for cell in cells if _in_sight(place, cell, scene))
-        self._lead(paths.paths_to(next(seen, cells[0] if len(cells) else place)))
+        self._lead(paths.paths_to(next(seen, place)))
         for cell in seen:
             if self.path(start) is not None:
                 break
@@ -90,11 +92,11 @@ class PathAhead:
         """Return the shortest path ``[n, 2]`` over the cells from a pose ``[>= 2]``, or None."""
         column, row = np.floor(pose[:2] / self._cell_m).astype(int)
         around = [(column + right, row + up) for up in (0, 1, -1) for right in (0, 1, -1)]
-        centres = self._cell_m * (np.array(around) + 0.5)
-        to_go = self._at(self._to_go, centres[:, 0], centres[:, 1])
+        middles = self._cell_m * (np.array(around) + 0.5)
+        to_go = self._at(self._to_go, middles[:, 0], middles[:, 1])
         best = int(to_go.argmin()) if to_go[0] == math.inf else 0
         if to_go[best] < math.inf:
-            return self._paths.path(centres[best])
+            return self._paths.path(middles[best])
         cells = self._free_cells(pose[:2], BESIDE_M)
         cells = cells[np.isfinite(self._at(self._to_go, cells[:, 0], cells[:, 1]))]
         seen = (cell for cell in cells if _in_sight(pose[:2], cell, self._scene))
@@ -102,16 +104,16 @@ class PathAhead:
         return None if begin is None else self._paths.path(begin)
 
     def _free_cells(self, place: Floats, reach: float) -> Floats:
-        """The centres ``[n, 2]`` of free cells within some metres of a place ``[2]``, the nearest first."""
+        """The spots ``[n, 2]`` of free cells within some metres of a place ``[2]``, the nearest first."""
         (left, low), (right, high) = (
             np.floor((place + by) / self._cell_m).astype(int) for by in (-reach, reach)
         )
         left, low = max(left, 0), max(low, 0)
-        rows, columns = np.nonzero(~self._grid.occupied[low : high + 1, left : right + 1])
-        centres = self._cell_m * (np.column_stack((columns + left, rows + low)) + 0.5)
-        distances = np.hypot(*(centres - place).T)
+        window = slice(low, high + 1), slice(left, right + 1)
+        spots = self._spots[window][~self._grid.occupied[window]]
+        distances = np.hypot(*(spots - place).T)
         order = np.argsort(distances, kind="stable")
-        nearest: Floats = centres[order[: np.searchsorted(distances[order], reach, side="right")]]
+        nearest: Floats = spots[order[: np.searchsorted(distances[order], reach, side="right")]]
         return nearest
 
     def distance(self, poses: Floats) -> Floats:
@@ -146,12 +148,13 @@ class PathAhead:
             place, radius, arrival = self.stop
             if not self.stop.is_pose:
                 goals.append(LocalGoal(place, radius, None, True))
-            goals.append(LocalGoal(place, radius, arrival, True))
+            goals.append(LocalGoal(place, radius, arrival, True, self.stop.is_pose and along[-1] > NEAR_M))
         for reach in REACHES_M:
             within = (along <= reach) & (along >= reach - SOUGHT_M) & (straight <= CANONICAL_DISTANCE)
             if reach < along[-1] and within.any():
                 x, y = path[int(np.where(within, along - TIGHT_M * lacking, -math.inf).argmax())].tolist()
                 goals.append(LocalGoal((x, y), GOAL_RADIUS, None, False))
+        goals += [goal._replace(brief=False) for goal in goals if goal.brief]  # where nothing nearer led on
         return goals
 
     def _at(self, values: Floats, x: Floats, y: Floats) -> Floats:

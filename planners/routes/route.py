@@ -18,12 +18,14 @@ import numpy as np
 from scipy import ndimage
 
 from planners.attempt import Attempt
-from planners.maps.global_path import GlobalPaths
+from planners.maps.global_path import GlobalPaths, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
+from planners.routes.legs import Leg, joined, polished_legs, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
 from planners.search.braking import free_stop, is_free_drive
-from planners.search.free_goal import has_free_goal, with_free_goal
+from planners.search.free_goal import lacks_room
+from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
@@ -36,40 +38,22 @@ from planners.world.problem import (
     start_state,
 )
 from planners.world.vehicles.dynamics import control_limits, simulate
-from planners.world.vehicles.vehicle import CAR, DifferentialDrive, Vehicle
+from planners.world.vehicles.vehicle import CAR, DifferentialDrive, Vehicle, trailers_of
+from planners.world.workspace import Workspace
 
 SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
+CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map are no wider
+ROOMY_M: Final = 1.0  # by which obstacles are wider for paths with more room
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
 ARRIVED_M: Final = 1e6  # so much better than any other stop is one in the goal disc
 POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take long, and seldom help
-OF_TOLERANCES: Final = 0.99  # that plans to a pose may use: rounding must not lead out of them
 
-Solve = Callable[[Problem], Attempt]
+BRIEFLY: Final = Limits(expansions=8_000)
 
-
-@dataclass(frozen=True, eq=False)
-class Leg:
-    """A part of a local plan, from the state in which the leg before ends; the last before a goal brakes."""
-
-    begin: Floats  # [S]
-    end: Floats  # [S]
-    controls: Floats  # [n, 2]
-    driving: int  # how many controls follow the plan; the others brake
-    attempt: Attempt  # how the local problem was solved
-    problem: Problem  # in the canonical frame
-    goal: Point  # local or final, metres
-
-    def states(self, vehicle: Vehicle) -> Floats:
-        """Simulate the states ``[n + 1, S]`` from ``begin`` to ``end``."""
-        return simulate(self.begin, self.controls, vehicle)
-
-    @property
-    def source(self) -> str:
-        """``recalled``, ``repaired`` or ``searched``."""
-        return self.attempt.source or ""
+Solve = Callable[[Problem, Limits], Attempt]
 
 
 class Stuck(NamedTuple):
@@ -114,16 +98,11 @@ class Route:
 
     def plan(self, vehicle: Vehicle) -> Plan:
         """Join all legs to one plan."""
-        return _joined(self.problem, self.legs, vehicle)
+        return joined(self.problem, self.legs, vehicle)
 
     def plans(self, vehicle: Vehicle) -> list[Plan]:
         """To each stop the plan that solves its problem."""
-        return [_joined(*each, vehicle) for each in zip(self.problems, self.sections, strict=True)]
-
-
-def _joined(problem: Problem, legs: Sequence[Leg], vehicle: Vehicle) -> Plan:
-    controls = np.concatenate([np.empty((0, 2)), *(leg.controls for leg in legs)])
-    return Plan(simulate(start_state(problem, vehicle), controls, vehicle), controls, vehicle.dt)
+        return [joined(*each, vehicle) for each in zip(self.problems, self.sections, strict=True)]
 
 
 class Router:
@@ -135,6 +114,7 @@ class Router:
         solve: Solve,
         vehicle: Vehicle = CAR,
         tolerance_m: float = 0.0,
+        polishes: bool = True,
     ) -> None:
         """Prepare the map.
 
@@ -143,8 +123,10 @@ class Router:
             solve: solves local problems, from any motion to a place.
             vehicle: what is to be driven.
             tolerance_m: how far the outlines of occupied regions may move.
+            polishes: whether the drive to each stop is polished as a whole.
         """
-        self._name, self._vehicle = world.name, vehicle
+        self._name, self._vehicle, self._polishes = world.name, vehicle, polishes
+        self._workspace = Workspace()
         self._solve = solve
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
         bounds = (0.0, 0.0, *world.size)
@@ -153,9 +135,12 @@ class Router:
             world.name, world.name, CANONICAL_START, (0.0, 0.0), GOAL_RADIUS, bounds, occupied
         )
         self._scene = scene_of(self._whole)
-        self._paths = GlobalPaths(world, 1.0)
-        roomy = replace(self._paths.grid, occupied=ndimage.binary_dilation(self._paths.grid.occupied))
-        self._roomy_paths = GlobalPaths(roomy, 1.0)  # for where the shortest path is too narrow to drive
+        widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
+        self._paths = passable(world, widest, CELL_M)
+        grid = self._paths.grid
+        wider = ndimage.binary_dilation(grid.occupied, iterations=max(1, round(ROOMY_M / grid.resolution)))
+        roomy = replace(grid, occupied=wider)
+        self._roomy_paths = GlobalPaths(roomy, self._paths.spots)  # where the shortest are too narrow
         self._attempts = self._most_attempts = self._pose_tries = 0
 
     def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
@@ -176,8 +161,7 @@ class Router:
         for stop, to_stop in zip(stops, problems, strict=True):
             if not point_is_free(*stop.place, self._scene):
                 return Stuck(stop.place, "the goal lies in an obstacle or outside the map", 0)
-            aimed = with_free_goal(to_stop, self._vehicle, self._scene)
-            if not has_free_goal(aimed, self._vehicle, self._scene):
+            if lacks_room(to_stop, self._vehicle, self._scene):
                 return Stuck(stop.place, "the vehicle has no room in the goal pose", 0)
         sections: list[list[Leg]] = []
         paths = []
@@ -197,8 +181,10 @@ class Router:
                 if isinstance(again, Stuck):
                     return more._replace(why=more.why.replace("the goal", goal))
                 more = again
+            if self._polishes:
+                more = polished_legs(problems[number], more, self._vehicle, self._scene, self._workspace)
             sections.append(more)
-            paths.append(path)
+            paths.append(np.vstack((pose[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
 
@@ -238,13 +224,13 @@ class Router:
         for goal in ahead.local_goals(state):
             if self._attempts == self._most_attempts:
                 break
-            if goal.final and ahead.stop.is_pose:
+            if goal.final and ahead.stop.is_pose and not goal.brief:
                 if self._pose_tries == POSE_TRIES:
                     continue
                 self._pose_tries += 1
             problem = self._problem(state, goal)
             self._attempts += 1
-            attempt = self._solve(problem)
+            attempt = self._solve(problem, BRIEFLY if goal.brief else usual_limits(problem))
             if attempt.plan is None:
                 continue
             states = simulate(state, attempt.plan.controls, self._vehicle)
@@ -280,15 +266,8 @@ class Router:
             arrival=goal.arrival,
         )
         if goal.arrival is not None and goal.arrival.heading is not None:
-            asked = replace(
-                asked,
-                goal_radius=OF_TOLERANCES * goal.radius,
-                arrival=goal.arrival._replace(
-                    heading=along + goal.arrival.heading - towards,
-                    heading_tolerance=OF_TOLERANCES * goal.arrival.heading_tolerance,
-                    hitch_tolerances=tuple(OF_TOLERANCES * each for each in goal.arrival.hitch_tolerances),
-                ),
-            )
+            heading = along + goal.arrival.heading - towards
+            asked = stricter(replace(asked, arrival=goal.arrival._replace(heading=heading)))
         return to_canonical(asked)[0]
 
     def _arrivals(self, ahead: PathAhead, drive: _Drive) -> Iterator[Leg]:

@@ -14,8 +14,10 @@ import numpy as np
 from dashboards.cells import CellTable, decimal
 from planners.attempt import WITHOUT_MEMORY, Attempt
 from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
-from planners.routes.route import Leg, Route, Router, Stuck
+from planners.routes.route import Route, Router, Stuck
+from planners.search.query import Limits
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Pose
 from planners.world.authority.authority import faults
@@ -28,6 +30,7 @@ from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
+from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
@@ -49,9 +52,9 @@ class _Solver:
     scale: float  # metres of the map in a canonical metre
     seconds: list[float] = field(default_factory=list)  # planning time of each attempt
 
-    def __call__(self, problem: Problem) -> Attempt:
+    def __call__(self, problem: Problem, limits: Limits) -> Attempt:
         """Solve a problem as the assistant is set, check the plan, and note the time."""
-        attempt = self.assistant.attempt(replace(problem, scale=self.scale))
+        attempt = self.assistant.attempt(replace(problem, scale=self.scale), limits=limits)
         attempt = check_attempt(problem, attempt, set(), self.assistant.vehicle)
         self.seconds.append(attempt.planning_seconds)
         return attempt
@@ -114,22 +117,23 @@ def drive_route(
 
     def router_over(each: OccupancyMap) -> Router:
         tolerance_m = settings.tolerance_m / scale
-        return Router(each, solver, assistant.vehicle, tolerance_m)
+        return Router(each, solver, assistant.vehicle, tolerance_m, assistant.settings.polished)
 
     router = router_over(canonical)
     x, y, heading = world.grid_pose(pose[0], pose[1], pose[2])
     asked = (x / scale, y / scale, heading), stops, motion
-    _drive_mirrored(router_over, canonical, *asked)
-    OtherWork()()
-    solver.seconds.clear()
-    began = time.perf_counter()
-    route = router.route(*asked)
-    seconds = time.perf_counter() - began
+    with told_meanwhile("planning"):
+        _drive_mirrored(router_over, canonical, *asked)
+        OtherWork()()
+        solver.seconds.clear()
+        began = time.perf_counter()
+        route = router.route(*asked)
+        seconds = time.perf_counter() - began
     if isinstance(route, Stuck):
         raise _refusal(route, world, scale)
     plan = route.plan(assistant.vehicle)
     _check(route, plan, assistant)
-    record = _record(route, plan, world, assistant, solver, scale)
+    record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
     summary = _summary(route, plan, solver, assistant, scale, seconds)
@@ -196,7 +200,7 @@ def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
 
 
 def _record(
-    route: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, solver: _Solver, scale: float
+    route: Route, plan: Plan, world: OccupancyMap, assistant: Assistant, seconds: float, scale: float
 ) -> PlanRecord:
     """The plan in the map's frame; the source is "searched" if any leg's is, else "repaired" if any is."""
     left, bottom, turn = world.origin
@@ -208,7 +212,7 @@ def _record(
         max(sources, key=SOURCES.index, default="searched"),
         assistant.settings.planner,
         assistant.settings.assist,
-        sum(solver.seconds),
+        seconds,
         in_map_frame,
         assistant.vehicle,
         scale,
@@ -268,7 +272,7 @@ def _summary(
         "(a repaired leg counts whole)",
         _pace(route, plan, assistant.vehicle, scale),
         f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
-        f"route with its checks {seconds:.2f} s",
+        f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
     ]
 
 

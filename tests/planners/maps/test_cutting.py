@@ -120,7 +120,7 @@ def test_global_paths_are_shortest_and_cut_no_corner() -> None:
     free = ~world.occupied
     places = np.argwhere(free)
     rng = np.random.default_rng(0)
-    paths = GlobalPaths(world, 1.0)
+    paths = GlobalPaths(world.coarser(1.0))
     for start, goal in rng.choice(places, (12, 2)):
         lengths = shortest(free, tuple(goal))
         path = paths.path(start[::-1] + 0.5, goal[::-1] + 0.5)
@@ -153,7 +153,7 @@ def test_a_scenario_begins_towards_where_its_way_leaves_the_canonical_distance()
     ]
     assert len(cuts) >= 3
     assert {type(cut) for cut in found} == {Cut, str}
-    paths = GlobalPaths(TOWN, 1.0)
+    paths = GlobalPaths(TOWN.coarser(1.0))
     for cut, start, goal in cuts:
         assert np.allclose(cut.pose[:2], start)
         path = paths.path(start, goal)
