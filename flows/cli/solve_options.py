@@ -29,7 +29,7 @@ class SolveOptions:
             Default: that of the problems, else that of the memory, else car.
         seed: Everything random follows from it.
         unpolished: Take each plan as it is found, some milliseconds sooner. It is driven longer, to a pose by
-            seconds. With --improve-seconds it is improved all the same.
+            seconds. Where there is --improve-seconds, it is improved all the same.
     """
 
     planner: PlannerName = "lattice"
