@@ -169,6 +169,7 @@ def route(
     end: Annotated[list[str], Parameter(name="--to", allow_leading_hyphen=True, negative=())],
     goal_tolerance: Annotated[str | None, Parameter(allow_leading_hyphen=True)] = None,
     goal_hitch: Annotated[list[float] | None, Parameter(allow_leading_hyphen=True, negative=())] = None,
+    goal_radius: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     start_speed: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     start_steering: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
     start_turn_rate: Annotated[float | None, Parameter(allow_leading_hyphen=True)] = None,
@@ -192,6 +193,7 @@ def route(
             the metres are times the scale.
         goal_hitch: Hitch angle of a trailer in the poses, radians, within those of --goal-tolerance; once for
             each trailer. Default: trailers stand as they come.
+        goal_radius: How far from a place the vehicle may stop, metres. Default: 2, times the scale.
         start_speed: Speed at the start if the vehicle moves, m/s, below 0 backwards.
         start_steering: How a car's wheels are steered at the start, radians.
         start_turn_rate: How fast a differential drive turns at the start, rad/s.
@@ -217,7 +219,7 @@ def route(
         "start_turn_rate": start_turn_rate,
         "start_hitch": start_hitch,
     }
-    request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or ())
+    request = RouteRequest(begin, end, goal_tolerance, motion, goal_hitch or (), goal_radius)
     driven = drive_route(path, format, request, assistant, settings, out, picture)
     write_for_people(options.vehicle_line(assistant.settings))
     write(driven.legs)

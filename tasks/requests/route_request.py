@@ -12,9 +12,9 @@ from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.world.arrays import Pose
 from planners.world.checked_problem import NO_OBSTACLES
-from planners.world.problem import POSE_RADIUS, POSE_TOLERANCE, Problem
+from planners.world.problem import GOAL_RADIUS, POSE_RADIUS, POSE_TOLERANCE, Problem
 from planners.world.problem_faults import arrival_fault, motion_fault
-from planners.world.vehicles.vehicle import Vehicle
+from planners.world.vehicles.vehicle import Vehicle, name_of, trailers_of
 from storage.exchange.question_fields import ANY_HEADING, start_motion_of
 from storage.fields import degrees_hint
 from storage.worlds.importing import ImportSettings, load_map
@@ -33,6 +33,7 @@ class RouteRequest(NamedTuple):
     goal_tolerance: str | None = None  # metres,radians by which poses may be missed; None: the usual
     motion: Mapping[str, Any] = {}  # at the start, by the names that files of problems have for it
     goal_hitch: Sequence[float] = ()  # how each trailer stands in poses; none: as they come
+    goal_radius: float | None = None  # metres by which places may be missed; None: the usual
 
 
 def _numbers_of(text: str, counts: Sequence[int], option: str, meaning: str) -> tuple[float, ...]:
@@ -65,13 +66,21 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
                 f"{scale * POSE_RADIUS:g},{POSE_TOLERANCE:g}."
             )
         _warn(degrees_hint("--goal-tolerance", turn, ANY_HEADING, "which any heading is within"))
-    hitches = tuple(request.goal_hitch)
+    hitches, trailers = tuple(request.goal_hitch), len(trailers_of(vehicle))
+    if len(hitches) not in (0, trailers):
+        raise UsageError(
+            f"--goal-hitch is given {len(hitches)} times, but {name_of(vehicle)} has {trailers} trailers; "
+            "give it once for each, or leave it out."
+        )
     posed = AT_REST._replace(
         heading_tolerance=turn, hitches=hitches, hitch_tolerances=tuple(turn for _ in hitches)
     )
     fault = arrival_fault(posed, scale, vehicle)
     if fault is not None:
         raise UsageError(f"--goal-hitch: {fault}.")
+    near = scale * GOAL_RADIUS if request.goal_radius is None else request.goal_radius
+    if not 0.0 < near < math.inf:
+        raise UsageError(f"--goal-radius is {near:g}; give metres above 0, or leave it out.")
     stops = []
     for goal in request.goals:
         x, y, *heading = _numbers_of(goal, [2, 3], "--to", "x,y in metres, or x,y,heading for a pose")
@@ -81,12 +90,14 @@ def stops_of(request: RouteRequest, world: OccupancyMap, vehicle: Vehicle, scale
             _warn(degrees_hint("The heading of --to", heading[0]))
             stops.append(Stop(place, radius / scale, posed._replace(heading=facing)))
         else:
-            stops.append(Stop(place))
+            stops.append(Stop(place, near / scale))
     if not stops:
         raise UsageError("There is no goal: give --to x,y or --to x,y,heading once or more often.")
     for option, given in (("tolerance", request.goal_tolerance is not None), ("hitch", bool(hitches))):
         if given and not any(stop.is_pose for stop in stops):
             raise UsageError(f"--goal-{option} is for poses: give --to x,y,heading, or leave it out.")
+    if request.goal_radius is not None and all(stop.is_pose for stop in stops):
+        raise UsageError("--goal-radius is for places: give --to x,y, or leave it out.")
     return stops
 
 

@@ -115,6 +115,17 @@ def test_a_route_begins_in_motion_and_ends_in_a_pose(town: Path, tmp_path: Path)
     assert picture.stat().st_size > 10_000
 
 
+def test_a_route_stops_as_near_to_a_place_as_it_is_asked_to(town: Path, tmp_path: Path) -> None:
+    out = tmp_path / "plan.json"
+    asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", "8,7.5", "--to", "150,190"]
+    assert call([*asked, "--goal-radius", "0.3", "--out", str(out)]) == 0
+    plan = read_plan(out).plan
+    assert plan is not None
+    assert math.dist(plan.states[-1, :2], (150.0, 190.0)) <= 0.3
+    rests = plan.states[np.abs(plan.states[:, 3]) < 1e-9, :2]
+    assert np.hypot(*(rests - (8.0, 7.5)).T).min() <= 0.3
+
+
 def test_a_trailer_stands_in_a_pose_as_it_is_asked_to(town: Path, tmp_path: Path) -> None:
     out, picture = tmp_path / "plan.json", tmp_path / "route.png"
     asked = ["route", str(town / "town.map"), "--vehicle", "car-1-trailer", "--goal-tolerance", "0.1,0.03"]
@@ -176,7 +187,9 @@ def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) 
         (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "1"], 2, "metres,radians, 2 numbers"),
         (["--from", "8,6,0", "--to", "150,190,0", "--goal-tolerance", "0,1"], 2, "numbers above 0"),
         (["--from", "8,6,0", "--to", "150,190", "--goal-tolerance", "1,1"], 2, "for poses: give --to x,y"),
-        (["--from", "8,6,0", "--to", "150,190,0", "--goal-hitch", "0"], 2, "there are no trailers"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-hitch", "0"], 2, "car has 0 trailers"),
+        (["--from", "8,6,0", "--to", "150,190,0", "--goal-radius", "1"], 2, "for places: give --to x,y"),
+        (["--from", "8,6,0", "--to", "150,190", "--goal-radius", "0"], 2, "metres above 0"),
         (["--from", "8,6,0", "--to", "150,190", "--goal-hitch", "0", "--vehicle", "car-1-trailer"], 2,
          "for poses: give --to x,y"),
         (["--from", "8,6,0", "--to", "150,190,0", "--goal-hitch", "2", "--vehicle", "car-1-trailer"], 2,
