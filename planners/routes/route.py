@@ -24,11 +24,11 @@ from planners.maps.surroundings import surroundings_of
 from planners.routes.legs import Leg, joined, polished_legs, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
 from planners.search.braking import free_stop, is_free_drive
-from planners.search.free_goal import lacks_room
+from planners.search.free_goal import lacks_room, unfolded
 from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats, Point, Pose
-from planners.world.geometry.collision import count_free_prefix, point_is_free, scene_of
+from planners.world.geometry.collision import count_free_prefix, note_free, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_DISTANCE,
     CANONICAL_START,
@@ -37,6 +37,7 @@ from planners.world.problem import (
     Problem,
     start_state,
 )
+from planners.world.vehicles.bodies import body_count, swept_boxes
 from planners.world.vehicles.dynamics import control_limits, simulate
 from planners.world.vehicles.vehicle import CAR, DifferentialDrive, Vehicle, trailers_of
 from planners.world.workspace import Workspace
@@ -157,12 +158,14 @@ class Router:
         ]
         state = start_state(begun, self._vehicle)
         if not is_free_drive(state[np.newaxis], self._vehicle, self._scene):
-            return Stuck(start[:2], "the vehicle would stand in an obstacle or outside the map", 0)
+            who = self._blocked_body(state)
+            return Stuck(start[:2], f"{who} would stand in an obstacle or outside the map", 0)
         for stop, to_stop in zip(stops, problems, strict=True):
             if not point_is_free(*stop.place, self._scene):
                 return Stuck(stop.place, "the goal lies in an obstacle or outside the map", 0)
             if lacks_room(to_stop, self._vehicle, self._scene):
-                return Stuck(stop.place, "the vehicle has no room in the goal pose", 0)
+                who = self._blocked_body(unfolded(to_stop, self._vehicle))
+                return Stuck(stop.place, f"{who} has no room in the goal pose", 0)
         sections: list[list[Leg]] = []
         paths = []
         self._attempts = 0
@@ -187,6 +190,16 @@ class Router:
             paths.append(np.vstack((pose[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
+
+    def _blocked_body(self, state: Floats | None) -> str:
+        """Who is not free in a state ``[S]``: the vehicle, or if that is free a trailer."""
+        bodies = body_count(self._vehicle)
+        free = np.ones(bodies, bool)
+        if state is not None:
+            note_free(swept_boxes(state[np.newaxis], self._vehicle), self._scene, free)
+        if free.all() or not free[0]:
+            return "the vehicle"
+        return f"trailer {int(free.argmin())}" if bodies > 2 else "the trailer"
 
     def _legs_to(self, ahead: PathAhead, state: Floats) -> list[Leg] | Stuck:
         """Search the legs from a state to rest at one stop, depth first."""

@@ -84,10 +84,10 @@ def lacks_room(problem: Problem, vehicle: Vehicle, scene: Scene) -> bool:
         vehicle: what is driven.
         scene: ``scene_of(problem)``.
     """
-    arrival, unfolded = problem.arrival, _unfolded(problem, vehicle)
-    if arrival is None or arrival.heading is None or unfolded is None:
+    arrival, straight = problem.arrival, unfolded(problem, vehicle)
+    if arrival is None or arrival.heading is None or straight is None:
         return False
-    if _is_free(unfolded, vehicle, scene):
+    if _is_free(straight, vehicle, scene):
         return False
     trailers = trailers_of(vehicle)
     hitches = arrival.hitches or (0.0,) * len(trailers)
@@ -160,11 +160,11 @@ def _last(problem: Problem, vehicle: Vehicle) -> Floats | None:
     arrival = problem.arrival
     if arrival is not None and trailers_of(vehicle) and not arrival.hitches:
         return None
-    return _unfolded(problem, vehicle)
+    return unfolded(problem, vehicle)
 
 
-def _unfolded(problem: Problem, vehicle: Vehicle) -> Floats | None:
-    """The same, with trailers straight behind if their angles are free; None if no heading is asked."""
+def unfolded(problem: Problem, vehicle: Vehicle) -> Floats | None:
+    """The state ``[S]`` in a goal pose, trailers straight if their angles are free; None if it is a place."""
     arrival = problem.arrival
     if arrival is None or arrival.heading is None:
         return None

@@ -358,3 +358,14 @@ def test_a_pose_behind_a_door_is_not_sought_for_long_from_afar() -> None:
     behind = Stop((30.0, 5.0), POSE_RADIUS, Arrival(math.pi, POSE_TOLERANCE, 0.0, 0.0))
     check(Router(hall([(17.0, 18.4)]), noted).route((5.0, 5.0, 0.0), [behind]))
     assert sum(expansions) < 30_000
+
+
+def test_of_a_train_it_is_told_which_body_has_no_room() -> None:
+    world = hall([(0.0, 20.0)])  # without a wall; the map ends at x = 0
+    router = Router(world, partial(searched, vehicle=CAR_1_TRAILER), CAR_1_TRAILER)
+    pose = Stop((1.0, 10.0), POSE_RADIUS, Arrival(0.0, POSE_TOLERANCE, 0.0, 0.0, (0.0,), (0.05,)))
+    no_room, outside = (router.route(start, [pose]) for start in ((10.0, 10.0, 0.0), (1.0, 10.0, 0.0)))
+    assert isinstance(no_room, Stuck)
+    assert no_room.why == "the trailer has no room in the goal pose"
+    assert isinstance(outside, Stuck)
+    assert outside.why.startswith("the trailer would stand")
