@@ -22,7 +22,7 @@ NEAR_M: Final = 8.0  # of the drive: what else is occupied is not looked at by t
 APART: Final = 10  # steps between states whose surroundings count
 MOST_STEPS: Final = 10_000  # of a drive that is polished as a whole
 OF_TOLERANCES: Final = 0.99  # that plans may use
-NEAREST_M: Final = 0.1  # to a place: no drive is to end nearer than that
+NEAREST_M: Final = 0.1  # to a place: who may end so far from it may end anywhere within
 
 
 @dataclass(frozen=True, eq=False)
