@@ -38,12 +38,22 @@ class MapJudge:
 
     def faults(self, record: PlanRecord, plan: Plan) -> list[str]:
         """What is wrong with the ``plan`` of a ``record``, driven from its first state, goals left aside."""
-        scale, (x, y, turn) = record.scale, self._world.grid_pose(*record.offset, 0.0)
+        scale, (left, low, turned) = record.scale, self._world.origin
+        x, y, turn = self._world.grid_pose(*record.offset, 0.0)
         on_grid = from_canonical(plan, Alignment((x / scale, y / scale), -turn))
         width, height = self._world.size
         bounds = (0.0, 0.0, width / scale, height / scale)
-        whole = replace(by_itself(on_grid), bounds=bounds, obstacles=self._obstacles(scale))
-        return faults(whole, on_grid, record.vehicle)
+        lies_at = (0.0, 0.0) if turned else (left, low)
+        whole = replace(
+            by_itself(on_grid),
+            bounds=bounds,
+            obstacles=self._obstacles(scale),
+            scale=scale,
+            offset=lies_at,
+        )
+        found = faults(whole, on_grid, record.vehicle)
+        where = " Places are in metres along the map's cells, as the map is turned."
+        return [fault + where * (turned != 0.0 and "near (" in fault) for fault in found]
 
     def _obstacles_at(self, scale: float) -> Obstacles:
         """What is occupied, in metres of plans at that ``scale``."""

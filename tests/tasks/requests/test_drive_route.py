@@ -162,7 +162,28 @@ def test_a_route_is_refused_on_a_map_that_has_changed_in_its_way(
     write_map(tmp_path / "changed.map", changed)
     capsys.readouterr()
     assert call(["verify", str(out), "--map", str(tmp_path / "changed.map")]) == 1
-    assert "Collision" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "Collision" in told
+    near = re.search(r"near \((\S+), (\S+)\)", told)
+    assert near is not None
+    assert math.dist((float(near[1]), float(near[2])), (x, y)) < 4.0  # metres of the map
+
+
+def test_where_a_scaled_route_collides_is_told_in_metres_of_the_map(
+    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "plan.json"
+    asked = ["route", str(town / "town.map"), "--scale", str(SCALE), "--from", "8,6,0.3", "--to", "150,190"]
+    assert call([*asked, "--out", str(out)]) == 0
+    x, y = json.loads(out.read_text())["states"][200][:2]
+    changed = CELLS.copy()
+    changed[-1 - int(y), int(x)] = True
+    write_map(tmp_path / "changed.map", changed)
+    capsys.readouterr()
+    assert call(["verify", str(out), "--map", str(tmp_path / "changed.map")]) == 1
+    near = re.search(r"near \((\S+), (\S+)\)", capsys.readouterr().err)
+    assert near is not None
+    assert math.dist((float(near[1]), float(near[2])), (x, y)) < 3.0
 
 
 def test_it_goes_through_all_goals_without_a_memory(town: Path, tmp_path: Path) -> None:
