@@ -15,6 +15,7 @@ from planners.world.arrays import Floats, Integers
 from planners.world.problem import CANONICAL_DISTANCE
 
 NEARLY: Final = 0.9  # of the width of a disc, so that no oblique gap is lost between cells
+SHARE: Final = 0.36  # of the width of a disc: spots of neighbours on two sides of a wall are farther apart
 OFF_MIDDLE: Final = 0.25  # cells by which the clearance of a middle may fall short of that of a point beside
 _STEPS: Final = ((0, 1), (1, 0), (1, 1), (1, -1))  # row, column; the other four go backwards
 
@@ -66,11 +67,11 @@ def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
 
     Args:
         world: the map.
-        width: of the disc, metres. Cells are at most half as wide, if those of the map are.
+        width: of the disc, metres. Cells are at most ``SHARE`` of it, if those of the map are.
         cell_m: width of a cell at most, metres, if those of the map are no wider.
     """
     clear = ndimage.distance_transform_edt(np.pad(~world.occupied, 1))[1:-1, 1:-1]  # cells between middles
-    factor = max(1, math.floor(min(cell_m, 0.5 * width) / world.resolution + 1e-9))
+    factor = max(1, math.floor(min(cell_m, SHARE * width) / world.resolution + 1e-9))
     squares = np.moveaxis(blocks(clear, factor, 0.0), 2, 1)  # [rows, columns, factor, factor]
     rows, columns = squares.shape[:2]
     squares = squares.reshape(rows, columns, -1)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -45,7 +46,12 @@ from planners.world.workspace import Workspace
 SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map are no wider
-ROOMY_M: Final = 1.0  # by which obstacles are wider for paths with more room
+WIDER: Final = (
+    1.2,
+    1.6,
+)  # times the vehicle's width are the gaps of ways that are tried next
+DETOUR_M: Final = 1.0  # by which they are longer at least; and then ...
+ROOMY_M: Final = 1.0  # ... obstacles are so much wider
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
@@ -138,10 +144,8 @@ class Router:
         self._scene = scene_of(self._whole)
         widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
         self._paths = passable(world, widest, CELL_M)
-        grid = self._paths.grid
-        wider = ndimage.binary_dilation(grid.occupied, iterations=max(1, round(ROOMY_M / grid.resolution)))
-        roomy = replace(grid, occupied=wider)
-        self._roomy_paths = GlobalPaths(roomy, self._paths.spots)  # where the shortest are too narrow
+        self._wider = [cache(partial(passable, world, more * widest, CELL_M)) for more in WIDER]
+        self._wider.append(cache(self._roomy_paths))
         self._attempts = self._most_attempts = self._pose_tries = 0
 
     def route(self, start: Pose, stops: Sequence[Stop], motion: tuple[float, ...] = ()) -> Route | Stuck:
@@ -179,9 +183,8 @@ class Router:
             problems[number] = replace(problems[number], start=pose, start_motion=moving)
             more = self._legs_to(ahead, state)
             if isinstance(more, Stuck):
-                around = PathAhead(self._roomy_paths, stop, self._scene, state)
-                again = more if around.path(state) is None else self._legs_to(around, state)
-                if isinstance(again, Stuck):
+                again = self._legs_around(path, stop, state)
+                if again is None:
                     return more._replace(why=more.why.replace("the goal", goal))
                 more = again
             if self._polishes:
@@ -190,6 +193,26 @@ class Router:
             paths.append(np.vstack((pose[:2], path[1:], stop.place)))
             state = more[-1].end if more else state
         return Route(problems, sections, paths)
+
+    def _roomy_paths(self) -> GlobalPaths:
+        grid = self._paths.grid
+        wider = ndimage.binary_dilation(grid.occupied, iterations=max(1, round(ROOMY_M / grid.resolution)))
+        return GlobalPaths(replace(grid, occupied=wider), self._paths.spots)
+
+    def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | None:
+        """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain."""
+        metres = _length(path)
+        for wider in self._wider:
+            around = PathAhead(wider(), stop, self._scene, state)
+            other = around.path(state)
+            if other is None:
+                continue
+            if wider is self._wider[-1] or _length(other) > metres + DETOUR_M:
+                legs = self._legs_to(around, state)
+                if not isinstance(legs, Stuck):
+                    return legs
+                metres = _length(other)
+        return None
 
     def _blocked_body(self, state: Floats | None) -> str:
         """Who is not free in a state ``[S]``: the vehicle, or if that is free a trailer."""
@@ -317,6 +340,10 @@ class Router:
             best = int(np.where(arrived, ahead.distance(rests) - ARRIVED_M, to_go).argmin())
             if arrived[best] or to_go[best] <= ahead.to_go(drive.states[:1])[0] - PROGRESS_M:
                 yield drive.leg(*stops[best])
+
+
+def _length(path: Floats) -> float:
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 class _Drive(NamedTuple):

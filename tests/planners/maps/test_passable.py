@@ -57,3 +57,22 @@ def test_cells_of_a_coarse_map_stay_as_they_are() -> None:
     paths = passable(OccupancyMap("coarse", blocked, 1.0), WIDTH, 1.0)
     assert np.array_equal(paths.grid.occupied, blocked)
     assert np.allclose(paths.spots[2, 5], [5.5, 2.5])
+
+
+@given(
+    angle=st.floats(0.0, math.pi),
+    thickness=st.floats(1.0, 4.0),
+    off=st.floats(0.0, 1.0),
+    share=st.floats(0.02, 0.5),
+)
+def test_no_path_leads_through_a_wall_however_thin(
+    angle: float, thickness: float, off: float, share: float
+) -> None:
+    resolution = share * WIDTH
+    count = math.ceil(20.0 / resolution)
+    y, x = resolution * (np.indices((count, count)) + 0.5) - 10.0 - off
+    across = y * math.cos(angle) - x * math.sin(angle)
+    blocked = np.abs(across) < 0.71 * thickness * resolution  # a disc cannot slip between its cells
+    paths = passable(OccupancyMap("wall", blocked, resolution), WIDTH, 1.0)
+    middle, beyond = MIDDLE + off, 6.0 * np.array([-math.sin(angle), math.cos(angle)])
+    assert paths.path(middle - beyond, middle + beyond) is None

@@ -369,3 +369,12 @@ def test_of_a_train_it_is_told_which_body_has_no_room() -> None:
     assert no_room.why == "the trailer has no room in the goal pose"
     assert isinstance(outside, Stuck)
     assert outside.why.startswith("the trailer would stand")
+
+
+def test_a_gap_that_is_too_narrow_does_not_hide_a_door_farther_away() -> None:
+    rows, columns = np.indices((600, 400))
+    x, y = 0.1 * (columns + 0.5), 0.1 * (rows + 0.5)
+    free = ((y > 9.6) & (y < 10.4)) | ((y > 50.0) & (y < 51.5))
+    world = OccupancyMap("detour", (x > 20.0) & (x < 20.3) & ~free, 0.1)
+    found = check(Router(world, searched).route((5.0, 10.0, 0.0), [Stop((35.0, 10.0))]))
+    assert found.plan(CAR).states[:, 1].max() > 49.0
