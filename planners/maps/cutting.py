@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from planners.maps.global_path import GlobalPaths, local_goal
+from planners.maps.global_path import GlobalPaths, length_of, local_goal
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.regions import Blocks, Part, blocks_of, lie_in
 from planners.maps.surroundings import WINDOW, Surroundings
@@ -129,7 +129,7 @@ def is_drivable(problem: Problem, vehicle: Vehicle = CAR, workspace: Workspace |
     path = grid_path(occupied, problem.start[:2], problem.goal, problem.goal_radius, workspace)
     if path is None:
         return False
-    return float(np.hypot(*np.diff(path, axis=0).T).sum()) <= LONGEST_PATH * CANONICAL_DISTANCE
+    return length_of(path) <= LONGEST_PATH * CANONICAL_DISTANCE
 
 
 def window_boxes(poses: Floats, scale: float) -> tuple[Floats, Floats]:

@@ -107,6 +107,11 @@ class PathsTo:
         return spots
 
 
+def length_of(path: Floats) -> float:
+    """Return how long a ``path [n, 2]`` is, in its own unit."""
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
 def local_goal(path: Floats, start: Floats, scale: float) -> float | None:
     """Return the heading (rad) from ``start [2]`` to the first point of a path at the canonical distance.
 

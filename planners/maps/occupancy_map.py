@@ -61,7 +61,10 @@ class OccupancyMap:
 
 
 def blocks(cells: Array, factor: int, beyond: float) -> Array:
-    """Cells in squares, ``[rows, factor, columns, factor]``; where there are none they are ``beyond``."""
+    """Group ``cells`` into squares of ``factor`` by ``factor``.
+
+    Returns ``[rows, factor, columns, factor]``. Where a square reaches beyond the cells, it is ``beyond``.
+    """
     rows, columns = cells.shape
     padded = np.pad(cells, ((0, -rows % factor), (0, -columns % factor)), constant_values=beyond)
     return padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)

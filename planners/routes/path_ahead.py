@@ -42,7 +42,7 @@ class LocalGoal(NamedTuple):
     radius: float  # metres
     arrival: Arrival | None  # what the plan itself has to keep; None: nothing
     final: bool  # it is where the route stops
-    brief: bool = False  # it is asked for in vain before long: it is far, so something nearer comes next
+    brief: bool = False  # the search for it soon gives up, since it is far and nearer goals come next
 
 
 class PathAhead:

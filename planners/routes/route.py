@@ -19,7 +19,7 @@ import numpy as np
 from scipy import ndimage
 
 from planners.attempt import Attempt
-from planners.maps.global_path import GlobalPaths, passable
+from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
 from planners.routes.legs import Leg, joined, polished_legs, stricter
@@ -46,12 +46,9 @@ from planners.world.workspace import Workspace
 SHARES: Final = (2.0 / 3.0, 1.0 / 3.0)  # of a plan, after which the next begins, in the order of trial
 PROGRESS_M: Final = 3.0  # by which a leg must shorten the path to the goal
 CELL_M: Final = 1.0  # width of the cells of paths, at most, if those of the map are no wider
-WIDER: Final = (
-    1.2,
-    1.6,
-)  # times the vehicle's width are the gaps of ways that are tried next
-DETOUR_M: Final = 1.0  # by which they are longer at least; and then ...
-ROOMY_M: Final = 1.0  # ... obstacles are so much wider
+WIDER: Final = (1.2, 1.6)  # times the vehicle's width: gaps of the ways that are tried next ...
+DETOUR_M: Final = 1.0  # ... if they are so much longer; at last ...
+ROOMY_M: Final = 1.0  # ... a way that keeps so much more away from obstacles
 ATTEMPTS: Final = 30  # local problems to solve before a route is given up, and ...
 ATTEMPTS_A_METRE: Final = 0.1  # ... so many more for each metre to the goal
 RESTING: Final = 1e-8  # m/s and radians: what sums of controls round away, and no more
@@ -201,17 +198,17 @@ class Router:
 
     def _legs_around(self, path: Floats, stop: Stop, state: Floats) -> list[Leg] | None:
         """Search the legs to a stop along ways with more room than a ``path [n, 2]`` that was in vain."""
-        metres = _length(path)
+        metres = length_of(path)
         for wider in self._wider:
             around = PathAhead(wider(), stop, self._scene, state)
             other = around.path(state)
             if other is None:
                 continue
-            if wider is self._wider[-1] or _length(other) > metres + DETOUR_M:
+            if wider is self._wider[-1] or length_of(other) > metres + DETOUR_M:
                 legs = self._legs_to(around, state)
                 if not isinstance(legs, Stuck):
                     return legs
-                metres = _length(other)
+                metres = length_of(other)
         return None
 
     def _blocked_body(self, state: Floats | None) -> str:
@@ -340,10 +337,6 @@ class Router:
             best = int(np.where(arrived, ahead.distance(rests) - ARRIVED_M, to_go).argmin())
             if arrived[best] or to_go[best] <= ahead.to_go(drive.states[:1])[0] - PROGRESS_M:
                 yield drive.leg(*stops[best])
-
-
-def _length(path: Floats) -> float:
-    return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
 class _Drive(NamedTuple):

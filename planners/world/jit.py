@@ -49,7 +49,7 @@ _config: Any = numba.config
 _OWN = _SOURCES / "__pycache__"
 _CACHE = Path(_config.CACHE_DIR or _OWN) / f"kernels-{_digest_of_sources()}"
 _STATES = "kernels-" + 16 * "[0-9a-f]"
-KEPT_BESIDE = 2  # folders of kernels of other states of the sources, for who goes back to one
+KEPT_BESIDE = 2  # folders of earlier versions' kernels are kept, for people who go back to one
 
 
 class _KernelLocator(InTreeCacheLocator):

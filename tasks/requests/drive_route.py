@@ -9,10 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
 from dashboards.cells import CellTable, decimal
 from planners.attempt import WITHOUT_MEMORY, Attempt
+from planners.maps.global_path import length_of
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
@@ -282,7 +281,7 @@ def _from_memory(route: Route) -> int:
 
 def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
     """A line with the mean speed, and that of a drive as long at full speed with a rest at each goal."""
-    shortest = sum(float(np.hypot(*np.diff(path, axis=0).T).sum()) for path in route.paths)
+    shortest = sum(map(length_of, route.paths))
     mean = plan.length_m / max(plan.duration_s, 1e-9)
     share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)
     return (

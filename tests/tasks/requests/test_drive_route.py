@@ -149,6 +149,15 @@ def test_who_is_there_already_is_told_so_and_gets_a_plan_that_stands(
         assert call(["verify", str(out), "--map", str(town / "town.map")]) == 0
 
 
+def block(drive: Path, state: int, changed: Path) -> tuple[float, float]:
+    """Write the town's map with the cell occupied where a drive is in a state; x and y there."""
+    x, y = json.loads(drive.read_text())["states"][state][:2]
+    cells = CELLS.copy()
+    cells[-1 - int(y), int(x)] = True
+    write_map(changed, cells)
+    return x, y
+
+
 def test_a_route_is_refused_on_a_map_that_has_changed_in_its_way(
     town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -156,10 +165,7 @@ def test_a_route_is_refused_on_a_map_that_has_changed_in_its_way(
     asked = ["route", str(town / "town.map"), "--from", "8,6,0.3", "--to", "150,190", "--out", str(out)]
     assert call(asked) == 0
     assert call(["verify", str(out), "--map", str(town / "town.map")]) == 0
-    x, y = json.loads(out.read_text())["states"][100][:2]
-    changed = CELLS.copy()
-    changed[-1 - int(y), int(x)] = True
-    write_map(tmp_path / "changed.map", changed)
+    x, y = block(out, 100, tmp_path / "changed.map")
     capsys.readouterr()
     assert call(["verify", str(out), "--map", str(tmp_path / "changed.map")]) == 1
     told = capsys.readouterr().err
@@ -175,10 +181,7 @@ def test_where_a_scaled_route_collides_is_told_in_metres_of_the_map(
     out = tmp_path / "plan.json"
     asked = ["route", str(town / "town.map"), "--scale", str(SCALE), "--from", "8,6,0.3", "--to", "150,190"]
     assert call([*asked, "--out", str(out)]) == 0
-    x, y = json.loads(out.read_text())["states"][200][:2]
-    changed = CELLS.copy()
-    changed[-1 - int(y), int(x)] = True
-    write_map(tmp_path / "changed.map", changed)
+    x, y = block(out, 200, tmp_path / "changed.map")
     capsys.readouterr()
     assert call(["verify", str(out), "--map", str(tmp_path / "changed.map")]) == 1
     near = re.search(r"near \((\S+), (\S+)\)", capsys.readouterr().err)
