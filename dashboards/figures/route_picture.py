@@ -1,4 +1,4 @@
-"""A route as a picture: the map, the shortest way, and the legs, coloured by where they came from.
+"""A route as a picture: the map around it, the shortest way, and the legs, coloured by where they came from.
 
 On a map a vehicle is a few dots, so of goals that are poses there are close-ups of how it gets in.
 """
@@ -12,17 +12,18 @@ from typing import Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from dashboards.figures.manoeuvre_picture import draw_manoeuvre, manoeuvre_legend
+from dashboards.figures.manoeuvre_picture import BACKWARDS, draw_manoeuvre, manoeuvre_legend
 from dashboards.figures.map_picture import draw_map
 from dashboards.figures.marks import draw_travel_arrows
 from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below, new_figure
 from dashboards.palette import BLUE, GREEN, INK, ORANGE, VERMILLION
-from dashboards.world_outlines import footprint_spacing_m
+from dashboards.world_outlines import footprint_spacing_m, gears_of
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
@@ -35,7 +36,10 @@ COLOURS: Final = {"recalled": BLUE, "repaired": ORANGE, "searched": VERMILLION}
 _OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
-_ARROW: Final = 0.05  # of the map's longer side: the arrow of a heading
+_MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
+_AROUND: Final = 5.0  # ... and at least so many lengths of the vehicle
+_MOST_OF_MAP: Final = 0.7  # of each side: who drives over more sees the whole map
+_ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
 _APART: Final = 0.1  # of it: arrows along the drive
 _CLOSE_UPS: Final = 3  # side by side, at most
 _LENGTHS: Final = 1.5  # of the vehicle to each side of the goal that a close-up shows
@@ -63,7 +67,8 @@ def route_picture(
         caption: text above the map.
         vehicle: the vehicle that drives the route.
     """
-    width, height = _extent(world)
+    left, bottom, right, top = _shown(world, route, stops, scale, vehicle)
+    width, height = right - left, top - bottom
     longest = max(width, height)
     arrivals = _arrivals(world, route, stops, scale, vehicle)
     columns = min(max(len(arrivals), 2), _CLOSE_UPS)
@@ -73,15 +78,17 @@ def route_picture(
     grid = figure.add_gridspec(1 + rows, columns, height_ratios=[tall, *[side] * rows])
     axes = figure.add_subplot(grid[0, :])
     for number, (name, problem, plan) in enumerate(arrivals):
-        close_up = figure.add_subplot(grid[1 + number // columns, number % columns])
-        draw_problem(close_up, problem, vehicle, _OCCUPIED)
-        draw_manoeuvre(close_up, plan, vehicle)
-        close_up.set_title(name, fontsize=9, color=INK, loc="left", pad=4)
+        beside = figure.add_subplot(grid[1 + number // columns, number % columns])
+        draw_problem(beside, problem, vehicle, _OCCUPIED)
+        draw_manoeuvre(beside, plan, vehicle)
+        beside.set_title(name, fontsize=9, color=INK, loc="left", pad=4)
     draw_map(axes, world, _OCCUPIED)
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
     axes.set_title(caption, fontsize=9, color=INK, loc="left", pad=6)
     for path in route.paths:
         axes.plot(*_placed(world, scale * path).T, color=INK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=3)
-    sources = []
+    sources, backs = [], False
     for leg in route.legs:
         states = leg.states(vehicle)
         points = _placed(world, scale * states[:, :2])
@@ -94,8 +101,11 @@ def route_picture(
             axes.plot(*drawn.T, color=colour, linewidth=linewidth, zorder=zorder, solid_capstyle="butt")
         axes.plot(*points[-1], marker="o", color="white", markeredgecolor=INK, markersize=3.5, zorder=7)
         way = Plan(np.column_stack([points, states[:, 2:]]), leg.controls)
-        colour = COLOURS[leg.source]
-        draw_travel_arrows(axes, way, vehicle, {1: colour, -1: colour}, _APART * longest, 17.0)
+        steps = np.stack([points[:-1], points[1:]], axis=1)[gears_of(way, vehicle) < 0]
+        axes.add_collection(LineCollection(list(steps), color=BACKWARDS, linewidth=2.6, zorder=6))
+        backs = backs or len(steps) > 0
+        colours = {1: COLOURS[leg.source], -1: BACKWARDS}
+        draw_travel_arrows(axes, way, vehicle, colours, _APART * longest, 17.0)
         sources.append(leg.source)
     several = len(stops) > 1
     for number, stop in enumerate(stops, start=1):
@@ -135,8 +145,10 @@ def route_picture(
         Line2D([], [], color=INK, linewidth=0.9, linestyle=(0, (2, 2)), label="shortest way over the cells"),
         Patch(facecolor=_OCCUPIED, label="occupied"),
     ]  # fmt: skip
-    if arrivals:
-        handles += [*_CLOSE_UP_ENTRIES, *manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals])]
+    close_up = manoeuvre_legend([(plan, vehicle) for _, _, plan in arrivals]) if arrivals else []
+    if backs and "backwards" not in [entry.get_label() for entry in close_up]:
+        handles.append(Line2D([], [], color=BACKWARDS, linewidth=2.6, label="backwards"))
+    handles += [*_CLOSE_UP_ENTRIES, *close_up] if arrivals else []
     legend_below(figure, handles, 4)
     return figure
 
@@ -195,12 +207,25 @@ def _legend_of(source: str, legs: int) -> str:
     return f"{source}, {legs} leg" + "s" * (legs > 1)
 
 
-def _extent(world: OccupancyMap) -> tuple[float, float]:
-    """Width and height of the map in its own frame, metres."""
+def _shown(
+    world: OccupancyMap, route: Route, stops: Sequence[Stop], scale: float, vehicle: Vehicle
+) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of what is shown, in metres of the map's frame.
+
+    It is the whole map, or if less is driven over what lies around the drive.
+    """
     width, height = world.size
     corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
-    across, up = np.ptp(corners, axis=0)
-    return float(across), float(up)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    places = [np.array([stop.place for stop in stops]), np.array([route.problem.start[:2]]), *route.paths]
+    places += [leg.states(vehicle)[:, :2] for leg in route.legs]
+    driven = _placed(world, scale * np.concatenate(places))
+    first, last = driven.min(axis=0), driven.max(axis=0)
+    around = max(_MARGIN * float((last - first).max()), _AROUND * scale * footprint_spacing_m(vehicle))
+    first, last = np.maximum(first - around, low), np.minimum(last + around, high)
+    if (last - first > _MOST_OF_MAP * (high - low)).any():
+        first, last = low, high
+    return float(first[0]), float(first[1]), float(last[0]), float(last[1])
 
 
 def _placed(world: OccupancyMap, points: Floats) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dashboards.figures.route_picture import route_picture
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.route import Route, Router
@@ -18,10 +20,24 @@ def test_every_pose_is_in_the_middle_of_a_close_up_and_no_place_has_one() -> Non
         found = Router(world, searched).route(START, stops)
         assert isinstance(found, Route)
         overview, *close_ups = route_picture(world, found, stops, 1.0, "").axes
-        assert overview.get_xlim() == (0.0, world.size[0])
+        shown = np.array([overview.get_xlim(), overview.get_ylim()])
+        for place in [START[:2], *(leg.end[:2] for leg in found.legs), *(stop.place for stop in stops)]:
+            assert (shown[:, 0] < place).all()
+            assert (place < shown[:, 1]).all()
+        assert (shown[:, 0] >= 0.0).all()
+        assert (shown[:, 1] <= world.size).all()
         assert len(close_ups) == sum(stop.is_pose for stop in stops)
         for axes in close_ups:
             left, right = axes.get_xlim()
             low, high = axes.get_ylim()
             assert abs(0.5 * (left + right) - POSE.place[0]) < 0.1 * (right - left)
             assert abs(0.5 * (low + high) - POSE.place[1]) < 0.1 * (high - low)
+
+
+def test_of_a_large_map_only_what_lies_around_the_drive_is_shown() -> None:
+    world = town()
+    stop = Stop((START[0] + 12.0, START[1]))
+    found = Router(world, searched).route(START, [stop])
+    assert isinstance(found, Route)
+    axes = route_picture(world, found, [stop], 1.0, "").axes[0]
+    assert max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())) < 0.5 * min(world.size)
