@@ -37,7 +37,11 @@ def read_ros_map(file: Path, name: str, unknown_is_occupied: bool = True) -> Occ
     x, y, yaw = (yaml_number(value, "origin") for value in origin)
     if not all(math.isfinite(value) and abs(value) <= FARTHEST_ORIGIN_M for value in (x, y, yaw)):
         raise ValueError("has an origin that is not finite or impossibly far away; expected [x, y, yaw]")
-    picture = read_picture(_picture_file(file, fields["image"]), ("PNG", "PPM"))
+    image = _picture_file(file, fields["image"])
+    try:
+        picture = read_picture(image, ("PNG", "PPM"))
+    except ValueError as error:
+        raise ValueError(f"names the image {image.name}, which {error}") from None
     occupied, free = _judged(picture, fields)
     return OccupancyMap(name, (occupied if not unknown_is_occupied else ~free)[::-1], resolution, (x, y, yaw))
 

@@ -24,6 +24,7 @@ from planners.world.problem import Plan, Problem
 from planners.world.vehicles.vehicle import Vehicle, name_of
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
+from storage.worlds.sources import Source
 from tasks.attempts.judged_attempts import PlanFaultError, check_attempt
 from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
@@ -129,7 +130,7 @@ def drive_route(
         route = router.route(*asked)
         seconds = time.perf_counter() - began
     if isinstance(route, Stuck):
-        raise _refusal(route, world, scale)
+        raise _refusal(route, source, world, scale, any(motion))
     plan = route.plan(assistant.vehicle)
     _check(route, plan, assistant)
     record = _record(route, plan, world, assistant, seconds, scale)
@@ -177,15 +178,14 @@ def _drive_mirrored(
     across.route((width - x, y, math.pi - heading), asked, turned)
 
 
-def _refusal(stuck: Stuck, world: OccupancyMap, scale: float) -> Exception:
+def _refusal(stuck: Stuck, source: Source, world: OccupancyMap, scale: float, moves: bool) -> Exception:
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    line = f"No route across {world.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
+    line = f"No route across {source.path.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
     if stuck.attempts == 0:
         return UsageError(f"{line}; choose another place or heading.")
-    return RunError(
-        f"{line} ({stuck.attempts} local problems tried); try another --seed, heading or planner."
-    )
+    other = "motion at the start, --seed, heading" if moves else "--seed, heading"
+    return RunError(f"{line} ({stuck.attempts} local problems tried); try another {other} or planner.")
 
 
 def _check(route: Route, plan: Plan, assistant: Assistant) -> None:
@@ -252,23 +252,25 @@ def _summary(
     by_source = {
         source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
     }
+    has_memory = assistant.settings.assist not in WITHOUT_MEMORY
     from_memory = _from_memory(route)
-    lines = [
-        f"{scale * plan.length_m:.0f} m in {plan.duration_s:.0f} s, {_count(len(legs), 'leg')}, "
-        f"{from_memory} from memory"
-    ]
+    whole = f"{scale * plan.length_m:.0f} m in {plan.duration_s:.0f} s, {_count(len(legs), 'leg')}"
+    lines = [f"{whole}, {from_memory} from memory" if has_memory else whole]
     parts = [
         f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
         for source, metres in by_source.items()
         if metres
     ]
     parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
-    share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
     lines.append("; ".join(parts))
+    if has_memory:
+        share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
+        lines.append(
+            f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
+            "(a repaired leg counts whole)"
+        )
     return [
         *lines,
-        f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
-        "(a repaired leg counts whole)",
         _pace(route, plan, assistant.vehicle, scale),
         f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
         f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
