@@ -31,7 +31,7 @@ from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, drawing_of, window_of
-from planners.world.goal import RADIUS, X, Y, place
+from planners.world.goal import RADIUS, X, Y, asks_for_more, place
 from planners.world.problem import Plan, is_canonical
 from planners.world.vehicles.dynamics import turning_speed
 
@@ -51,6 +51,7 @@ class LatticeSettings(NamedTuple):
         Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
         Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
     )  # the same for problems that are not canonical; where a speed is asked at the goal, without one or two
+    sharpest: float = 0.65  # 1/m: no primitive on the way to a pose bends more at full speed
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
@@ -105,7 +106,8 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                 manoeuvring = Manoeuvring(query, goal, cells)
                 if query.endings is not None:
                     joining = manoeuvring.joining(query, query.endings)
-        level = paced(levels[min(tried, len(levels) - 1)], vehicle)
+        sharpest = settings.sharpest if asks_for_more(goal) else math.inf
+        level = paced(levels[min(tried, len(levels) - 1)], vehicle, sharpest)
         tried += 1
         if improving:
             level = varied(level, settings.improving_greed, query)

@@ -39,6 +39,7 @@ from planners.world.vehicles.dynamics import (
     admissible,
     control_limits,
     load,
+    sharpest_at,
     step,
     turn_limit,
     turn_limit_at,
@@ -191,19 +192,25 @@ def grow_lattice(
                 open_vertex(tree, last, frontier, ahead, lattice, vehicle)
 
 
-def paced(lattice: Lattice, vehicle: Vehicle) -> Lattice:
+def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float = math.inf) -> Lattice:
     """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
 
     Speeds are told apart more finely if two primitives one after another would not get from one to the next.
+    Who turns on the spot would turn round in each primitive: at full speed none bends more than ``sharpest``
+    (1/m). Where lateral acceleration is limited that does so already.
     """
-    seconds = 2.0 / vehicle.max_speed
+    top = vehicle.max_speed
+    seconds = 2.0 / top
     faster = 2.0 * seconds * control_limits(vehicle)[0]
     paces = lattice.paces
-    while faster * paces < vehicle.max_speed - vehicle.min_speed and paces < 8:
+    while faster * paces < top - vehicle.min_speed and paces < 8:
         paces += 1
     steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
-    slower = vehicle.max_speed / turning_speed(vehicle)  # times as long as at full speed a turn takes
-    return lattice._replace(steps=max(steps, 1), paces=paces, heading_s=slower * lattice.heading_s)
+    slower = top / turning_speed(vehicle)  # times as long as at full speed a turn takes
+    turn = lattice.turn
+    if sharpest < math.inf and vehicle.max_lateral_acceleration == math.inf:
+        turn *= min(sharpest_at(top, sharpest * top * top, vehicle) / turn_limit(vehicle), 1.0)
+    return lattice._replace(steps=max(steps, 1), paces=paces, turn=turn, heading_s=slower * lattice.heading_s)
 
 
 def varied(lattice: Lattice, greed: float, query: Query) -> Lattice:

@@ -2,12 +2,14 @@
 
 ``python -m tests.speed connections`` draws states at random, one half at rest, the other with speeds from 0
 to the largest and the wheels turned, and goal poses at rest 2 to 30 m away, to 0.1 m and 0.05 rad. The bound
-is the time of the straight way, from the speed at the start to rest; nothing is faster.
+is the time of the straight way, from the speed at the start to rest; nothing is faster. The vehicles are the
+built-in ones and those of docs/vehicles whose wheels turn at once or slowly for their speed.
 """
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from time import perf_counter
 from typing import Final
 
@@ -22,10 +24,13 @@ from planners.search.connection.profile import run_seconds
 from planners.world.arrays import Floats, Indices
 from planners.world.goal import goal_of_pose
 from planners.world.jit import lean
+from planners.world.vehicles.dynamics import control_limits, turn_limit
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, state_size
+from storage.vehicles.vehicle_files import read_vehicle
 
 SEED: Final = 78
 COUNT: Final = 4000
+OTHERS: Final = ("hunter", "jackal", "create3", "turtlebot")  # of docs/vehicles
 WORDS: Final = 3  # tried at most, as by the planners' default
 
 
@@ -50,13 +55,16 @@ def report(console: Console) -> None:
     table = Table(title="Connections", title_justify="left")
     for column in ("vehicle", "from", "closed", "us each", "driving s", "bound s"):
         table.add_column(column, justify="left" if column in ("vehicle", "from") else "right")
-    for name, vehicle in VEHICLES.items():
+    others = {name: read_vehicle(Path(f"docs/vehicles/{name}.yaml")) for name in OTHERS}
+    for name, vehicle in {**VEHICLES, **others}.items():
         rng = np.random.default_rng(SEED)
         starts = np.zeros((COUNT, state_size(vehicle)))
         starts[:, 2] = rng.uniform(-math.pi, math.pi, COUNT)
         moving = np.arange(COUNT) % 2 == 1
         starts[moving, 3] = rng.uniform(0.0, vehicle.max_speed, moving.sum())
-        starts[moving, 4] = rng.uniform(-0.5, 0.5, moving.sum())
+        starts[moving, 4] = np.clip(
+            rng.uniform(-0.5, 0.5, moving.sum()), -turn_limit(vehicle), turn_limit(vehicle)
+        )
         metres, bearings, headings = rng.uniform(
             (2, -math.pi, -math.pi), (30, math.pi, math.pi), (COUNT, 3)
         ).T
@@ -76,7 +84,7 @@ def report(console: Console) -> None:
                 for each, speed, limit in zip(
                     metres[chosen][closed],
                     starts[chosen][closed][:, 3],
-                    [vehicle.max_acceleration] * closed.sum(),
+                    [control_limits(vehicle)[0]] * closed.sum(),
                     strict=True,
                 )
             ]

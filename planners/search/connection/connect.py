@@ -23,7 +23,7 @@ from planners.search.connection.profile import fill_limited, fill_run
 from planners.search.connection.words import PARTS
 from planners.world.arrays import Floats
 from planners.world.goal import HEADING_TOLERANCE, MOST_TURN, RADIUS, X, Y, reaches
-from planners.world.jit import lean
+from planners.world.jit import inlined, lean
 from planners.world.trigonometry import length, sincos, wrapped
 from planners.world.vehicles.dynamics import (
     admissible,
@@ -46,21 +46,40 @@ DAMPING: Final = 1e-6  # metres squared
 SHORT: Final = 0.1  # radii between two places of a run at which its limits are known ...
 FEWEST: Final = 16  # ... if these are not fewer
 SMALLEST_BEND: Final = 1e-9  # 1/m
+ROOM: Final = 2.0  # of an arc's length: what is driven until it bends, on average, has to fit in ...
+FIRST_ROOM: Final = 0.5  # ... or in so much of it if it begins at rest
 GEAR, BEND, LENGTH, TIME = range(4)  # rows of ``Connection.parts``
 
 
+@inlined
+def _share_of_bend(metres: float, top: float, bend: float, from_rest: bool, vehicle: Vehicle) -> float:
+    """How much of a ``bend`` an arc gets that is too short to bend so: it is gentler then, and longer."""
+    seconds = 0.5 * bend / bend_rate(top, vehicle)  # until it bends, on average
+    if not from_rest:
+        return min(math.sqrt(ROOM * metres / (top * seconds)), 1.0)
+    at_full_speed = math.sqrt(FIRST_ROOM * metres / (top * seconds))
+    gaining = 2.0 * FIRST_ROOM * FIRST_ROOM * metres / (control_limits(vehicle)[0] * seconds * seconds)
+    return float(min(max(at_full_speed, gaining ** (1.0 / 3.0)), 1.0))
+
+
 @lean
-def _take(c: Connection, number: int, radius: float, bend: float) -> int:
-    """Copy a word into ``c.parts``, and return how many parts it has."""
+def _take(c: Connection, number: int, top: float, vehicle: Vehicle) -> int:
+    """Copy a word into ``c.parts``, and return how many parts it has. Short arcs become gentler."""
+    radius, bend = radius_at(top, vehicle), tightest_bend(top, vehicle)
+    speed = c.states[0, 3]
     count = 0
     gear = 0.0
     for k in range(PARTS):
         metres = radius * c.words[number, PARTS + k]
         if metres != 0.0:
             gear = 1.0 if metres > 0.0 else -1.0
+            metres = abs(metres)
+            share = 1.0
+            if c.words[number, k] != 0.0 and (count > 0 or speed == 0.0):
+                share = _share_of_bend(metres, top, bend, count == 0, vehicle)
             c.parts[GEAR, count] = gear
-            c.parts[BEND, count] = bend * c.words[number, k]
-            c.parts[LENGTH, count] = abs(metres)
+            c.parts[BEND, count] = share * bend * c.words[number, k]
+            c.parts[LENGTH, count] = metres / share
             count += 1
     return count
 
@@ -151,7 +170,7 @@ def _drive(c: Connection, count: int, steps: int, top: float, vehicle: Vehicle) 
     for k in range(count):
         change = c.parts[BEND, k] - bend
         bend = c.parts[BEND, k]
-        seconds = max(abs(change) / rate, 1e-6)
+        seconds = max(abs(change) / rate, vehicle.dt)  # in less than a step it would jump
         c.ramps[k, 0] = change
         c.ramps[k, 1] = braking + 0.5 * seconds if k == 0 else max(c.parts[TIME, k - 1], 0.5 * seconds)
         c.ramps[k, 2] = 1.0 / seconds
@@ -259,5 +278,5 @@ def connect(c: Connection, word: int, goal: Floats, top: float, vehicle: Vehicle
         The steps of the drive in ``c.states`` and ``c.controls``; 0 if the word does not lead to the goal.
     """
     state = load(c.states, 0, vehicle)
-    parts = _take(c, word, radius_at(top, vehicle), tightest_bend(top, vehicle))
+    parts = _take(c, word, top, vehicle)
     return _drive_word(c, parts, lead_of(state, top, vehicle), heading_at(state, goal), goal, top, vehicle)

@@ -71,13 +71,18 @@ def last_speed(gear: float, first: float, metres: float, goal: Floats, accelerat
 def lead_of(state: State, top: float, vehicle: Vehicle) -> float:
     """How far a state drives, in metres, before it bends as the first part does, on average.
 
-    Who is too fast to bend so brakes first.
+    Who is too fast to bend so brakes first, who is slower gains speed.
     """
     speed = abs(state[3])
+    if speed == 0.0:
+        return 0.0  # it may drive off in either gear
+    acceleration = control_limits(vehicle)[0]
     braking = braking_seconds(state, top, vehicle)
-    slowed = speed - control_limits(vehicle)[0] * braking
-    bending = 0.5 * slowed * tightest_bend(top, vehicle) / bend_rate(top, vehicle)
-    return bending + 0.5 * (speed + slowed) * braking
+    slowed = speed - acceleration * braking
+    bending = 0.5 * tightest_bend(top, vehicle) / bend_rate(top, vehicle)
+    gaining = min(max((top - slowed) / acceleration, 0.0), bending)
+    ahead = slowed * bending + acceleration * gaining * (bending - 0.5 * gaining)
+    return ahead + 0.5 * (speed + slowed) * braking
 
 
 @inlined

@@ -17,6 +17,7 @@ from planners.world.vehicles.interface import curvature_of as curvature_of
 from planners.world.vehicles.interface import is_folded as is_folded
 from planners.world.vehicles.interface import lateral_acceleration as lateral_acceleration
 from planners.world.vehicles.interface import load as load
+from planners.world.vehicles.interface import sharpest_at as sharpest_at
 from planners.world.vehicles.interface import slides as slides
 from planners.world.vehicles.interface import step as step
 from planners.world.vehicles.interface import store as store

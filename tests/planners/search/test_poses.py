@@ -68,8 +68,8 @@ def test_a_better_plan_than_a_given_one_still_arrives() -> None:
 def test_a_train_is_given_the_time_that_its_poses_take() -> None:
     """The lorry backs into this one after more expansions than a place is worth."""
     lorry = read_vehicle(Path("docs/vehicles/semitrailer.yaml"))
-    world = problem_class("trap", vehicle=lorry).draw(7, 13)
-    question = question_in(world, 13, 7, lorry, pose=True)
+    world = problem_class("curves", vehicle=lorry).draw(8, 39)
+    question = question_in(world, 39, 8, lorry, pose=True)
     assert question is not None
     asked, _ = to_canonical(question)
     assert solve(asked, "lattice", seed=1, limits=Limits(), vehicle=lorry, polished=False).plan is None

@@ -23,6 +23,12 @@ VEHICLES = {
     "limited-car": CAR._replace(max_lateral_acceleration=1.0),
     "limited-differential-drive": DIFFERENTIAL_DRIVE._replace(max_lateral_acceleration=1.0),
 }
+UNEVEN = {
+    "turned-within-a-step": CAR._replace(max_steering_rate=20.0),
+    "turned-slowly-for-its-speed": DIFFERENTIAL_DRIVE._replace(
+        max_speed=1.8, min_speed=-1.8, max_acceleration=20.0, max_turn_rate=2.8, max_turn_acceleration=3.2
+    ),
+}
 Drive = tuple[Floats, Floats]
 
 
@@ -46,7 +52,7 @@ def questions(vehicle: Vehicle, moving: bool, count: int, seed: int) -> list[tup
         start = np.zeros(state_size(vehicle))
         start[2] = rng.uniform(-math.pi, math.pi)
         if moving:
-            start[3:5] = rng.uniform(0.0, 4.0), rng.uniform(-0.5, 0.5)
+            start[3:5] = rng.uniform(0.0, vehicle.max_speed), rng.uniform(-0.5, 0.5)
             most = (1.0 - 1e-9) * turn_limit_at(start[3], vehicle)
             start[4] = np.clip(start[4], -most, most)
         bearing, metres = rng.uniform(-math.pi, math.pi), rng.uniform(2.0, 30.0)
@@ -75,6 +81,24 @@ def test_connections_are_lawful_drives_to_the_goal_and_nearly_always_there(
                 assert limit.values.min() >= limit.low - 1e-9
                 assert limit.values.max() <= limit.high + 1e-9
     assert closed >= (0.8 if moving else 0.98) * len(asked)
+
+
+@pytest.mark.parametrize("vehicle", UNEVEN.values(), ids=UNEVEN)
+def test_bends_that_come_at_once_or_slowly_are_driven_as_well(vehicle: Vehicle) -> None:
+    for moving, least in ((False, 0.9), (True, 0.7)):
+        asked = questions(vehicle, moving, 100, 1)
+        closed = [connection(start, goal, vehicle, turning_speed(vehicle)) for start, goal in asked]
+        assert sum(drive is not None for drive in closed) >= least * len(asked)
+
+
+@pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE, *UNEVEN.values()])
+def test_a_goal_straight_ahead_but_for_a_little_is_driven_to_forwards(vehicle: Vehicle) -> None:
+    for aside in (0.05, 0.5, 2.0):
+        for heading in (0.0, 0.2, 1.5):
+            start = np.zeros(state_size(vehicle))
+            drive = connection(start, goal_of_pose(40.0, aside, heading), vehicle, turning_speed(vehicle))
+            assert drive is not None
+            assert drive[0][:, 3].min() >= -1e-9
 
 
 @pytest.mark.parametrize("vehicle", [CAR, DIFFERENTIAL_DRIVE], ids=["car", "differential-drive"])
