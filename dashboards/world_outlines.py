@@ -9,9 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.repair import blocked_states
-from planners.world.arrays import Flags, Floats, Integers
+from planners.world.arrays import Flags, Floats, Integers, Point
 from planners.world.geometry.collision import Scene
-from planners.world.problem import Plan, Problem
+from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.bodies import footprints
 from planners.world.vehicles.vehicle import (
     CAR,
@@ -78,16 +78,15 @@ def speed_tip(problem: Problem) -> tuple[float, float] | None:
     return x + speed * math.cos(heading), y + speed * math.sin(heading)
 
 
-def asked_pose(problem: Problem, vehicle: Vehicle = CAR) -> tuple[Floats, Vehicle] | None:
-    """The state ``[1, S]`` of ``vehicle`` in the goal pose of ``problem``, and what of it is to stand so.
+def asked_pose(goal: Point, arrival: Arrival | None, vehicle: Vehicle = CAR) -> tuple[Floats, Vehicle] | None:
+    """The state ``[1, S]`` of ``vehicle`` in a goal pose at ``goal``, and what of it is to stand so.
 
     That is all of it, or without its trailers if their angles are free; None if any heading will do.
     """
-    arrival = problem.arrival
     if arrival is None or arrival.heading is None:
         return None
     state = np.zeros((1, state_size(vehicle)))
-    state[0, :3] = *problem.goal, arrival.heading
+    state[0, :3] = *goal, arrival.heading
     state[0, 5 : 5 + len(arrival.hitches)] = arrival.hitches
     if isinstance(vehicle, CarWithTrailers) and not arrival.hitches:
         return state, Car._make(vehicle[: len(Car._fields)])

@@ -61,7 +61,7 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: s
     pieces = PolyCollection(problem.obstacles.pieces(), facecolor=colour, edgecolor=colour, linewidth=0.3)
     axes.add_collection(pieces)
     pieces.set_clip_path(frame)
-    asked = asked_pose(problem, vehicle)
+    asked = asked_pose(problem.goal, problem.arrival, vehicle)
     if asked is None:
         disc = Circle(problem.goal, problem.goal_radius, facecolor=ORANGE, edgecolor=INK, linewidth=0.8)
         axes.add_patch(disc).set_zorder(0.5)  # below obstacles, which it may meet

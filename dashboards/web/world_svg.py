@@ -76,7 +76,7 @@ def _scale_bar(problem: Problem) -> str:
 
 def _asked(problem: Problem, vehicle: Vehicle) -> list[str]:
     """The vehicle in a goal pose, and the way of the first second at the speed of the start."""
-    asked, tip = asked_pose(problem, vehicle), speed_tip(problem)
+    asked, tip = asked_pose(problem.goal, problem.arrival, vehicle), speed_tip(problem)
     (x, y, _), marks = problem.start, []
     if asked is not None:
         marks.append(_bodies(*asked, "goal pose"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -34,6 +35,7 @@ from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
+_LOG: Final = logging.getLogger(__name__)
 SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
 HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
@@ -130,6 +132,12 @@ def drive_route(
         route = router.route(*asked)
         seconds = time.perf_counter() - began
     if isinstance(route, Stuck):
+        if drawing is not None:
+            from dashboards.figures.route_picture import stuck_picture
+            from dashboards.figures.style import save_picture
+
+            save_picture(stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle), drawing)
+            _LOG.info("picture  %s", drawing)
         raise _refusal(route, source, world, scale, any(motion))
     plan = route.plan(assistant.vehicle)
     _check(route, plan, assistant)

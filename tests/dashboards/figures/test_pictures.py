@@ -153,7 +153,7 @@ def test_a_speed_at_the_start_and_a_pose_at_the_goal_are_drawn(vehicle: Vehicle)
     assert math.atan2(tip[1] - CANONICAL_GOAL[1], tip[0] - CANONICAL_GOAL[0]) == pytest.approx(1.0)
     assert math.dist(tip, CANONICAL_GOAL) > vehicle.front + 0.4 * vehicle.width  # or the body hides it
     assert goal_tip(plain, vehicle) is None
-    pose = asked_pose(asked, vehicle)
+    pose = asked_pose(asked.goal, asked.arrival, vehicle)
     assert pose is not None
     state, standing = pose
     assert trailers_of(standing) == ()  # their angles are free

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dashboards.figures.route_picture import route_picture
+from dashboards.figures.route_picture import route_picture, stuck_picture
 from planners.routes.path_ahead import AT_REST, Stop
-from planners.routes.route import Route, Router
+from planners.routes.route import Route, Router, Stuck
 from tests.planners.maps.samples import town
 from tests.planners.routes.test_route import START, searched
 
@@ -41,3 +41,18 @@ def test_of_a_large_map_only_what_lies_around_the_drive_is_shown() -> None:
     assert isinstance(found, Route)
     axes = route_picture(world, found, [stop], 1.0, "").axes[0]
     assert max(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())) < 0.5 * min(world.size)
+
+
+def test_where_a_route_ends_too_early_is_in_the_middle_of_a_close_up() -> None:
+    world = town()
+    row, column = np.argwhere(world.occupied[100:, 100:])[0] + 100
+    blocked = (float(column) + 0.5, float(row) + 0.5)
+    for stops, place in (([Stop(blocked)], blocked), ([Stop(blocked), POSE], blocked)):
+        stuck = Router(world, searched).route(START, stops)
+        assert isinstance(stuck, Stuck)
+        overview, close_up = stuck_picture(world, START, stops, stuck, 1.0).axes
+        for axes in (overview, close_up):
+            shown = np.array([axes.get_xlim(), axes.get_ylim()])
+            assert (shown[:, 0] < place).all()
+            assert (place < shown[:, 1]).all()
+        np.testing.assert_allclose(shown.mean(axis=1), place)

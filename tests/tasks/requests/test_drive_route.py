@@ -270,3 +270,13 @@ def test_half_a_kilometre_through_a_city(
     plan = read_plan(out).plan
     assert plan is not None
     assert plan.length_m >= metres
+
+
+def test_where_no_route_is_found_the_picture_says_where(town: Path, tmp_path: Path) -> None:
+    picture, plan = tmp_path / "stuck.png", tmp_path / "plan.json"
+    begin = placed(8.0, 6.0)
+    asked = ["route", str(town / "town.yaml"), "--scale", str(SCALE), "--from", f"{begin[0]},{begin[1]},0.7"]
+    asked += ["--to", "0,0", "--picture", str(picture), "--out", str(plan)]
+    assert call(asked) == 2
+    assert picture.stat().st_size > 10_000
+    assert not plan.exists()
