@@ -216,6 +216,8 @@ def _draw_ends(
         right, up = stop.place
         x, y, heading = world.pose(scale * right, scale * up, stop.arrival.heading or 0.0)
         goal = (x, y)
+        if not axes.viewLim.contains(x, y):
+            continue  # off the map: marks that are not clipped would shrink everything else
         if stop.is_pose:
             _draw_heading(axes, goal, heading, GREEN, longest)
         axes.plot(
@@ -316,7 +318,7 @@ def _view(
     corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     places = [np.array([*ends, *(stop.place for stop in stops)]), *ways]
-    shown = _placed(world, scale * np.concatenate(places))
+    shown = np.clip(_placed(world, scale * np.concatenate(places)), low, high)
     first, last = shown.min(axis=0), shown.max(axis=0)
     around = max(_MARGIN * float((last - first).max()), _AROUND * scale * footprint_spacing_m(vehicle))
     first, last = np.maximum(first - around, low), np.minimum(last + around, high)
