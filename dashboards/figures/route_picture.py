@@ -38,8 +38,8 @@ _OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
 _WIDTH: Final = 7.4  # inches
 _TALLEST: Final = 9.0  # inches
 _MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
-_AROUND: Final = 5.0  # ... and at least so many lengths of the vehicle
-_MOST_OF_MAP: Final = 0.7  # of each side: who drives over more sees the whole map
+_AROUND: Final = 2.5  # ... and at least so many lengths of the vehicle
+_MOST_OF_MAP: Final = 0.7  # of a side: if that is more, all of the side is shown
 _ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
 _APART: Final = 0.1  # of it: arrows along the drive
 _CLOSE_UPS: Final = 3  # side by side, at most
@@ -196,14 +196,15 @@ def _draw_legs(
         sources.append(leg.source)
     brakes = any(leg.driving < len(leg.controls) for leg in route.legs)
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5,
-               label="brakes, or the next leg begins" if brakes else "the next leg begins"),
-        *(
-            Line2D([], [], color=colour, linewidth=2.6, label=_legend_of(source, sources.count(source)))
-            for source, colour in COLOURS.items()
-            if source in sources
-        ),
-    ]  # fmt: skip
+        Line2D([], [], color=colour, linewidth=2.6, label=_legend_of(source, sources.count(source)))
+        for source, colour in COLOURS.items()
+        if source in sources
+    ]
+    if brakes or len(sources) > 1:
+        label = "brakes, or the next leg begins" if brakes else "the next leg begins"
+        mark = Line2D([], [], color=INK, marker="o", markerfacecolor="white", linewidth=1.6, markersize=4.5)
+        mark.set_label(label)
+        handles.append(mark)
     return handles, backs
 
 
@@ -313,7 +314,7 @@ def _view(
     scale: float,
     vehicle: Vehicle,
 ) -> _View:
-    """What lies around all of these, which are in canonical metres; the whole map if that is most of it."""
+    """What lies around all of these, which are in canonical metres; a whole side if that is most of it."""
     width, height = world.size
     corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -322,8 +323,8 @@ def _view(
     first, last = shown.min(axis=0), shown.max(axis=0)
     around = max(_MARGIN * float((last - first).max()), _AROUND * scale * footprint_spacing_m(vehicle))
     first, last = np.maximum(first - around, low), np.minimum(last + around, high)
-    if (last - first > _MOST_OF_MAP * (high - low)).any():
-        first, last = low, high
+    wide = last - first > _MOST_OF_MAP * (high - low)
+    first, last = np.where(wide, low, first), np.where(wide, high, last)
     return _View(*first.tolist(), *last.tolist())
 
 

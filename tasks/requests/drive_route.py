@@ -144,7 +144,7 @@ def drive_route(
     record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
-    summary = _summary(route, plan, solver, assistant, scale, seconds)
+    summary = _summary(route, plan, stops, solver, assistant, scale, seconds)
     if drawing is not None:
         from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
         from dashboards.figures.style import save_picture
@@ -251,9 +251,15 @@ def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
 
 
 def _summary(
-    route: Route, plan: Plan, solver: _Solver, assistant: Assistant, scale: float, seconds: float
+    route: Route,
+    plan: Plan,
+    stops: Sequence[Stop],
+    solver: _Solver,
+    assistant: Assistant,
+    scale: float,
+    seconds: float,
 ) -> list[str]:
-    """Lines: the whole route, the share that came from memory, the planning times."""
+    """Lines: the whole route, where it stops, the share that came from memory, the planning times."""
     legs = route.legs
     if not legs:
         return ["The vehicle is there already: nothing has to be driven."]
@@ -262,7 +268,8 @@ def _summary(
     }
     has_memory = assistant.settings.assist not in WITHOUT_MEMORY
     from_memory = _from_memory(route)
-    whole = f"{scale * plan.length_m:.0f} m in {plan.duration_s:.0f} s, {_count(len(legs), 'leg')}"
+    length = _rounded(scale * plan.length_m)
+    whole = f"{length} m in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
     lines = [f"{whole}, {from_memory} from memory" if has_memory else whole]
     parts = [
         f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
@@ -271,6 +278,14 @@ def _summary(
     ]
     parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
     lines.append("; ".join(parts))
+    off = [
+        f"{scale * math.dist(part.states[-1, :2], stop.place):.2f} m"
+        for stop, part in zip(stops, route.plans(assistant.vehicle), strict=True)
+        if not stop.is_pose
+    ]
+    if off:
+        places = f"the place{'s' * (len(off) > 1)} asked for; --goal-radius says how far that may be"
+        lines.append(f"stops {', '.join(off)} from {places}")
     if has_memory:
         share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
         lines.append(
@@ -283,6 +298,11 @@ def _summary(
         f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
         f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
     ]
+
+
+def _rounded(figure: float) -> str:
+    """A figure as text; below 100 with a decimal, since small robots have short drives."""
+    return f"{figure:.1f}" if figure < 100.0 else f"{figure:.0f}"
 
 
 def _from_memory(route: Route) -> int:

@@ -87,7 +87,7 @@ def test_a_route_at_a_scale_over_a_turned_map_can_be_driven(
     assert math.dist(own[-1, :2], end) <= 2.0 * SCALE
     assert abs(plan.states[-1, 3]) < 1e-9
     assert in_free_cells(own)
-    metres = re.search(r"^(\d+) m in (\d+) s, (\d+) legs?, (\d+) from memory", told.out, re.MULTILINE)
+    metres = re.search(r"^([\d.]+) m in ([\d.]+) s, (\d+) legs?, (\d+) from memory", told.out, re.MULTILINE)
     assert metres is not None
     assert float(metres[1]) == pytest.approx(SCALE * plan.length_m, abs=0.5)
     rows = [line.split() for line in told.out.splitlines() if re.match(r" +\d+ +(rec|rep|sea)", line)]
