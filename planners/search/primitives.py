@@ -192,7 +192,7 @@ def grow_lattice(
                 open_vertex(tree, last, frontier, ahead, lattice, vehicle)
 
 
-def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float = math.inf) -> Lattice:
+def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
     """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
 
     Speeds are told apart more finely if two primitives one after another would not get from one to the next.

@@ -10,11 +10,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from dashboards.cells import CellTable, decimal
-from planners.attempt import WITHOUT_MEMORY, Attempt
-from planners.maps.global_path import length_of
+from dashboards.cells import CellTable
+from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
-from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route, Router, Stuck
 from planners.search.query import Limits
@@ -22,7 +20,7 @@ from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Pose
 from planners.world.authority.authority import faults
 from planners.world.problem import Plan, Problem
-from planners.world.vehicles.vehicle import Vehicle, name_of
+from planners.world.vehicles.vehicle import name_of
 from storage.exchange.plans import PlanRecord, write_plan
 from storage.worlds.importing import ImportSettings
 from storage.worlds.sources import Source
@@ -31,19 +29,13 @@ from tasks.attempts.timing import OtherWork
 from tasks.requests.assistant import Assistant
 from tasks.requests.plan_answers import plan_answer
 from tasks.requests.route_request import RouteRequest, map_source, motion_of, start_of, stops_of, told_map
+from tasks.requests.route_summary import SOURCES, legs_from_memory, route_summary, route_table
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_outputs, check_picture, check_plan_file
 from tasks.settings.errors import RunError, UsageError
 
 _LOG: Final = logging.getLogger(__name__)
-SOURCES: Final = ("recalled", "repaired", "searched")
 WIDEST_M: Final = 10_000.0  # canonical metres; the table of cells for collision checks grows with the area
-HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
-FIELDS: Final = (
-    *("leg", "source", "driven_m", "braking_m"),
-    *("duration_s", "first_speed_mps", "planning_ms", "retrieval_ms"),
-)
-RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of planning that a memory takes
 
 
 @dataclass
@@ -133,7 +125,7 @@ def drive_route(
         seconds = time.perf_counter() - began
     if isinstance(route, Stuck):
         if drawing is not None:
-            from dashboards.figures.route_picture import stuck_picture
+            from dashboards.figures.stuck_picture import stuck_picture  # late: few routes are drawn
             from dashboards.figures.style import save_picture
 
             save_picture(stuck_picture(world, asked[0], stops, route, scale, assistant.vehicle), drawing)
@@ -144,20 +136,19 @@ def drive_route(
     record = _record(route, plan, world, assistant, seconds, scale)
     if out is not None:
         write_plan(out, record)
-    summary = _summary(route, plan, stops, solver, assistant, scale, seconds)
+    summary = route_summary(route, plan, stops, assistant, scale, solver.seconds, seconds)
     if drawing is not None:
-        from dashboards.figures.route_picture import route_picture  # late: few routes are drawn
+        from dashboards.figures.route_picture import route_picture  # late, as above
         from dashboards.figures.style import save_picture
 
-        figure = route_picture(world, route, stops, scale, summary[0], assistant.vehicle)
-        save_picture(figure, drawing)
+        save_picture(route_picture(world, route, stops, scale, summary[0], assistant.vehicle), drawing)
     more = {
         "legs": len(route.legs),
-        "legs_from_memory": _from_memory(route),
+        "legs_from_memory": legs_from_memory(route),
         "local_plans": len(solver.seconds),
         "seconds": seconds,
     }
-    return DrivenRoute(_table(route, assistant, scale), summary, plan_answer(record, out, True) | more)
+    return DrivenRoute(route_table(route, assistant, scale), summary, plan_answer(record, out, True) | more)
 
 
 def _drive_mirrored(
@@ -224,101 +215,3 @@ def _record(
         assistant.vehicle,
         scale,
     )
-
-
-def _driven_m(leg: Leg, assistant: Assistant) -> float:
-    """The length of the part of a leg that follows its local plan, in canonical metres."""
-    states = leg.states(assistant.vehicle)[: leg.driving + 1]
-    return Plan(states, leg.controls[: leg.driving]).length_m
-
-
-def _table(route: Route, assistant: Assistant, scale: float) -> CellTable:
-    rows = []
-    for number, leg in enumerate(route.legs, start=1):
-        states, driven = leg.states(assistant.vehicle), _driven_m(leg, assistant)
-        whole = Plan(states, leg.controls, assistant.vehicle.dt)
-        retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
-        used_memory = leg.attempt.assist not in WITHOUT_MEMORY
-        figures = [scale * driven, scale * (whole.length_m - driven), whole.duration_s, scale * leg.begin[3]]
-        seconds = [leg.attempt.planning_seconds, retrieval if used_memory else math.nan]
-        cells = [
-            *(f"{number}", leg.source),
-            *(decimal(figure, 1) for figure in figures),
-            *(decimal(1000.0 * each, 2) for each in seconds),
-        ]
-        rows.append(cells)
-    return CellTable("", HEADINGS, [rows], "legs", FIELDS)
-
-
-def _summary(
-    route: Route,
-    plan: Plan,
-    stops: Sequence[Stop],
-    solver: _Solver,
-    assistant: Assistant,
-    scale: float,
-    seconds: float,
-) -> list[str]:
-    """Lines: the whole route, where it stops, the share that came from memory, the planning times."""
-    legs = route.legs
-    if not legs:
-        return ["The vehicle is there already: nothing has to be driven."]
-    by_source = {
-        source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
-    }
-    has_memory = assistant.settings.assist not in WITHOUT_MEMORY
-    from_memory = _from_memory(route)
-    length = _rounded(scale * plan.length_m)
-    whole = f"{length} m in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
-    lines = [f"{whole}, {from_memory} from memory" if has_memory else whole]
-    parts = [
-        f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
-        for source, metres in by_source.items()
-        if metres
-    ]
-    parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
-    lines.append("; ".join(parts))
-    off = [
-        f"{scale * math.dist(part.states[-1, :2], stop.place):.2f} m"
-        for stop, part in zip(stops, route.plans(assistant.vehicle), strict=True)
-        if not stop.is_pose
-    ]
-    if off:
-        places = f"the place{'s' * (len(off) > 1)} asked for; --goal-radius says how far that may be"
-        lines.append(f"stops {', '.join(off)} from {places}")
-    if has_memory:
-        share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
-        lines.append(
-            f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
-            "(a repaired leg counts whole)"
-        )
-    return [
-        *lines,
-        _pace(route, plan, assistant.vehicle, scale),
-        f"{_count(len(solver.seconds), 'local plan')} took {1000.0 * sum(solver.seconds):.2f} ms, the whole "
-        f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
-    ]
-
-
-def _rounded(figure: float) -> str:
-    """A figure as text; below 100 with a decimal, since small robots have short drives."""
-    return f"{figure:.1f}" if figure < 100.0 else f"{figure:.0f}"
-
-
-def _from_memory(route: Route) -> int:
-    return sum(leg.source in ("recalled", "repaired") for leg in route.legs)
-
-
-def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
-    """A line with the mean speed, and that of a drive as long at full speed with a rest at each goal."""
-    shortest = sum(map(length_of, route.paths))
-    mean = plan.length_m / max(plan.duration_s, 1e-9)
-    share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)
-    return (
-        f"{scale * mean:.2f} m/s on average, {share:.0%} of what full speed "
-        f"from goal to goal would be; the shortest way over the cells has {scale * shortest:.0f} m"
-    )
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + "s" * (number != 1)

@@ -58,13 +58,12 @@ def report(console: Console) -> None:
     others = {name: read_vehicle(Path(f"docs/vehicles/{name}.yaml")) for name in OTHERS}
     for name, vehicle in {**VEHICLES, **others}.items():
         rng = np.random.default_rng(SEED)
+        (limit, _), most = control_limits(vehicle), turn_limit(vehicle)
         starts = np.zeros((COUNT, state_size(vehicle)))
         starts[:, 2] = rng.uniform(-math.pi, math.pi, COUNT)
         moving = np.arange(COUNT) % 2 == 1
         starts[moving, 3] = rng.uniform(0.0, vehicle.max_speed, moving.sum())
-        starts[moving, 4] = np.clip(
-            rng.uniform(-0.5, 0.5, moving.sum()), -turn_limit(vehicle), turn_limit(vehicle)
-        )
+        starts[moving, 4] = np.clip(rng.uniform(-0.5, 0.5, moving.sum()), -most, most)
         metres, bearings, headings = rng.uniform(
             (2, -math.pi, -math.pi), (30, math.pi, math.pi), (COUNT, 3)
         ).T
@@ -81,12 +80,7 @@ def report(console: Console) -> None:
             closed = steps > 0
             bounds = [
                 run_seconds(max(each, speed**2 / 2 / limit), speed, 0.0, vehicle.max_speed, limit)
-                for each, speed, limit in zip(
-                    metres[chosen][closed],
-                    starts[chosen][closed][:, 3],
-                    [control_limits(vehicle)[0]] * closed.sum(),
-                    strict=True,
-                )
+                for each, speed in zip(metres[chosen][closed], starts[chosen][closed][:, 3], strict=True)
             ]
             table.add_row(
                 *(name, label, f"{closed.mean():.1%}", f"{1e6 * seconds / len(steps):.1f}"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dashboards.figures.route_picture import route_picture, stuck_picture
+from dashboards.figures.route_picture import route_picture
+from dashboards.figures.stuck_picture import stuck_picture
 from planners.routes.path_ahead import AT_REST, Stop
 from planners.routes.route import Route, Router, Stuck
 from tests.planners.maps.samples import town

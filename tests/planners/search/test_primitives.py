@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from planners.search.lattice import LatticeSettings
-from planners.search.primitives import controls_of, paced
+from planners.search.primitives import SHARES, controls_of, paced
 from planners.world.vehicles.dynamics import step
 from planners.world.vehicles.vehicle import VEHICLES, Vehicle, state_size
 from storage.vehicles.vehicle_files import read_vehicle
@@ -15,7 +15,7 @@ from storage.vehicles.vehicle_files import read_vehicle
 FILES = ("create3", "hunter", "jackal", "race-car", "tugger-train", "turtlebot")
 ALL = {**VEHICLES, **{name: read_vehicle(Path(f"docs/vehicles/{name}.yaml")) for name in FILES}}
 LEVEL = LatticeSettings().anywhere[0]
-SHARPEST = 5  # the primitive that turns fully, forwards
+SHARPEST = SHARES.index(1.0)  # the primitive that turns fully, forwards
 
 
 def turned(vehicle: Vehicle, sharpest: float) -> float:

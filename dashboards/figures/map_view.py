@@ -1,0 +1,131 @@
+"""What of a map is shown around a route, with its start and goals, and room for close-ups below."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from dashboards.figures.map_picture import draw_map
+from dashboards.figures.style import new_figure
+from dashboards.palette import GREEN, INK
+from dashboards.world_outlines import footprint_spacing_m
+from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.path_ahead import Stop
+from planners.world.arrays import Floats, Pose
+from planners.world.vehicles.vehicle import Vehicle
+
+OCCUPIED: Final = "#C9CDD3"  # paler than elsewhere, so that the legs stand out
+CLOSE_UP_LENGTHS: Final = 1.5  # of the vehicle to each side of its middle
+_WIDTH: Final = 7.4  # inches
+_TALLEST: Final = 9.0  # inches
+_CLOSE_UPS: Final = 3  # side by side, at most
+_MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
+_AROUND: Final = 2.5  # ... and at least so many lengths of the vehicle
+_MOST_OF_MAP: Final = 0.7  # of a side: if that is more, all of the side is shown
+_ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
+
+
+class View(NamedTuple):
+    """What of a map is shown, in metres of its frame."""
+
+    left: float
+    bottom: float
+    right: float
+    top: float
+
+    @property
+    def longest(self) -> float:
+        """The longer side."""
+        return max(self.right - self.left, self.top - self.bottom)
+
+
+def view_around(world: OccupancyMap, places: Sequence[Floats], scale: float, vehicle: Vehicle) -> View:
+    """What lies around all ``places [n, 2]``, canonical metres; a whole side if that is most of it."""
+    width, height = world.size
+    corners = np.array([world.pose(x, y, 0.0)[:2] for x in (0.0, width) for y in (0.0, height)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    shown = np.clip(placed(world, scale * np.concatenate(places)), low, high)
+    first, last = shown.min(axis=0), shown.max(axis=0)
+    around = max(_MARGIN * float((last - first).max()), _AROUND * scale * footprint_spacing_m(vehicle))
+    first, last = np.maximum(first - around, low), np.minimum(last + around, high)
+    wide = last - first > _MOST_OF_MAP * (high - low)
+    first, last = np.where(wide, low, first), np.where(wide, high, last)
+    return View(*first.tolist(), *last.tolist())
+
+
+def figure_over(
+    world: OccupancyMap, view: View, close_ups: int, title: str, caption: str
+) -> tuple[Figure, Axes, list[Axes]]:
+    """A figure with what is shown of the map, and below it axes for so many close-ups."""
+    columns = min(max(close_ups, 2), _CLOSE_UPS)
+    rows, side = math.ceil(close_ups / columns), _WIDTH / columns
+    tall = min(_WIDTH * (view.top - view.bottom) / (view.right - view.left), _TALLEST)
+    figure = new_figure(_WIDTH, tall + rows * side + 0.9, title)
+    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[tall, *[side] * rows])
+    axes = figure.add_subplot(grid[0, :])
+    draw_map(axes, world, OCCUPIED)
+    axes.set_xlim(view.left, view.right)
+    axes.set_ylim(view.bottom, view.top)
+    axes.set_title(caption, fontsize=9, color=INK, loc="left", pad=6)
+    beside = [figure.add_subplot(grid[1 + k // columns, k % columns]) for k in range(close_ups)]
+    return figure, axes, beside
+
+
+def draw_ends(
+    axes: Axes, world: OccupancyMap, start: Pose, stops: Sequence[Stop], scale: float, longest: float
+) -> list[Line2D | Patch]:
+    """Draw the start and the goals; returns what a legend says of them."""
+    several = len(stops) > 1
+    for number, stop in enumerate(stops, start=1):
+        right, up = stop.place
+        x, y, heading = world.pose(scale * right, scale * up, stop.arrival.heading or 0.0)
+        goal = (x, y)
+        if not axes.viewLim.contains(x, y):
+            continue  # off the map: marks that are not clipped would shrink everything else
+        if stop.is_pose:
+            _draw_heading(axes, goal, heading, GREEN, longest)
+        axes.plot(
+            *goal,
+            marker="o" if several else "*",
+            color=GREEN,
+            markeredgecolor=INK,
+            markersize=13 if several else 15,
+            zorder=10,
+            clip_on=False,
+        )
+        if several:
+            axes.annotate(f"{number}", goal, ha="center", va="center_baseline", color="white", zorder=11,
+                          fontsize=9, fontweight="bold", annotation_clip=False)  # fmt: skip
+    x, y, heading = world.pose(scale * start[0], scale * start[1], start[2])
+    axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
+    _draw_heading(axes, (x, y), heading, INK, longest)
+    return [
+        Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
+        Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
+               markersize=10, label="goals in order" if several else "goal"),
+    ]  # fmt: skip
+
+
+def _draw_heading(
+    axes: Axes, place: tuple[float, float], heading: float, colour: str, longest: float
+) -> None:
+    """An arrow from a ``place`` on a map along a heading."""
+    reach = _ARROW * longest
+    tip = place[0] + reach * math.cos(heading), place[1] + reach * math.sin(heading)
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.6, "shrinkA": 0.0}
+    axes.annotate("", tip, place, arrowprops=arrow, zorder=9, annotation_clip=True, clip_on=True)
+
+
+def placed(world: OccupancyMap, points: Floats) -> Floats:
+    """``points [n, 2]`` in grid metres, in the map's frame."""
+    left, bottom, turn = world.origin
+    cos, sin = math.cos(turn), math.sin(turn)
+    placed: Floats = points @ np.array([[cos, sin], [-sin, cos]]) + (left, bottom)
+    return placed

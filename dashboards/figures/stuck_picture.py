@@ -1,0 +1,86 @@
+"""Where a route over a map ends too early, as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from dashboards.figures.map_picture import draw_map
+from dashboards.figures.map_view import (
+    CLOSE_UP_LENGTHS,
+    OCCUPIED,
+    draw_ends,
+    figure_over,
+    placed,
+    view_around,
+)
+from dashboards.figures.style import legend_below
+from dashboards.palette import INK, VERMILLION
+from dashboards.world_outlines import asked_pose, footprint_spacing_m, outlines
+from planners.maps.occupancy_map import OccupancyMap
+from planners.routes.path_ahead import AT_REST, Stop
+from planners.routes.route import Stuck
+from planners.world.arrays import Floats, Point, Pose
+from planners.world.vehicles.vehicle import CAR, Vehicle
+
+
+def stuck_picture(
+    world: OccupancyMap,
+    start: Pose,
+    stops: Sequence[Stop],
+    stuck: Stuck,
+    scale: float,
+    vehicle: Vehicle = CAR,
+) -> Figure:
+    """A figure of a map in its own frame and where a route over it ends too early.
+
+    Close up it shows what is around that place. If it is the start or a goal pose, the vehicle stands there.
+
+    Args:
+        world: the map, in metres.
+        start: of the route, in canonical metres.
+        stops: the goals, in canonical metres.
+        stuck: why there is no route, and where.
+        scale: metres of the map in a canonical metre.
+        vehicle: the vehicle that was to drive.
+    """
+    places = np.array([start[:2], stuck.place, *(stop.place for stop in stops)])
+    view = view_around(world, [places], scale, vehicle)
+    title = f"No route over {world.name}"
+    figure, axes, (close_up,) = figure_over(world, view, 1, title, f"{stuck.why}, at the cross")
+    handles: list[Line2D | Patch] = draw_ends(axes, world, start, stops, scale, view.longest)
+    x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
+    axes.plot(x, y, marker="X", color=VERMILLION, markeredgecolor="white", markersize=11, zorder=12)
+    standing = _standing_at(stuck.place, start, stops, vehicle)
+    reach = CLOSE_UP_LENGTHS * scale * footprint_spacing_m(vehicle if standing is None else standing[1])
+    draw_map(close_up, world, OCCUPIED)
+    close_up.set_xlim(x - reach, x + reach)
+    close_up.set_ylim(y - reach, y + reach)
+    close_up.set_title("what is around the cross", fontsize=9, color=INK, loc="left", pad=4)
+    if standing is not None:
+        bodies, _ = outlines(*standing)
+        shown = [placed(world, scale * body) for body in bodies]
+        close_up.add_collection(
+            PolyCollection(shown, facecolor="none", edgecolor=VERMILLION, linewidth=1.4, zorder=5)
+        )
+        handles.append(Patch(facecolor="none", edgecolor=VERMILLION, label="where the vehicle would stand"))
+    handles += [
+        Line2D([], [], marker="X", color=VERMILLION, linestyle="none", markersize=9, label="stuck here"),
+        Patch(facecolor=OCCUPIED, label="occupied"),
+    ]
+    legend_below(figure, handles, 4)
+    return figure
+
+
+def _standing_at(
+    place: Point, start: Pose, stops: Sequence[Stop], vehicle: Vehicle
+) -> tuple[Floats, Vehicle] | None:
+    """Who stands at a place, as ``asked_pose``: at the start or in a goal pose; None if neither is there."""
+    arrivals = [AT_REST._replace(heading=start[2])] if place == start[:2] else []
+    arrivals += [stop.arrival for stop in stops if stop.place == place]
+    return asked_pose(place, arrivals[0], vehicle) if arrivals else None

@@ -1,0 +1,142 @@
+"""What is told of a route: a table of its legs, and lines that sum it up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from dashboards.cells import CellTable, decimal
+from planners.attempt import WITHOUT_MEMORY
+from planners.maps.global_path import length_of
+from planners.routes.legs import Leg
+from planners.routes.path_ahead import Stop
+from planners.routes.route import Route
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import Vehicle
+from tasks.requests.assistant import Assistant
+
+SOURCES: Final = ("recalled", "repaired", "searched")
+HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
+FIELDS: Final = (
+    *("leg", "source", "driven_m", "braking_m"),
+    *("duration_s", "first_speed_mps", "planning_ms", "retrieval_ms"),
+)
+RETRIEVAL: Final = ("occupancy", "encode", "recall", "check")  # parts of planning that a memory takes
+
+
+def _driven_m(leg: Leg, assistant: Assistant) -> float:
+    """The length of the part of a leg that follows its local plan, in canonical metres."""
+    states = leg.states(assistant.vehicle)[: leg.driving + 1]
+    return Plan(states, leg.controls[: leg.driving]).length_m
+
+
+def route_table(route: Route, assistant: Assistant, scale: float) -> CellTable:
+    """A row for each leg of a ``route``, in metres of the map, of which ``scale`` are a canonical one."""
+    rows = []
+    for number, leg in enumerate(route.legs, start=1):
+        states, driven = leg.states(assistant.vehicle), _driven_m(leg, assistant)
+        whole = Plan(states, leg.controls, assistant.vehicle.dt)
+        retrieval = sum(getattr(leg.attempt, f"{part}_seconds") for part in RETRIEVAL)
+        used_memory = leg.attempt.assist not in WITHOUT_MEMORY
+        figures = [scale * driven, scale * (whole.length_m - driven), whole.duration_s, scale * leg.begin[3]]
+        seconds = [leg.attempt.planning_seconds, retrieval if used_memory else math.nan]
+        cells = [
+            *(f"{number}", leg.source),
+            *(decimal(figure, 1) for figure in figures),
+            *(decimal(1000.0 * each, 2) for each in seconds),
+        ]
+        rows.append(cells)
+    return CellTable("", HEADINGS, [rows], "legs", FIELDS)
+
+
+def route_summary(
+    route: Route,
+    plan: Plan,
+    stops: Sequence[Stop],
+    assistant: Assistant,
+    scale: float,
+    local_seconds: Sequence[float],
+    seconds: float,
+) -> list[str]:
+    """Say how long the route is, where it stops, what came from memory, and how long planning took.
+
+    Args:
+        route: the route, in canonical metres.
+        plan: all of it.
+        stops: where it was to stop.
+        assistant: solved the local problems.
+        scale: metres of the map in a canonical metre.
+        local_seconds: planning time of each local problem.
+        seconds: planning time of the route.
+
+    Returns:
+        Lines, the first of which says all in short.
+    """
+    legs = route.legs
+    if not legs:
+        return ["The vehicle is there already: nothing has to be driven."]
+    by_source = {
+        source: [_driven_m(leg, assistant) for leg in legs if leg.source == source] for source in SOURCES
+    }
+    has_memory = assistant.settings.assist not in WITHOUT_MEMORY
+    from_memory = legs_from_memory(route)
+    length = _rounded(scale * plan.length_m)
+    whole = f"{length} m in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
+    lines = [f"{whole}, {from_memory} from memory" if has_memory else whole]
+    parts = [
+        f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
+        for source, metres in by_source.items()
+        if metres
+    ]
+    parts.append(f"braking {scale * abs(plan.length_m - sum(map(sum, by_source.values()))):.0f} m")
+    lines.append("; ".join(parts))
+    ends = [
+        section[-1].end if section else problem.start
+        for problem, section in zip(route.problems, route.sections, strict=True)
+    ]
+    off = [
+        f"{scale * math.dist(end[:2], stop.place):.2f} m"
+        for stop, end in zip(stops, ends, strict=True)
+        if not stop.is_pose
+    ]
+    if off:
+        places = f"the place{'s' * (len(off) > 1)} asked for; --goal-radius says how far that may be"
+        lines.append(f"stops {', '.join(off)} from {places}")
+    if has_memory:
+        share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
+        lines.append(
+            f"from memory: {from_memory / len(legs):.0%} of the legs, {share:.0%} of the metres "
+            "(a repaired leg counts whole)"
+        )
+    return [
+        *lines,
+        _pace(route, plan, assistant.vehicle, scale),
+        f"{_count(len(local_seconds), 'local plan')} took {1000.0 * sum(local_seconds):.2f} ms, the whole "
+        f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
+    ]
+
+
+def _rounded(figure: float) -> str:
+    """A figure as text; below 100 with a decimal, since small robots have short drives."""
+    return f"{figure:.1f}" if figure < 100.0 else f"{figure:.0f}"
+
+
+def legs_from_memory(route: Route) -> int:
+    """How many legs of a ``route`` came from a memory, as stored or repaired."""
+    return sum(leg.source in ("recalled", "repaired") for leg in route.legs)
+
+
+def _pace(route: Route, plan: Plan, vehicle: Vehicle, scale: float) -> str:
+    """A line with the mean speed, and that of a drive as long at full speed with a rest at each goal."""
+    shortest = sum(map(length_of, route.paths))
+    mean = plan.length_m / max(plan.duration_s, 1e-9)
+    share = route.least_seconds(vehicle) / max(plan.duration_s, 1e-9)
+    return (
+        f"{scale * mean:.2f} m/s on average, {share:.0%} of what full speed "
+        f"from goal to goal would be; the shortest way over the cells has {scale * shortest:.0f} m"
+    )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + "s" * (number != 1)
