@@ -39,7 +39,8 @@ def stuck_picture(
 ) -> Figure:
     """A figure of a map in its own frame and where a route over it ends too early.
 
-    Close up it shows what is around that place. If it is the start or a goal pose, the vehicle stands there.
+    Close up it shows what is around that place, if it is on the map. If it is the start or a goal pose, the
+    vehicle stands there.
 
     Args:
         world: the map, in metres.
@@ -51,28 +52,33 @@ def stuck_picture(
     """
     places = np.array([start[:2], stuck.place, *(stop.place for stop in stops)])
     view = view_around(world, [places], scale, vehicle)
-    title = f"No route over {world.name}"
-    figure, axes, (close_up,) = figure_over(world, view, 1, title, f"{stuck.why}, at the cross")
-    handles: list[Line2D | Patch] = draw_ends(axes, world, start, stops, scale, view.longest)
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    axes.plot(x, y, marker="X", color=VERMILLION, markeredgecolor="white", markersize=11, zorder=12)
-    standing = _standing_at(stuck.place, start, stops, vehicle)
-    reach = CLOSE_UP_LENGTHS * scale * footprint_spacing_m(vehicle if standing is None else standing[1])
-    draw_map(close_up, world, OCCUPIED)
-    close_up.set_xlim(x - reach, x + reach)
-    close_up.set_ylim(y - reach, y + reach)
-    close_up.set_title("what is around the cross", fontsize=9, color=INK, loc="left", pad=4)
-    if standing is not None:
-        bodies, _ = outlines(*standing)
-        shown = [placed(world, scale * body) for body in bodies]
-        close_up.add_collection(
-            PolyCollection(shown, facecolor="none", edgecolor=VERMILLION, linewidth=1.4, zorder=5)
-        )
-        handles.append(Patch(facecolor="none", edgecolor=VERMILLION, label="where the vehicle would stand"))
-    handles += [
-        Line2D([], [], marker="X", color=VERMILLION, linestyle="none", markersize=9, label="stuck here"),
-        Patch(facecolor=OCCUPIED, label="occupied"),
-    ]
+    is_on_map = all(0.0 <= scale * each <= side for each, side in zip(stuck.place, world.size, strict=True))
+    figure, axes, close_ups = figure_over(
+        world, view, int(is_on_map), f"No route over {world.name}", f"{stuck.why}, at ({x:.1f}, {y:.1f})"
+    )
+    handles = draw_ends(axes, world, start, stops, scale, view.longest)
+    for close_up in close_ups:
+        axes.plot(x, y, marker="X", color=VERMILLION, markeredgecolor="white", markersize=11, zorder=12)
+        cross = Line2D([], [], marker="X", color=VERMILLION, linestyle="none", markersize=9)
+        cross.set_label("stuck here")
+        handles.append(cross)
+        standing = _standing_at(stuck.place, start, stops, vehicle)
+        reach = CLOSE_UP_LENGTHS * scale * footprint_spacing_m(vehicle if standing is None else standing[1])
+        draw_map(close_up, world, OCCUPIED)
+        close_up.set_xlim(x - reach, x + reach)
+        close_up.set_ylim(y - reach, y + reach)
+        close_up.set_title("what is around the cross", fontsize=9, color=INK, loc="left", pad=4)
+        if standing is not None:
+            bodies, _ = outlines(*standing)
+            shown = [placed(world, scale * body) for body in bodies]
+            close_up.add_collection(
+                PolyCollection(shown, facecolor="none", edgecolor=VERMILLION, linewidth=1.4, zorder=5)
+            )
+            handles.append(
+                Patch(facecolor="none", edgecolor=VERMILLION, label="where the vehicle would stand")
+            )
+    handles.append(Patch(facecolor=OCCUPIED, label="occupied"))
     legend_below(figure, handles, 4)
     return figure
 

@@ -57,3 +57,10 @@ def test_where_a_route_ends_too_early_is_in_the_middle_of_a_close_up() -> None:
             assert (shown[:, 0] < place).all()
             assert (place < shown[:, 1]).all()
         np.testing.assert_allclose(shown.mean(axis=1), place)
+
+
+def test_of_a_place_that_is_not_on_the_map_there_is_no_close_up() -> None:
+    world, stops = town(), [Stop((2000.0, 12.0))]
+    stuck = Router(world, searched).route(START, stops)
+    assert isinstance(stuck, Stuck)
+    assert len(stuck_picture(world, START, stops, stuck, 1.0).axes) == 1
