@@ -9,7 +9,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.search.repair import blocked_states
-from planners.world.arrays import Flags, Floats, Integers, Point
+from planners.world.arrays import Flags, Floats, Point
+from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.geometry.collision import Scene
 from planners.world.problem import Arrival, Plan, Problem
 from planners.world.vehicles.bodies import footprints
@@ -24,7 +25,6 @@ from planners.world.vehicles.vehicle import (
 )
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
-_STANDING: Final = 1e-6  # m/s, below which a vehicle stands
 _CLEAR_M: Final = 2.0  # between two footprints of a plan, so that a small picture stays readable
 
 
@@ -109,25 +109,6 @@ def shown_states(plan: Plan, vehicle: Vehicle = CAR) -> Floats:
     rows = np.searchsorted(driven, np.linspace(0.0, driven[-1], count))
     shown: Floats = plan.states[np.minimum(rows, len(driven) - 1)]
     return shown
-
-
-def gears_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
-    """Whether each step ``[T - 1]`` of ``plan`` leads forwards (1) or backwards (-1).
-
-    A step in which ``vehicle`` stands counts to the gear before, or to the first one that follows.
-    """
-    speeds = plan.states[1:, 3] if vehicle.first_order else plan.states[:-1, 3] + plan.states[1:, 3]
-    gears = np.sign(np.where(np.abs(speeds) < _STANDING, 0.0, speeds)).astype(np.int32)
-    moving = np.flatnonzero(gears)
-    if len(moving) == 0:
-        return np.ones_like(gears)
-    last = np.searchsorted(moving, np.arange(len(gears)), side="right") - 1
-    return gears[moving[np.maximum(last, 0)]]
-
-
-def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
-    """The rows of the states at which ``vehicle`` changes gear on ``plan``."""
-    return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
 
 
 def travel_arrows(plan: Plan, vehicle: Vehicle = CAR, apart: float | None = None) -> Floats:

@@ -22,6 +22,7 @@ from planners.search.manoeuvres.suitability import is_tight
 from planners.search.manoeuvres.variants import without_trailers
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.goal import HEADING, X, Y, goal_of
 from planners.world.jit import jit
 from planners.world.problem import Arrival, Plan, Problem, obstacles_of, start_state
@@ -112,23 +113,26 @@ def drive_answer(
         count, quickest, checks = min(TRIED, len(drives.plans)), 0, 0
         order[:count] = blindly.integers(-len(drives.plans), len(drives.plans), count)
     view.lap("recall")
-    found = DriveAnswer(checks=int(checks))
+    found, cost = DriveAnswer(checks=int(checks)), math.inf
     for k in range(0, count, AT_ONCE):
         if working_clock() > until:
             break
         entries = [int(entry) for entry in order[k : min(k + AT_ONCE, count)]]
         guesses = [moved_drive(drives, entry, start, goal, vehicle.dt) for entry in entries]
-        ends = until, math.inf if found.plan is None else found.plan.duration_s
+        ends = until, cost
         chosen, polished = polish_guesses(problem, guesses, vehicle, view.scene, view.workspace, *ends)
         if polished.plan is not None:
             entry = entries[chosen]
             number = int(drives.plans[max(entry, -1 - entry)])
-            found = found._replace(plan=polished.plan, number=number, entry=entry)
-        if found.plan is not None and found.plan.duration_s**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
+            found, cost = (
+                found._replace(plan=polished.plan, number=number, entry=entry),
+                cost_of(polished.plan, vehicle),
+            )
+        if cost**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
             break
     if found.plan is not None:
         without = _seconds_without_obstacles(start, goal, vehicle)
         usual = max(LONG * without, UNUSUAL * quickest * vehicle.dt)
-        found = found._replace(is_long=found.plan.duration_s > usual)
+        found = found._replace(is_long=cost > usual)
     view.lap("repair")
     return found

@@ -28,6 +28,7 @@ from planners.search.query import Limits, Query, usual_limits
 from planners.search.registry import PLANNERS
 from planners.world.arrays import Integers
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.problem import Plan, Problem
 from planners.world.randomness import generator
 from planners.world.vehicles.reach import least_scale
@@ -213,7 +214,7 @@ def _searched(
     if polished:
         given, below_s = found.plan, math.inf
         if found.plan is not None and found.is_polished:
-            given, below_s = None, found.plan.duration_s
+            given, below_s = None, cost_of(found.plan, vehicle)
         searched, rough = search_and_polish(planner, query, seed, given, below_s)
     else:
         searched = PLANNERS[planner](query)
@@ -229,7 +230,7 @@ def _searched(
     plan, helped = searched.plan, helper is not None and helper.has_begun
     if rough is not None and rough is found.plan:
         return _Answer(plan, found.source, Status.SOLVED, work)
-    if plan is not None and (found.plan is None or plan.duration_s < found.plan.duration_s):
+    if plan is not None and (found.plan is None or cost_of(plan, vehicle) < cost_of(found.plan, vehicle)):
         is_repair = searched.joined or (helper is not None and rough is not None and helper.is_repair(rough))
         return _Answer(plan, "repaired" if is_repair else "searched", Status.SOLVED, work, helped)
     status = searched.status if found.plan is None else Status.SOLVED

@@ -76,7 +76,7 @@ def _closed_from(
     """Connect a state of ``r`` to the goal in less than ``most`` steps. Returns them, 0 if none are free."""
     state = load(r.states, row, vehicle)
     store(c.states, 0, state)
-    count = list_connections(c, goal, top, vehicle)
+    count = list_connections(c, state[3], goal, top, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
     radius = radius_at(top, vehicle)
     driven = 0

@@ -15,8 +15,9 @@ from matplotlib.path import Path
 
 from dashboards.figures.marks import draw_travel_arrows
 from dashboards.palette import GREEN, INK, PURPLE, SKY
-from dashboards.world_outlines import cusps_of, gears_of, outlines
+from dashboards.world_outlines import outlines
 from planners.world.arrays import Floats
+from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import CAR, Vehicle
 

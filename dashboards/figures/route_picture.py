@@ -29,13 +29,14 @@ from dashboards.figures.marks import draw_travel_arrows
 from dashboards.figures.pictures import draw_problem
 from dashboards.figures.style import legend_below
 from dashboards.palette import BLUE, INK, ORANGE, VERMILLION
-from dashboards.world_outlines import footprint_spacing_m, gears_of
+from dashboards.world_outlines import footprint_spacing_m
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Floats
+from planners.world.driving_cost import gears_of
 from planners.world.problem import Plan, Problem, obstacles_of
 from planners.world.vehicles.vehicle import CAR, Vehicle
 

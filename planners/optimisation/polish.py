@@ -18,6 +18,7 @@ from planners.optimisation.local_model import NEVER, Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of, extra_steps
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
@@ -84,13 +85,12 @@ def polish_quickest(
     seconds: float = math.inf,
     below_s: float = math.inf,
 ) -> tuple[int, Polished]:
-    """Polish several plans of which only the one that gets quickest is wanted; arguments as of ``polish``.
+    """Polish several plans of which only the one that gets cheapest is wanted; arguments as of ``polish``.
 
-    With ``below_s`` only a plan that takes less time is wanted, and what does not promise to is left as it
-    is.
+    With ``below_s`` only a plan that costs less is wanted, and what does not promise to is left as it is.
 
     Returns:
-        The number of the plan that got quickest, and what it is now.
+        The number of the plan that got cheapest, and what it is now.
     """
     most = most_iterations(problem) if iterations is None else iterations
     around = vehicle, scene, workspace
@@ -101,7 +101,7 @@ def polish_quickest(
     while was_pressed and best.plan is not None and left > 0 and working_clock() < until:
         _, better, was_pressed = _polished_once(problem, [best.plan], *around, left, margin_m, until, below)
         left -= better.iterations
-        is_better = better.plan is not None and better.plan.duration_s < best.plan.duration_s
+        is_better = better.plan is not None and cost_of(better.plan, vehicle) < cost_of(best.plan, vehicle)
         best = Polished(better.plan if is_better else best.plan, best.iterations + better.iterations)
     return number, best
 
@@ -132,6 +132,7 @@ def _polished_once(
     barrier = Barrier(0.0, 0.0, margin_m, _widest_hitch(vehicle), 0.0)
     arriving = problem.arrival not in (None, Arrival())
     used = 0
+    extras = [extra_steps(plan, vehicle) for plan in plans]
     given = [
         (k, states, plan.controls[: len(states) - 1], length)
         for k, (states, plan, length) in enumerate(zip(drives, plans, lengths, strict=True))
@@ -140,18 +141,19 @@ def _polished_once(
         interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
         around = goal, vehicle, scene, barrier
         begun = [Plan(states, controls, vehicle.dt) for _, states, controls, _ in given]
-        number, moved, used = quickest(begun, model, interior, *around, iterations, until, below)
-        shortest = min(given, key=lambda each: each[3])
+        number, moved, used = quickest(begun, model, interior, *around, iterations, until, below, extras)
+        cheapest = min(given, key=lambda each: each[3] + extras[each[0]])
+        least = cheapest[3] + extras[cheapest[0]]
         gains_little = isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order  # by pressing
-        if moved is None and gains_little and below < NEVER and below <= shortest[3]:
+        if moved is None and gains_little and below < NEVER and below <= least:
             return 0, Polished(None, used), False
-        if moved is not None and len(moved.controls) < shortest[3]:
+        if moved is not None and _cost_in_steps(moved, vehicle) < least:
             if gains_little:
                 return number, Polished(moved, used), False
-            given = [(number, moved.states, moved.controls, len(moved.controls)), shortest]
+            given = [(number, moved.states, moved.controls, len(moved.controls)), cheapest]
     lower = shortened if arriving else _descended
     left = iterations - used // len(plans)
-    number, better = given[0][0], None
+    number, better, cost = given[0][0], None, NEVER
     enough = MUCH * min(length for *_, length in given)
     for k, states, controls, length in given:
         steps = len(controls)
@@ -159,9 +161,12 @@ def _polished_once(
         model.controls[:steps] = model.best_controls[:steps] = controls
         least, more = lower(model, steps, length, goal, barrier, vehicle, scene, left, until)
         used += more
-        if least < (NEVER if better is None else len(better.controls)):
-            states, controls = model.best_states[: least + 1].copy(), model.best_controls[:least].copy()
-            number, better = k, Plan(states, controls, vehicle.dt)
+        ends = [] if least == NEVER else [(model.best_states[: least + 1], model.best_controls[:least])]
+        ends += [] if length == NEVER else [(states, controls)]
+        for states, controls in ends:
+            each = Plan(states.copy(), controls.copy(), vehicle.dt)
+            if _cost_in_steps(each, vehicle) < cost:
+                number, better, cost = k, each, _cost_in_steps(each, vehicle)
     was_pressed = arriving and better is not None and len(better.controls) <= enough
     return number, Polished(better, used), was_pressed
 
@@ -176,7 +181,7 @@ def polish_guesses(
     below_s: float = math.inf,
     near: int = NEAR_ITERATIONS,
 ) -> tuple[int, Polished]:
-    """Find the quickest drive near one of several guesses that are nearly optimal, or soon give up.
+    """Find the cheapest drive near one of several guesses that are nearly optimal, or soon give up.
 
     Args:
         problem: what the drive is for; it asks for a pose.
@@ -185,7 +190,7 @@ def polish_guesses(
         scene: ``scene_of(problem)``.
         workspace: the caller's buffers.
         until: when to end, by ``working_clock``.
-        below_s: only a drive that takes less time is wanted.
+        below_s: only a drive that costs less is wanted.
         near: how many iterations each may take while time counts; what is blocked then is given up.
 
     Returns:
@@ -195,7 +200,8 @@ def polish_guesses(
     interior = workspace.buffers(allocate_interior, len(model.controls), state_size(vehicle))
     barrier = Barrier(0.0, 0.0, 0.0, _widest_hitch(vehicle), 0.0)
     around = goal, vehicle, scene, barrier
-    most = GUESS_ITERATIONS, until, _steps_below(below_s, vehicle)
+    extras = [extra_steps(guess, vehicle) for guess in guesses]
+    most = GUESS_ITERATIONS, until, _steps_below(below_s, vehicle), extras
     number, plan, used = quickest(guesses, model, interior, *around, *most, near=near)
     return number, Polished(plan, used)
 
@@ -240,6 +246,10 @@ def driven_near(
 def most_iterations(problem: Problem) -> int:
     """As many iterations as are of use for a problem."""
     return ITERATIONS if problem.arrival is None else ARRIVING_ITERATIONS
+
+
+def _cost_in_steps(plan: Plan, vehicle: Vehicle) -> int:
+    return len(plan.controls) + extra_steps(plan, vehicle)
 
 
 def _steps_below(seconds: float, vehicle: Vehicle) -> int:

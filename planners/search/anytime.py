@@ -11,19 +11,24 @@ long as the one before, as long as there is time for that.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+
 from planners.optimisation.polish import most_iterations, polish_quickest
 from planners.search.guides.guidance import guidance
 from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.suitability import is_tight, meets, suits
+from planners.search.manoeuvres.variants import counting_time
 from planners.search.outcome import Outcome, Status
 from planners.search.query import POSE_EXPANSIONS, Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene, scene_of
 from planners.world.goal import goal_of
 from planners.world.problem import Plan, Problem, start_state
@@ -36,24 +41,25 @@ FURTHER = 2000  # expansions of the first search for other kinds of drives; the 
 TIMES_AS_LONG = 4.0  # the next search: twice as many expansions, in half of the time that is left
 GROWTH = 1.5  # a search that fails may have been too short, so the next one is this much longer ...
 MOST_EXPANSIONS = 10_000_000  # ... up to this, which no search reaches in its time: it holds too few nodes
-LEAST_GAIN = 0.01  # share of the driving time that a new plan must save, when all slack is used up
-FIRST_SLACK = 0.1  # share of the driving time by which a plan may take longer before it is polished
+LEAST_GAIN = 0.01  # share of the cost that a new plan must save, when all slack is used up
+FIRST_SLACK = 0.1  # share of the cost by which a plan may cost more before it is polished
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
-SHORTER = 0.9  # of the driving time of the quickest so far: so long may the next one take ...
+SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cost ...
 AGAIN = 1000  # ... and so many expansions its search at least, ...
 AS_MANY = 8  # ... so many times as many as the first one had, ...
 MOST_AGAIN = 8000  # ... and so many at most
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-POLISHED = 2  # of the shortest plans: which of them is quickest when polished cannot be told before
+POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
 class Improvement(NamedTuple):
-    """One better plan: after how much work it came, and how long it takes to drive."""
+    """One better plan: after how much work it came, how long it takes to drive, and what that costs."""
 
     seconds: float  # since the first search began
     expansions: int
     duration_s: float
+    cost_s: float  # that, and what the vehicle counts beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +67,7 @@ class Improved:
     """The best plan, and how it came about."""
 
     plan: Plan | None
-    history: Sequence[Improvement]  # driving times strictly decrease; it begins with the given plan, if any
+    history: Sequence[Improvement]  # costs strictly decrease; it begins with the given plan, if any
     seconds: float
     collision_checks: int
     expansions: int
@@ -124,7 +130,7 @@ def improve(
     workspace = workspace or Workspace()
     most = math.inf if expansions is None else expansions
     best = given
-    history = [] if given is None else [Improvement(0.0, 0, given.duration_s)]
+    history: list[Improvement] = []
     spent = searches = checks = nodes = 0
     budget, slack = float(FIRST_EXPANSIONS), FIRST_SLACK
     is_given = given is not None
@@ -132,10 +138,11 @@ def improve(
     def keep(plan: Plan) -> bool:
         """Keep a plan if it is the best; say whether it is."""
         nonlocal best
-        if best is not None and plan.duration_s >= best.duration_s:
+        cost = cost_of(plan, vehicle)
+        if history and cost >= history[-1].cost_s:
             return False
         best = plan
-        history.append(Improvement(working_clock() - began, spent, plan.duration_s))
+        history.append(Improvement(working_clock() - began, spent, plan.duration_s, cost))
         return True
 
     def consider(plan: Plan, below_s: float = math.inf) -> bool:
@@ -150,6 +157,7 @@ def improve(
         return keep(better.plan or plan) or kept
 
     if given is not None:
+        history.append(Improvement(0.0, 0, given.duration_s, cost_of(given, vehicle)))
         consider(given)
     kinds = _asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
     looks_for_kinds, took = kinds.others, 0.0
@@ -167,7 +175,7 @@ def improve(
             limits = Limits(
                 expansions=int(min(budget, most - spent)),
                 seconds=min(left, Limits.seconds),
-                bound_s=math.inf if best is None else (1.0 - LEAST_GAIN + slack) * best.duration_s,
+                bound_s=(1.0 - LEAST_GAIN + slack) * history[-1].cost_s if history else math.inf,
             )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
@@ -183,7 +191,7 @@ def improve(
         gained = False
         for plan in (outcome.plan, *(other.plan for other in outcome.others)):
             if plan is not None and plan.controls.tobytes() not in seen:
-                below_s = best.duration_s if query.others and best is not None else math.inf
+                below_s = history[-1].cost_s if query.others and history else math.inf
                 seen.add(plan.controls.tobytes())
                 gained = consider(plan, below_s) or gained
         if gained:
@@ -197,7 +205,9 @@ def improve(
 def search_and_polish(
     planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
 ) -> tuple[Outcome, Plan | None]:
-    """Search for several plans, polish them and keep the quickest.
+    """Search for several plans, polish them and keep the one that costs least.
+
+    Unless time alone counts, that is done once more as if it did, so no answer costs more than that.
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
@@ -209,13 +219,42 @@ def search_and_polish(
         query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
-        below_s: only a plan that takes less time is wanted: the search goes on for as long as that is worth,
-            and what seems to take longer is not polished on.
+        below_s: only a plan that costs less is wanted: the search goes on for as long as that is worth, and
+            what seems to cost more is not polished on.
 
     Returns:
-        The outcome of the search with the plan that drives shortest, polished, or the first without a plan,
+        The outcome of the search with the plan that costs least, polished, or the first without a plan,
         with the work and the time of all; and what that plan was before it was polished.
     """
+    until = working_clock() + query.limits.seconds
+    vehicle = counting_time(query.vehicle)
+    if vehicle == query.vehicle:
+        return _searched_and_polished(planner, query, seed, given, below_s)
+    by_time = replace(query, vehicle=vehicle, rng=copy.deepcopy(query.rng), beside=None)
+    answers = [_searched_and_polished(planner, query, seed, given, below_s)]
+    limits = replace(query.limits, seconds=max(until - working_clock(), 0.0))
+    answers.append(_searched_and_polished(planner, replace(by_time, limits=limits), seed, given, below_s))
+    costs = [cost_of(each.plan, query.vehicle) if each.plan else math.inf for each, _ in answers]
+    best, rough = answers[int(np.argmin(costs))]
+    return _with_work([each for each, _ in answers], best), rough
+
+
+def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
+    """One outcome with the work and the time of all."""
+    return replace(
+        one,
+        collision_checks=sum(each.collision_checks for each in all_of),
+        expansions=sum(each.expansions for each in all_of),
+        nodes=sum(each.nodes for each in all_of),
+        roadmap_seconds=sum(each.roadmap_seconds for each in all_of),
+        search_seconds=sum(each.search_seconds for each in all_of),
+    )
+
+
+def _searched_and_polished(
+    planner: str, query: Query, seed: int, given: Plan | None, below_s: float
+) -> tuple[Outcome, Plan | None]:
+    """As ``search_and_polish``, once."""
     until = working_clock() + query.limits.seconds
     query, vehicle = _asking_for_kinds(planner, query), query.vehicle
     varies = query.others
@@ -228,24 +267,24 @@ def search_and_polish(
     found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
     plan = None if varies else found[0].plan
     again = min(max(AGAIN, AS_MANY * found[0].expansions), MOST_AGAIN)
-    shortest_s = min((each.duration_s for each in (given, found[0].plan) if each is not None), default=0.0)
-    while plan is not None and shortest_s > 0.0:  # it may be at the goal already
+    least_s = min((cost_of(each, vehicle) for each in (given, found[0].plan) if each), default=0.0)
+    while plan is not None and least_s > 0.0:  # it may be at the goal already
         limits = replace(
             query.limits,
             expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
             seconds=until - working_clock(),
-            bound_s=min(SHORTER * shortest_s, query.limits.bound_s),
+            bound_s=min(SHORTER * least_s, query.limits.bound_s),
         )
         if limits.expansions <= 0 or limits.seconds <= 0.0:
             break
         rng = generator(seed, "again", query.problem.id, planner, len(found))
         found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
         plan = found[-1].plan
-        shortest_s = shortest_s if plan is None else plan.duration_s
+        least_s = least_s if plan is None else cost_of(plan, vehicle)
     answers = found if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0), *found]
     solved = [(each, each.plan) for each in answers if each.plan is not None]
-    shortest = sorted(range(len(solved)), key=lambda k: solved[k][1].duration_s)[:POLISHED]
-    solved = [solved[k] for k in sorted(shortest)]  # a given plan first: it stays unless another is quicker
+    cheapest = sorted(range(len(solved)), key=lambda k: cost_of(solved[k][1], vehicle))[:POLISHED]
+    solved = [solved[k] for k in sorted(cheapest)]  # a given plan first: it stays unless another is quicker
     solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
     if not solved:
         return found[0], None
@@ -255,14 +294,4 @@ def search_and_polish(
         below_s=below_s,
     )
     best, rough = solved[number]
-    plan = polished.plan or rough
-    whole = replace(
-        best,
-        plan=plan,
-        collision_checks=sum(each.collision_checks for each in found),
-        expansions=sum(each.expansions for each in found),
-        nodes=sum(each.nodes for each in found),
-        roadmap_seconds=sum(each.roadmap_seconds for each in found),
-        search_seconds=sum(each.search_seconds for each in found),
-    )
-    return whole, rough
+    return _with_work(found, replace(best, plan=polished.plan or rough)), rough

@@ -30,8 +30,9 @@ from planners.search.structures.frontier import (
 )
 from planners.search.structures.time_to_go import Ahead, seconds_to_go
 from planners.world.arrays import Floats
+from planners.world.driving_cost import extra_cost, gear_after
 from planners.world.geometry.collision import Scene, state_is_free
-from planners.world.goal import asks_for_more, metres_to, reaches
+from planners.world.goal import asks_for_more, reaches
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
 from planners.world.vehicles.dynamics import (
@@ -107,11 +108,15 @@ def open_vertex(
     """Let all primitives from a vertex wait. Each is checked for collisions when it is driven."""
     for motion in range(len(SHARES) * lattice.speeds):
         state = load(tree.states, vertex, vehicle)
+        gear, extra = tree.gears[vertex], tree.extras[vertex]
         for _ in range(lattice.steps):
             control_1, control_2 = controls_of(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
+            before = gear
+            gear = gear_after(before, state[3])
+            extra += extra_cost(before, gear, vehicle.dt, vehicle)
         if not was_reached(frontier, _key(state, ahead.go, lattice, vehicle)):
-            spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt
+            spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt + extra
             left = seconds_to_go(state, ahead, lattice.heading_s, lattice.late_s, vehicle)
             push(frontier, spent + lattice.greed * left, vertex, motion)
 
@@ -132,20 +137,20 @@ def begin_lattice(
 def drive_primitive(
     tree: trees.Tree, vertex: int, motion: int, goal: Floats, lattice: Lattice, vehicle: Vehicle, scene: Scene
 ) -> int:
-    """Add the states of a primitive to the tree, and return the last; -1 if one is blocked or too late."""
+    """Add the states of a primitive to the tree, and return the last; -1: blocked, or too costly."""
     counts = tree.counts
     state = load(tree.states, vertex, vehicle)
     parent = vertex
     for _ in range(lattice.steps):
         control_1, control_2 = controls_of(state, motion, lattice, vehicle)
         state = step(state, control_1, control_2, vehicle)
-        depth = tree.depths[parent] + 1
-        if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:
+        if trees.is_beyond(tree, parent, state, goal, vehicle):
             return -1
         counts[trees.CHECKS] += 1
         if not state_is_free(state, vehicle, scene):
             return -1
-        parent = trees.append(tree, parent, 0, state, control_1, control_2, depth)
+        depth = tree.depths[parent] + 1
+        parent = trees.append(tree, parent, 0, state, control_1, control_2, depth, vehicle)
         if reaches(state, goal):
             counts[trees.GOAL_VERTEX] = parent
             break

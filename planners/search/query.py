@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.world.arrays import Floats, Integers
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene
 from planners.world.geometry.occupancy import Bits
 from planners.world.problem import Plan, Problem, start_state
@@ -51,7 +52,7 @@ class Limits:
     expansions: int = 20_000
     nodes: int = 400_000  # tree vertices at once
     seconds: float = 30.0
-    bound_s: float = math.inf  # only plans that take less time than this count as solutions
+    bound_s: float = math.inf  # only plans that cost less than this count as solutions
     further: int = 0  # expansions at least for drives of other kinds after a first to a pose
 
 
@@ -95,5 +96,5 @@ def after_prefix(query: Query) -> Query:
         return query
     x, y, heading, *motion = query.prefix.states[-1].tolist()
     problem = replace(query.problem, start=(x, y, heading), start_motion=tuple(motion))
-    limits = replace(query.limits, bound_s=query.limits.bound_s - query.prefix.duration_s)
+    limits = replace(query.limits, bound_s=query.limits.bound_s - cost_of(query.prefix, query.vehicle))
     return replace(query, problem=problem, limits=limits, prefix=None)

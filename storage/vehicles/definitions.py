@@ -18,6 +18,7 @@ from planners.world.vehicles.vehicle import (
     Car,
     CarWithTrailers,
     Corners,
+    Costs,
     DifferentialDrive,
     Trailer,
     Vehicle,
@@ -29,7 +30,8 @@ from storage.vehicles.bodies_of_files import corners_in_file, outline_of
 from storage.vehicles.sizes import check_sizes, scale_for
 from storage.yaml_text import yaml_number
 
-FIELDS: Final = ("name", "kind", "body", "wheelbase", "trailers", "limits", "step")
+FIELDS: Final = ("name", "kind", "body", "wheelbase", "trailers", "limits", "costs", "step")
+_MAY_LACK: Final = ("trailers", "costs")
 _TRAILER: Final = ("hitch_length", "body", "max_hitch")
 _LIMITS: Final = {  # of each kind
     "car": ("speed", "acceleration", "steering", "steering_rate"),
@@ -56,6 +58,12 @@ _RANGES: Final = {  # up to, unit
     "step": (1.0, "s"),
 }
 _FASTEST: Final = 100.0  # m/s
+_COSTS: Final = {  # least, what the most of each is
+    "gear_change": (0.0, "0 to 100 s"),
+    "forwards": (1.0, "1 to 100 times a second"),
+    "backwards": (1.0, "1 to 100 times a second"),
+}
+_DEAREST: Final = 100.0
 _NAME: Final = re.compile(r"[a-z0-9](-?[a-z0-9]){0,39}")
 FIRST_ORDER: Final = "-first-order"
 
@@ -70,7 +78,7 @@ def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
     if not isinstance(kind, str) or kind not in _LIMITS:
         raise ValueError(f"has the kind {short(kind)}; known are {', '.join(_LIMITS)}")
     is_car = kind.startswith("car")
-    wanted = [name for name in FIELDS if name not in (("trailers",) if is_car else ("trailers", "wheelbase"))]
+    wanted = [name for name in FIELDS if name not in _MAY_LACK and (is_car or name != "wheelbase")]
     _check_complete(fields, wanted, "")
     if not is_car:
         for name in ("wheelbase", "trailers"):
@@ -93,7 +101,8 @@ def vehicle_of(fields: Mapping[str, Any]) -> Vehicle:
         "max_acceleration": limits.get("acceleration", (most - least) / step),
         "max_lateral_acceleration": limits.get("lateral_acceleration", math.inf),
     }  # fmt: skip
-    same: dict[str, Any] = {"dt": step, "first_order": first_order}
+    costs = _costs(fields["costs"]) if fields.get("costs") is not None else Costs()
+    same: dict[str, Any] = {"dt": step, "first_order": first_order, "costs": costs}
     if is_car:
         real["wheelbase"] = wheelbase
         same |= {"max_steering": turning, "max_steering_rate": change}
@@ -135,14 +144,19 @@ def definition_of(vehicle: Vehicle) -> dict[str, Any]:
             }
             for trailer in trailers_of(vehicle)
         ]
-    return definition | {"limits": limits | turning, "step": vehicle.dt}
+    definition |= {"limits": limits | turning}
+    changed = {name: cost for name, cost in vehicle.costs._asdict().items() if cost != getattr(Costs(), name)}
+    return definition | ({"costs": changed} if changed else {}) | {"step": vehicle.dt}
 
 
 def first_difference(one: object, other: object, where: str = "") -> str:
-    """The first difference between two definitions; empty if they differ at most in the name."""
+    """The first difference between two definitions; empty if plans of one are plans of the other.
+
+    Then they differ at most in the name and in what their drives cost.
+    """
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         for name in [*one, *(name for name in other if name not in one)]:
-            if where or name != "name":
+            if where or name not in ("name", "costs"):
                 path = f"{where}.{name}" if where else name
                 if (name in one) != (name in other):
                     return f"{path} is given only {'there' if name in one else 'here'}"
@@ -221,6 +235,18 @@ def _limits(fields: object, kind: str) -> dict[str, Any]:
     given = [name for name in known if name != "speed" and name in fields]
     others = {name: _ranged(fields[name], name, "limits.") for name in given}
     return {"speed": (least, most), **others}
+
+
+def _costs(fields: object) -> Costs:
+    if not isinstance(fields, Mapping):
+        raise ValueError(f"has costs {short(fields)}; expected fields {', '.join(_COSTS)}")
+    check_fields([f"costs.{name}" for name in fields], [f"costs.{name}" for name in _COSTS])
+    costs = {name: yaml_number(fields[name], f"costs.{name}") for name in fields}
+    for name, cost in costs.items():
+        least, expected = _COSTS[name]
+        if not least <= cost <= _DEAREST:
+            raise ValueError(f"has costs.{name} {cost:g}; expected {expected}")
+    return Costs(**costs)
 
 
 def _list_of_trailers(trailers: object) -> list[Any]:

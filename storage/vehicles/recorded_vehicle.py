@@ -62,7 +62,7 @@ def vehicle_recorded(made_for: object) -> Vehicle | None:
 
 def _once_recorded(vehicle: Vehicle) -> dict[str, Any]:
     """The record that earlier versions, which only knew the built-in vehicles, made of one."""
-    later = ("max_lateral_acceleration", "first_order", "scale", "about", "trailers")
+    later = ("max_lateral_acceleration", "first_order", "scale", "costs", "about", "trailers")
     fields = {name: value for name, value in vehicle._asdict().items() if name not in later}
     if isinstance(vehicle, CarWithTrailers):
         first = trailers_of(vehicle)[0]

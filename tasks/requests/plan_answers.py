@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dashboards.world_outlines import cusps_of
 from planners.search.free_goal import lacks_room
 from planners.search.outcome import MEANINGS, Status
 from planners.world.alignment import to_canonical
+from planners.world.driving_cost import cusps_of
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle

@@ -41,7 +41,7 @@ def _connect_all(
     for i in range(starts.shape[0]):
         for k in range(starts.shape[1]):
             c.states[0, k] = starts[i, k]
-        count = list_connections(c, goals[i], top, vehicle)
+        count = list_connections(c, 0.0, goals[i], top, vehicle)
         steps[i] = 0
         for _ in range(WORDS):
             word = next_word(c, count, math.inf)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from dashboards.world_outlines import cusps_of
 from planners.attempt import Attempt
 from planners.memory.library.plan_library import PlanLibrary
 from planners.optimisation.optimise import DEFAULT_SETTINGS, optimise
 from planners.solve import solve
 from planners.world.alignment import from_canonical, to_canonical
 from planners.world.authority.authority import faults
+from planners.world.driving_cost import cusps_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from planners.world.workspace import Workspace

@@ -21,6 +21,7 @@ from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import extra_steps
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
 from planners.world.problem import Plan
@@ -84,10 +85,11 @@ def quickest(
     iterations: int,
     until: float,
     below: int,
+    extras: Sequence[int],
     *,
     near: int = 0,
 ) -> tuple[int, Plan | None, int]:
-    """Find the quickest drive near the way of another one, or of several.
+    """Find the quickest drive near the way of another one, or the cheapest near those of several.
 
     Args:
         given: drives, or guesses whose steps need not lead from state to state. They may be blocked, and all
@@ -100,7 +102,8 @@ def quickest(
         barrier: its margin and hitch count.
         iterations: at most, for each way.
         until: when to end, by ``working_clock``.
-        below: only a drive of less steps is wanted.
+        below: only a drive that costs less steps is wanted.
+        extras: what each costs beside its time, in steps.
         near: 0, or for guesses that are nearly optimal how many iterations each may take while time counts:
             then it begins with their speeds, and there is one attempt.
 
@@ -114,14 +117,15 @@ def quickest(
     drive = Drive(model, interior, goal, goal, scene, circles_around(scene), soft, (hold,), until)
     most = iterations * len(given)
     if near > 0:
-        number, best, used = _found(given, drive, vehicle, _near(near), most, below)
+        number, best, used = _found(given, drive, vehicle, _near(near), most, below, extras)
     else:
         guesses = [retimed(plan.states, vehicle) for plan in given]
-        number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below)
+        number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below, extras)
     drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
-        again, below = [retimed(best.states, vehicle)], len(best.controls)
-        _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below)
+        again, extra = [retimed(best.states, vehicle)], extra_steps(best, vehicle)
+        below = len(best.controls) + extra
+        _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below, [extra])
         used += more
         if quicker is None:
             break
@@ -135,18 +139,19 @@ def _found(
     vehicle: Vehicle,
     effort: Effort,
     most: int,
-    shorter_than: int,
+    cheaper_than: int,
+    extras: Sequence[int],
 ) -> tuple[int, Plan | None, int]:
     """As ``quickest``, near ``given`` drives, in some attempts and ``most`` iterations in all.
 
-    Only a drive of less than ``shorter_than`` steps will do, and after one attempt it has to promise much
-    less.
+    Only a drive that costs less than ``cheaper_than`` steps will do, and after one attempt it has to promise
+    much less.
     """
     model = around.model
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used = 0
-    number, best = -1, None
+    number, best, cost = -1, None, 0
     for attempt in effort.attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
@@ -159,17 +164,18 @@ def _found(
             if share_blocked(guesses[k].states, vehicle, drive.scene) > effort.most_blocked:
                 del guesses[k]
         left = {}
-        for k in sorted(guesses, key=lambda k: guesses[k].duration_s):
-            below = shorter_than if best is None else len(best.controls)
-            found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below, most - used)
+        costs = {k: guess.duration_s + extras[k] * vehicle.dt for k, guess in guesses.items()}
+        for k in sorted(guesses, key=lambda k: costs[k]):
+            below = cheaper_than if best is None else cost
+            found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below - extras[k], most - used)
             used += spent
-            if found is not None:
-                number, best = k, found
+            if found is not None and len(found.controls) + extra_steps(found, vehicle) < below:
+                number, best, cost = k, found, len(found.controls) + extra_steps(found, vehicle)
             else:
                 left[k] = guesses[k]
-        promising = PROMISING * shorter_than * vehicle.dt
-        longest = promising if best is None else best.duration_s - vehicle.dt
-        guesses = {k: guess for k, guess in left.items() if guess.duration_s < longest}
+        promising = PROMISING * cheaper_than * vehicle.dt
+        most_s = promising if best is None else (cost - 1) * vehicle.dt
+        guesses = {k: guess for k, guess in left.items() if costs[k] < most_s}
         if not guesses or used >= most or working_clock() > drive.until:
             break
     return number, best, used

@@ -1,4 +1,4 @@
-"""The words by which a state may be connected to a goal, the quickest first."""
+"""The words by which a state may be connected to a goal, the cheapest first."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from planners.search.connection.dubins import list_forward_words
 from planners.search.connection.profile import run_seconds
 from planners.search.connection.words import PARTS, list_words
 from planners.world.arrays import Floats, Pose
+from planners.world.driving_cost import cost_of_second, extra_cost
 from planners.world.goal import X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos, wrapped
@@ -26,9 +27,19 @@ from planners.world.vehicles.vehicle import Vehicle
 
 @lean
 def word_seconds(
-    word: Floats, radius: float, lead: float, speed: float, goal: Floats, top: float, vehicle: Vehicle
+    word: Floats,
+    radius: float,
+    lead: float,
+    before: float,
+    speed: float,
+    goal: Floats,
+    top: float,
+    vehicle: Vehicle,
 ) -> float:
-    """How long a word takes to drive, in seconds; infinite if the speed at its ends does not allow it."""
+    """What a word costs to drive, in seconds; infinite if the speed at its ends does not allow it.
+
+    ``before`` is above 0 if the vehicle has driven forwards so far, below 0 if backwards, 0 if not at all.
+    """
     acceleration = control_limits(vehicle)[0]
     straight = straight_speed(top, vehicle)
     seconds = 0.0
@@ -60,10 +71,12 @@ def word_seconds(
             end = min(last_speed(gear, begin, metres, goal, acceleration), fastest)
             if end < 0.0:
                 return math.inf
-        seconds += run_seconds(metres, begin, end, fastest, acceleration)
+        run = run_seconds(metres, begin, end, fastest, acceleration)
+        seconds += run + extra_cost(before, gear, run, vehicle)
+        before = gear
         if top < fastest:  # about as much longer as arcs take
             reached = min(fastest, math.sqrt(acceleration * metres + 0.5 * (begin * begin + end * end)))
-            seconds += bent * max(1.0 / top - 1.0 / reached, 0.0)
+            seconds += cost_of_second(gear, vehicle) * bent * max(1.0 / top - 1.0 / reached, 0.0)
     return seconds
 
 
@@ -96,17 +109,18 @@ def list_forward_words_between(start: Pose, end: Pose, radius: float, words: Flo
 
 
 @lean
-def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) -> int:
+def list_connections(c: Connection, before: float, goal: Floats, top: float, vehicle: Vehicle) -> int:
     """List the words that may lead from ``c.states[0]`` to a goal.
 
     Args:
         c: buffers, the first state filled in.
+        before: above 0 if the vehicle has driven forwards so far, below 0 if backwards, 0 if not at all.
         goal: that of ``goal_of``.
         top: the largest speed in m/s. Who drives more slowly may turn more sharply.
         vehicle: what is driven.
 
     Returns:
-        How many words there are in ``c.words``. ``c.seconds`` estimates how long each takes.
+        How many words there are in ``c.words``. ``c.seconds`` estimates what each costs.
     """
     state = load(c.states, 0, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
@@ -115,13 +129,13 @@ def list_connections(c: Connection, goal: Floats, top: float, vehicle: Vehicle) 
     count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
     lead = lead_of(state, top, vehicle)
     for i in range(count):
-        c.seconds[i] = word_seconds(c.words[i], radius, lead, state[3], goal, top, vehicle)
+        c.seconds[i] = word_seconds(c.words[i], radius, lead, before, state[3], goal, top, vehicle)
     return count
 
 
 @inlined
 def next_word(c: Connection, count: int, within_s: float) -> int:
-    """Take the quickest of the first ``count`` words; -1 if all that are left take ``within_s`` or more."""
+    """Take the cheapest of the first ``count`` words; -1 if all that are left cost ``within_s`` or more."""
     best = -1
     least = within_s
     for i in range(count):

@@ -37,7 +37,7 @@ class Connection(NamedTuple):
     speeds: Floats  # [STEPS + 1] m/s
     limits: Floats  # [PLACES + 1] m/s, at places equally far from one another along a run
     words: Floats  # [MOST_WORDS, 2 PARTS]
-    seconds: Floats  # [MOST_WORDS] an estimate for each word
+    seconds: Floats  # [MOST_WORDS] what each word costs, by an estimate
     parts: Floats  # [4, PARTS] gear (1 or -1); bend; length in metres; when the part ends, in seconds
     ramps: Floats  # [PARTS, 3] from a bend to the next: the change; when it is half done (s); 1 / duration
     effects: Floats  # [3, PARTS] how the end's x, y and heading change with each part's length

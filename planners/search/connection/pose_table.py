@@ -39,7 +39,7 @@ def _fill(table: Floats, c: Connection, goal: Floats, vehicle: Vehicle) -> None:
                 c.states[0, 1] = row * CELL - REACH_M
                 c.states[0, 2] = h * (2.0 * math.pi / HEADINGS)
                 least = NEVER
-                for i in range(list_connections(c, goal, turning_speed(vehicle), vehicle)):
+                for i in range(list_connections(c, 0.0, goal, turning_speed(vehicle), vehicle)):
                     least = min(least, c.seconds[i])
                 table[h, row, column] = least
 

@@ -16,6 +16,7 @@ from planners.search.manoeuvres.pose_tree import PoseTree, list_links
 from planners.search.query import Endings
 from planners.search.structures import tree as trees
 from planners.world.arrays import Floats
+from planners.world.driving_cost import extra_along
 from planners.world.geometry.collision import Scene
 from planners.world.goal import reaches
 from planners.world.jit import lean
@@ -148,14 +149,16 @@ def _drive_in(
 
 @lean
 def add_to_tree(drive: Drive, tree: trees.Tree, states: Floats, controls: Floats, vehicle: Vehicle) -> bool:
-    """Add a drive to the goal to the root of a tree, unless it takes too long or has no room.
+    """Add a drive to the goal to the root of a tree, unless it costs too much or has no room.
 
     What is driven before it, over ``states [n + 1, S]`` by ``controls [n, 2]``, comes first.
     """
     length = drive.counts[0]
     steps = controls.shape[0] + length
     counts = tree.counts
-    if steps * vehicle.dt >= tree.bound[0] or counts[trees.SIZE] + steps > tree.states.shape[0]:
+    extra = extra_along(states, 0.0, vehicle)
+    extra += extra_along(drive.states[: length + 1], states[-1, 3], vehicle)
+    if steps * vehicle.dt + extra >= tree.bound[0] or counts[trees.SIZE] + steps > tree.states.shape[0]:
         return False
     last = trees.add_drive(tree, 0, states[1:], controls, vehicle)
     last = trees.add_drive(tree, last, drive.states[1 : length + 1], drive.controls[:length], vehicle)

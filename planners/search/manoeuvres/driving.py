@@ -16,9 +16,11 @@ from planners.search.manoeuvres.near_meetings import NearMeetings, allocate_near
 from planners.search.manoeuvres.pace import fill_pace
 from planners.search.manoeuvres.ways import Ways, allocate_ways
 from planners.world.arrays import Floats, Indices
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import SLACK
 from planners.world.jit import inlined, lean
+from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import (
     admissible,
     control_limits,
@@ -130,6 +132,12 @@ def turn_wheels(drive: Drive, bend: float, vehicle: Vehicle) -> int:
         state = step(state, 0.0, second, vehicle)
         store(c.states, i + 1, state)
     return steps
+
+
+def cost_of_drive(drive: Drive, vehicle: Vehicle) -> float:
+    """What the drive costs that the buffers hold, in seconds."""
+    steps = int(drive.counts[0])
+    return cost_of(Plan(drive.states[: steps + 1], drive.controls[:steps], vehicle.dt), vehicle)
 
 
 @inlined

@@ -10,6 +10,7 @@ import numpy as np
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, add_known_node
 from planners.search.query import Endings
 from planners.world.arrays import Floats, Indices, Integers
+from planners.world.driving_cost import extra_cost
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
@@ -117,8 +118,10 @@ def add_endings(tree: PoseTree, endings: Endings, nodes: Integers, vehicle: Vehi
             metres = 0.0
             for j in range(first, endings.starts[k + 1] - 1):
                 metres -= 0.5 * vehicle.dt * (endings.states[j, 3] + endings.states[j + 1, 3])
-            seconds = tree.seconds[parent] + vehicle.dt * (endings.starts[k + 1] - 1 - first)
+            seconds = vehicle.dt * (endings.starts[k + 1] - 1 - first)
+            extra = tree.extras[parent] + extra_cost(-tree.metres[parent], -metres, seconds, vehicle)
+            seconds = tree.seconds[parent] + seconds
             bend = endings.states[first, 4]
             nodes[k] = add_known_node(
-                tree, parent, _placed(endings, first, tree, vehicle), bend, metres, seconds, k
+                tree, parent, _placed(endings, first, tree, vehicle), bend, metres, seconds, extra, k
             )

@@ -16,7 +16,7 @@ import numpy as np
 from planners.search.connection.candidates import list_forward_words_between
 from planners.search.connection.words import MOST_WORDS, PARTS
 from planners.search.manoeuvres.arcs import COARSE, at_pace, lay_arc, stride_of
-from planners.search.manoeuvres.driving import Drive
+from planners.search.manoeuvres.driving import Drive, cost_of_drive
 from planners.search.manoeuvres.mending import drive_one_of
 from planners.search.manoeuvres.ways import take_arcs
 from planners.search.query import Query
@@ -238,5 +238,5 @@ def loop(
     k = numbers[number]
     curvatures = np.array([curvature_of(bend, vehicle) for bend in loops.bends[k]])
     take_arcs(drive.ways, loops.metres[k], loops.metres[k] * curvatures)
-    drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
+    drive.ways.last_seconds[0] = cost_of_drive(drive, vehicle)
     return True

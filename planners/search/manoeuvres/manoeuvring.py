@@ -22,6 +22,7 @@ from planners.search.manoeuvres.shots import FromStart
 from planners.search.manoeuvres.suitability import TIGHT, is_tight, meets
 from planners.search.manoeuvres.variants import (
     at_its_slowest,
+    counting_time,
     less_folded,
     slimmer,
     time_reversed,
@@ -93,7 +94,8 @@ class Manoeuvring:
             self._drive.target[[LEAST_SPEED, MOST_SPEED]] = speeds
         go = query.workspace.buffers(allocate_way_from_start, len(self._before.controls) > 0)
         fill_cost_to_go(occupied, *query.problem.start[:2], AROUND_START_M, window, go)
-        known = seconds_to_pose(without_trailers(vehicle)), no_endings(size), word_radius(vehicle), goal[:2]
+        table = seconds_to_pose(without_trailers(counting_time(vehicle)))
+        known = table, no_endings(size), word_radius(vehicle), goal[:2]
         self._known = FromStart(start, go, *known, outward=True)
         to_goal = query.workspace.buffers(allocate_cost_to_go)
         self._known_there = FromStart(pose_of(goal, size)[np.newaxis], to_goal, *known, outward=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.polish import NEAR_ITERATIONS, polish_guesses
-from planners.search.manoeuvres.driving import Drive
+from planners.search.manoeuvres.driving import Drive, cost_of_drive
 from planners.search.manoeuvres.near_meetings import SIZE, lay_way
 from planners.search.manoeuvres.pose_tree import PoseTree
 from planners.search.manoeuvres.ways import last_is_worth, meeting_is_worth
@@ -50,7 +50,7 @@ def mend(
     if number < 0:
         return False
     meeting_is_worth(drive.ways, *pairs[number], vehicle)  # the last that was looked at is what is kept
-    drive.ways.last_seconds[0] = drive.counts[0] * vehicle.dt
+    drive.ways.last_seconds[0] = cost_of_drive(drive, vehicle)
     return last_is_worth(drive.ways)
 
 

@@ -34,7 +34,7 @@ from planners.world.arrays import Floats, Integers, Pose
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import sincos
-from planners.world.vehicles.dynamics import State, load, tightest_bend, top_speed, turning_speed
+from planners.world.vehicles.dynamics import State, load, tightest_bend, turning_speed
 from planners.world.vehicles.vehicle import CarWithTrailers, Vehicle
 
 KNOWN: Final = 0.2  # of the time of a known ending counts, so that it is tried before what is not known
@@ -221,10 +221,10 @@ def _wait(
         tree.frontier, cell_of(state, metres, tree, cell, settings.headings, vehicle)
     ):
         return
-    seconds = seconds_after(tree, node, bend, metres, top_speed(metres, bend, outgoing), vehicle)
+    seconds, extra = seconds_after(tree, node, bend, metres, outgoing, vehicle)
     left = _seconds_from_start(state, known, settings, vehicle)
     estimate = seconds + settings.greed * left
-    new = add_node(tree, node, state, bend, metres, seconds)
+    new = add_node(tree, node, state, bend, metres, seconds, extra)
     if len(state) > 5:  # decided when compiling
         mark_place(tree, new, known.origin, vehicle)
         near = node_near(other, state, known.origin, vehicle)
@@ -265,7 +265,7 @@ def grow_outward(
         key = cell_of(state, tree.metres[node], tree, cell, settings.headings, vehicle)
         if was_reached(tree.frontier, key):
             continue
-        least = tree.seconds[node] + _least_seconds_from_start(state, known, vehicle)
+        least = tree.seconds[node] + tree.extras[node] + _least_seconds_from_start(state, known, vehicle)
         if least >= slowest_kept(drive.ways):
             continue  # no way over it is worth driving
         reach(tree.frontier, key)

@@ -10,10 +10,19 @@ import numpy as np
 from planners.search.connection.profile import run_seconds
 from planners.search.structures.frontier import Frontier, allocate_frontier, clear_frontier, push
 from planners.world.arrays import Floats, Indices, Integers
+from planners.world.driving_cost import extra_cost
 from planners.world.goal import HEADING, HITCHES, X, Y
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
-from planners.world.vehicles.dynamics import State, bend_rate, control_limits, load, store, turn_limit
+from planners.world.vehicles.dynamics import (
+    State,
+    bend_rate,
+    control_limits,
+    load,
+    store,
+    top_speed,
+    turn_limit,
+)
 from planners.world.vehicles.vehicle import Vehicle
 
 NODES: Final = 1 << 17
@@ -41,6 +50,7 @@ class PoseTree(NamedTuple):
     metres: Floats  # [NODES] and its length; negative if it leads backwards out, so forwards in
     runs: Floats  # [NODES] metres that are driven in the gear of that arc until it changes
     seconds: Floats  # [NODES] estimated driving time from the node to the goal
+    extras: Floats  # [NODES] what that drive costs beside its time, in seconds
     known: Indices  # [NODES] the part of the known endings that leads to the parent; -1: an arc
     places: Integers  # [PLACES] a node in the place that falls into this slot; -1: none
     opened: Integers  # [REGIONS] how many nodes of the region that falls into this slot were opened
@@ -54,6 +64,7 @@ def allocate_pose_tree(state_size: int) -> PoseTree:
     return PoseTree(
         np.zeros((NODES, state_size)),
         np.zeros(NODES, np.int64),
+        np.zeros(NODES),
         np.zeros(NODES),
         np.zeros(NODES),
         np.zeros(NODES),
@@ -92,6 +103,7 @@ def plant_root(tree: PoseTree, root: Floats) -> None:
     tree.metres[0] = 0.0
     tree.runs[0] = 0.0
     tree.seconds[0] = 0.0
+    tree.extras[0] = 0.0
     tree.known[0] = 0  # the root is no end of an arc
 
 
@@ -120,26 +132,32 @@ def seconds_of_run(metres: float, top: float, vehicle: Vehicle) -> float:
 
 @inlined
 def seconds_after(
-    tree: PoseTree, node: int, bend: float, metres: float, top: float, vehicle: Vehicle
-) -> float:
-    """The time to the goal from the end of an arc out of a node, in seconds; ``metres`` as in the tree.
+    tree: PoseTree, node: int, bend: float, metres: float, outgoing: Vehicle, vehicle: Vehicle
+) -> tuple[float, float]:
+    """The time to the goal from the end of an arc out of a node, and what it costs beside that, in seconds.
 
-    ``top`` is the largest speed on the arc, in m/s.
+    ``metres`` and ``outgoing`` are as in the tree: the vehicle as it drives out of the root.
     """
+    top = top_speed(metres, bend, outgoing)
     turning = abs(bend - tree.bends[node]) / bend_rate(vehicle.max_speed, vehicle)
     turning = min(turning, 2.0 * turn_limit(vehicle) / control_limits(vehicle)[1])  # in tight bends
     seconds = tree.seconds[node]
     if tree.metres[node] * metres > 0.0:
         run = tree.runs[node]
-        seconds += seconds_of_run(run + abs(metres), top, vehicle) - seconds_of_run(run, top, vehicle)
+        driving = seconds_of_run(run + abs(metres), top, vehicle) - seconds_of_run(run, top, vehicle)
+        seconds += driving
         seconds += ROLLING * turning
     else:
-        seconds += seconds_of_run(abs(metres), top, vehicle) + (turning if node > 0 else 0.0)
-    return float(seconds)
+        driving = seconds_of_run(abs(metres), top, vehicle)
+        seconds += driving + (turning if node > 0 else 0.0)
+    extra = extra_cost(tree.metres[node], metres, driving, outgoing)
+    return float(seconds), float(tree.extras[node] + extra)
 
 
 @inlined
-def add_node(tree: PoseTree, parent: int, state: State, bend: float, metres: float, seconds: float) -> int:
+def add_node(
+    tree: PoseTree, parent: int, state: State, bend: float, metres: float, seconds: float, extra: float
+) -> int:
     """Add the end of an arc out of a node, and return its number. The tree must have room."""
     new = tree.counts[SIZE]
     tree.counts[SIZE] += 1
@@ -150,6 +168,7 @@ def add_node(tree: PoseTree, parent: int, state: State, bend: float, metres: flo
     tree.bends[new] = bend
     tree.metres[new] = metres
     tree.seconds[new] = seconds
+    tree.extras[new] = extra
     tree.known[new] = -1
     tree.crowds[new] = 0
     same = tree.metres[parent] * metres > 0.0
@@ -159,10 +178,17 @@ def add_node(tree: PoseTree, parent: int, state: State, bend: float, metres: flo
 
 @inlined
 def add_known_node(
-    tree: PoseTree, parent: int, state: State, bend: float, metres: float, seconds: float, part: int
+    tree: PoseTree,
+    parent: int,
+    state: State,
+    bend: float,
+    metres: float,
+    seconds: float,
+    extra: float,
+    part: int,
 ) -> int:
     """Add the beginning of a part of the known endings, as ``add_node`` does."""
-    new = add_node(tree, parent, state, bend, metres, seconds)
+    new = add_node(tree, parent, state, bend, metres, seconds, extra)
     tree.known[new] = part
     return new
 

@@ -95,7 +95,7 @@ def _shoot_alone(
     target[3] = tree.states[node, 2]
     top = turning_speed(vehicle)
     radius = radius_at(top, vehicle)
-    count = list_connections(c, target, top, vehicle)
+    count = list_connections(c, before.metres[last], target, top, vehicle)
     for _ in range(OUTLINES):
         word = next_word(c, count, math.inf)
         if word < 0:
@@ -132,7 +132,7 @@ def _shoot_with_trailers(
     count = list_words_between((x, y, heading), there, radius, c.words, vehicle)
     for i in range(count):
         c.seconds[i] = word_seconds(
-            c.words[i], radius, 0.0, 0.0, drive.target, turning_speed(vehicle), vehicle
+            c.words[i], radius, 0.0, 0.0, 0.0, drive.target, turning_speed(vehicle), vehicle
         )
     for k in range(tree.states.shape[1]):
         drive.join.ends[1, k] = tree.states[node, k]

@@ -16,6 +16,7 @@ from planners.optimisation.polish import polish_guesses
 from planners.search.manoeuvres.manoeuvring import Manoeuvring
 from planners.search.query import Query
 from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
 from planners.world.problem import Plan
 
 SHARES: Final = (0.1, 0.06, 0.04, 0.14)  # of its width by which a body is slimmer on each side, in turn
@@ -27,7 +28,7 @@ FURTHER: Final = 1000  # ... and for drives of other kinds
 class Squeezed(NamedTuple):
     """What came of it."""
 
-    plan: Plan | None  # the quickest
+    plan: Plan | None  # the cheapest
     expansions: int
     checks: int
 
@@ -52,7 +53,7 @@ def squeeze(query: Query, manoeuvring: Manoeuvring, within: int, until: float) -
         guesses = [other.plan for other in search.kept]
         if guesses and working_clock() < until:
             around = query.vehicle, query.scene, query.workspace
-            below_s = math.inf if best is None else best.duration_s
+            below_s = math.inf if best is None else cost_of(best, query.vehicle)
             _, found = polish_guesses(query.problem, guesses, *around, until, below_s)
             best = found.plan or best
     return Squeezed(best, expansions, checks)

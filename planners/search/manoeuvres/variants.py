@@ -11,6 +11,7 @@ from planners.world.vehicles.dynamics import turning_speed
 from planners.world.vehicles.vehicle import (
     Car,
     CarWithTrailers,
+    Costs,
     Trailer,
     Vehicle,
     trailers_of,
@@ -23,7 +24,8 @@ SLOWLY: Final = 1.1  # times the least speed of what cannot stand, so that arcs 
 
 def time_reversed(vehicle: Vehicle) -> Vehicle:
     """The vehicle with time reversed: a drive of it out of a goal is one into it."""
-    return vehicle._replace(min_speed=-vehicle.max_speed, max_speed=-vehicle.min_speed)
+    costs = vehicle.costs._replace(forwards=vehicle.costs.backwards, backwards=vehicle.costs.forwards)
+    return vehicle._replace(min_speed=-vehicle.max_speed, max_speed=-vehicle.min_speed, costs=costs)
 
 
 def at_its_slowest(vehicle: Vehicle) -> Vehicle:
@@ -45,6 +47,11 @@ def less_folded(vehicle: Vehicle, ends: Floats) -> Vehicle:
         for each, least in zip(vehicle.trailers, ends, strict=True)
     )
     return vehicle._replace(trailers=tuple(trailers))
+
+
+def counting_time(vehicle: Vehicle) -> Vehicle:
+    """The vehicle whose drives cost nothing beside their time."""
+    return vehicle._replace(costs=Costs())
 
 
 def slimmer(vehicle: Vehicle, share: float) -> Vehicle:

@@ -1,4 +1,4 @@
-"""Which drives of a search are worth driving: of each kind the one estimated quickest, of some kinds.
+"""Which drives of a search are worth driving: of each kind the one estimated cheapest, of some kinds.
 
 The first drive that a search finds is seldom of the kind that is quickest when it is improved. Of what kind a
 drive is, its gears and turns say; improving it changes places and times, but not these.
@@ -13,6 +13,7 @@ import numpy as np
 from planners.search.connection.words import PARTS
 from planners.search.manoeuvres.pose_tree import PoseTree, seconds_of_run
 from planners.world.arrays import Floats, Indices
+from planners.world.driving_cost import cost_of_second
 from planners.world.jit import inlined, lean
 from planners.world.trigonometry import wrapped
 from planners.world.vehicles.dynamics import top_speed
@@ -26,7 +27,7 @@ MOST_LEGS: Final = 512
 class Ways(NamedTuple):
     """The drives that a search has found, one of a kind."""
 
-    seconds: Floats  # [KEPT] estimated driving times; infinite: none
+    seconds: Floats  # [KEPT] what they cost, by an estimate; infinite: none
     kinds: Indices  # [KEPT]
     legs: Floats  # [MOST_LEGS, 2] scratch: gear (1 or -1), by how many radians it turns
     counts: Indices  # [1] how many legs there are
@@ -109,15 +110,18 @@ def _kind(ways: Ways) -> int:
 
 @inlined
 def _run(metres: float, gear: float, vehicle: Vehicle) -> float:
-    return seconds_of_run(metres, top_speed(gear, 0.0, vehicle), vehicle)
+    """What a run costs, in seconds."""
+    return cost_of_second(gear, vehicle) * seconds_of_run(metres, top_speed(gear, 0.0, vehicle), vehicle)
 
 
 @inlined
 def _joined_seconds(
     tree: PoseTree, node: int, metres: float, gear: float, seconds: float, vehicle: Vehicle
 ) -> float:
-    """The time of a way that comes to a node of a goal tree in ``seconds``, its last run ``metres`` long."""
-    whole = seconds + tree.seconds[node]
+    """What a way costs that comes to a node of a goal tree for ``seconds``, its last run ``metres`` long."""
+    whole = seconds + tree.seconds[node] + tree.extras[node]
+    if node > 0 and gear * tree.metres[node] > 0.0:
+        whole += vehicle.costs.gear_change
     if node > 0 and gear * tree.metres[node] < 0.0:  # it drives on without a stop
         run = tree.runs[node]
         whole += _run(metres + run, gear, vehicle) - _run(metres, gear, vehicle) - _run(run, gear, vehicle)
@@ -168,13 +172,13 @@ def word_is_worth(
     """
     metres = before.runs[last]
     gear = 0.0 if last == 0 else (1.0 if before.metres[last] > 0.0 else -1.0)
-    seconds = before.seconds[last] - _run(metres, gear, vehicle)
+    seconds = before.seconds[last] + before.extras[last] - _run(metres, gear, vehicle)
     for k in range(PARTS):
         part = radius * word[PARTS + k]
         if part == 0.0:
             continue
         if gear * part < 0.0:
-            seconds += _run(metres, gear, vehicle)
+            seconds += _run(metres, gear, vehicle) + vehicle.costs.gear_change
             metres = 0.0
         gear = 1.0 if part > 0.0 else -1.0
         metres += abs(part)
@@ -195,7 +199,9 @@ def meeting_is_worth(
 ) -> bool:
     """Whether a way is worth driving from a tree out of the start to a node of one out of the goal."""
     gear = 1.0 if before.metres[last] > 0.0 else -1.0
-    seconds = _joined_seconds(tree, node, before.runs[last], gear, before.seconds[last], vehicle)
+    seconds = _joined_seconds(
+        tree, node, before.runs[last], gear, before.seconds[last] + before.extras[last], vehicle
+    )
     if seconds >= slowest_kept(ways):
         return False
     _list_legs_from_root(ways, before, last)

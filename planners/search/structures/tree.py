@@ -21,6 +21,7 @@ from planners.search.guides.sampling import uniform
 from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
+from planners.world.driving_cost import extra_along, extra_cost, gear_after
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import asks_for_more, metres_to, reaches
 from planners.world.jit import inlined, lean
@@ -47,10 +48,12 @@ class Tree(NamedTuple):
     controls: Floats  # [C, 2] that led here from the parent
     parents: Indices  # [C]
     depths: Indices  # [C] steps from the root
+    gears: Floats  # [C] in which it came here, 1 or -1; 0 if it has not moved
+    extras: Floats  # [C] seconds that the way from the root costs beside its time
     waypoints: Indices  # [C] next waypoint of the lead path (Follow)
     spent: Indices  # [C] 1 after an extension that soon collided: too near an obstacle to lead anywhere
     counts: Indices  # [4] SIZE, CHECKS, EXPANSIONS, GOAL_VERTEX (-1: not reached)
-    bound: Floats  # [1] seconds by which the goal must be reached; vertices too late for that are not added
+    bound: Floats  # [1] seconds that a drive to the goal may cost; vertices that cost too much are not added
     buckets: Buckets
     connection: Connection
 
@@ -85,6 +88,8 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
         np.empty((capacity, 2)),
         np.empty(capacity, np.int64),
         np.empty(capacity, np.int64),
+        np.empty(capacity),
+        np.empty(capacity),
         np.empty(capacity, np.int64),
         np.empty(capacity, np.int64),
         np.zeros(4, np.int64),
@@ -96,7 +101,10 @@ def allocate_tree(capacity: int, state_size: int) -> Tree:
 
 @lean
 def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s: float) -> None:
-    """Begin a new tree with a drive: ``states [n, S]`` from the root on, and ``controls [n - 1, 2]``."""
+    """Begin a new tree with a drive: ``states [n, S]`` from the root on, and ``controls [n - 1, 2]``.
+
+    Beside its time it counts as nothing.
+    """
     for i in range(states.shape[0]):
         for k in range(states.shape[1]):  # one by one, because assigning a row takes two seconds to compile
             tree.states[i, k] = states[i, k]
@@ -104,6 +112,8 @@ def plant(tree: Tree, states: Floats, controls: Floats, bounds: Floats, bound_s:
         tree.controls[i, 1] = controls[i - 1, 1] if i > 0 else 0.0
         tree.parents[i] = i - 1
         tree.depths[i] = i
+        tree.gears[i] = gear_after(tree.gears[i - 1] if i > 0 else 0.0, states[i, 3])
+        tree.extras[i] = 0.0
     tree.counts.fill(0)
     tree.bound[0] = bound_s
     prune(tree, states.shape[0], bounds)
@@ -123,7 +133,14 @@ def prune(tree: Tree, size: int, bounds: Floats) -> None:
 
 @inlined
 def append(
-    tree: Tree, parent: int, waypoint: int, state: State, control_1: float, control_2: float, depth: int
+    tree: Tree,
+    parent: int,
+    waypoint: int,
+    state: State,
+    control_1: float,
+    control_2: float,
+    depth: int,
+    vehicle: Vehicle,
 ) -> int:
     """Add the state to which controls led from ``parent``, and return its vertex. The tree must have room."""
     new = tree.counts[SIZE]
@@ -133,6 +150,10 @@ def append(
     tree.controls[new, 1] = control_2
     tree.parents[new] = parent
     tree.depths[new] = depth
+    before = tree.gears[parent]
+    gear = gear_after(before, state[3])
+    tree.gears[new] = gear
+    tree.extras[new] = tree.extras[parent] + extra_cost(before, gear, vehicle.dt, vehicle)
     tree.waypoints[new] = waypoint
     tree.spent[new] = 0
     put(tree.buckets, new, state[0], state[1])
@@ -148,8 +169,17 @@ def add_drive(tree: Tree, vertex: int, states: Floats, controls: Floats, vehicle
     waypoint = tree.waypoints[vertex]
     for i in range(controls.shape[0]):
         state, depth = load(states, i, vehicle), tree.depths[vertex] + 1
-        vertex = append(tree, vertex, waypoint, state, controls[i, 0], controls[i, 1], depth)
+        vertex = append(tree, vertex, waypoint, state, controls[i, 0], controls[i, 1], depth, vehicle)
     return vertex
+
+
+@inlined
+def is_beyond(tree: Tree, parent: int, state: State, goal: Floats, vehicle: Vehicle) -> bool:
+    """Whether no drive that goes on from a vertex to a state, a step away, stays within the bound."""
+    seconds = (tree.depths[parent] + 1) * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed
+    before = tree.gears[parent]
+    extra = extra_cost(before, gear_after(before, state[3]), vehicle.dt, vehicle)
+    return bool(seconds + tree.extras[parent] + extra >= tree.bound[0])
 
 
 @lean
@@ -163,11 +193,11 @@ def connect_to_goal(
     c = tree.connection
     state = load(tree.states, vertex, vehicle)
     store(c.states, 0, state)
-    count = list_connections(c, goal, top, vehicle)
+    count = list_connections(c, tree.gears[vertex], goal, top, vehicle)
     x, y, heading = first_pose(state, top, vehicle)
     radius = radius_at(top, vehicle)
     depth = tree.depths[vertex]
-    within_s = tree.bound[0] - depth * vehicle.dt
+    within_s = tree.bound[0] - depth * vehicle.dt - tree.extras[vertex]
     driven = 0
     for _ in range(OUTLINES):
         word = next_word(c, count, within_s)
@@ -177,7 +207,10 @@ def connect_to_goal(
             continue
         driven += 1
         steps = connect(c, word, goal, top, vehicle)
-        if steps == 0 or (depth + steps) * vehicle.dt >= tree.bound[0]:
+        if steps == 0:
+            continue
+        extra = extra_along(c.states[: steps + 1], tree.gears[vertex], vehicle)
+        if (depth + steps) * vehicle.dt + tree.extras[vertex] + extra >= tree.bound[0]:
             continue
         if tree.counts[SIZE] + steps > tree.states.shape[0]:
             return False
@@ -246,7 +279,7 @@ def extend(
         x = state[0]
         y = state[1]
         depth = tree.depths[parent] + 1
-        if depth * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed >= tree.bound[0]:
+        if is_beyond(tree, parent, state, goal, vehicle):
             break
         counts[CHECKS] += 1
         if not state_is_free(state, vehicle, scene):
@@ -262,7 +295,7 @@ def extend(
             )
             if length(gap_x, gap_y) > tube_m:
                 break
-        parent = append(tree, parent, waypoint, state, driven_1, driven_2, depth)
+        parent = append(tree, parent, waypoint, state, driven_1, driven_2, depth, vehicle)
         if reaches(state, goal):
             counts[GOAL_VERTEX] = parent
             break

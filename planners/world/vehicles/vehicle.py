@@ -26,6 +26,14 @@ class About(NamedTuple):
     outline: tuple[Corners, ...] = ()  # convex polygons that the body consists of; none if it fills its box
 
 
+class Costs(NamedTuple):
+    """What a drive costs beside its seconds, in seconds; by default nothing."""
+
+    gear_change: float = 0.0  # of each change between forwards and backwards
+    forwards: float = 1.0  # what a second forwards counts as
+    backwards: float = 1.0
+
+
 class Car(NamedTuple):
     """A car with its reference point at the rear axle."""
 
@@ -42,6 +50,7 @@ class Car(NamedTuple):
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0
+    costs: Costs = Costs()
     about: About = About(b"car")
 
 
@@ -60,6 +69,7 @@ class DifferentialDrive(NamedTuple):
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0
+    costs: Costs = Costs()
     about: About = About(b"differential-drive")
 
 
@@ -94,6 +104,7 @@ class CarWithTrailers(NamedTuple):
     dt: float = 0.1  # seconds a step
     first_order: bool = False
     scale: float = 1.0
+    costs: Costs = Costs()
     about: About = About(b"car-1-trailer")
     trailers: tuple[Trailer, ...] = (Trailer(),)
 

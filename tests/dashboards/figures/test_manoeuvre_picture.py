@@ -14,8 +14,9 @@ from shapely import affinity
 
 from dashboards.figures.manoeuvre_picture import draw_manoeuvre, swept_by
 from dashboards.figures.pictures import Example, gallery
-from dashboards.world_outlines import cusps_of, gears_of, outlines, scale_bar, travel_arrows
+from dashboards.world_outlines import outlines, scale_bar, travel_arrows
 from planners.world.classes.families import FAMILIES, WITH_TRAILERS, family
+from planners.world.driving_cost import cusps_of, gears_of
 from planners.world.problem import Plan
 from planners.world.vehicles.dynamics import simulate
 from planners.world.vehicles.vehicle import CAR, CAR_1_TRAILER

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -198,6 +199,35 @@ def test_whatever_is_written_is_a_vehicle_or_an_error_of_one_line(values: dict[s
     except ValueError as error:
         told = str(error)
     assert "\n" not in told
+
+
+def test_what_drives_cost_is_read_and_told_again_and_what_is_made_for_other_costs_fits() -> None:
+    costs = {"gear_change": 1.5, "forwards": 1, "backwards": 2}
+    dear = vehicle_of(SMALL | {"costs": costs})
+    assert dear.costs == (1.5, 1.0, 2.0)
+    assert definition_of(dear)["costs"] == {"gear_change": 1.5, "backwards": 2.0}
+    assert vehicle_of(definition_of(dear)) == dear
+    cheap = vehicle_of(SMALL | {"costs": {}})
+    assert "costs" not in definition_of(cheap)
+    refuse_another("archive", definition_of(dear), cheap)
+    refuse_another("archive", definition_of(cheap), dear)
+
+
+@pytest.mark.parametrize(
+    ("costs", "told"),
+    [
+        (2, "has costs 2; expected fields gear_change, forwards, backwards"),
+        ({"backward": 2}, "unknown field 'costs.backward'"),
+        ({"backwards": 0.5}, "has costs.backwards 0.5; expected 1 to 100"),
+        ({"gear_change": -1}, "has costs.gear_change -1; expected 0 to 100 s"),
+        ({"gear_change": "much"}, "costs.gear_change"),
+        ({"forwards": float("nan")}, "costs.forwards"),
+        ({"gear_change": None}, "costs.gear_change"),
+    ],
+)
+def test_costs_that_make_no_sense_are_refused_by_name(costs: Any, told: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(told)):
+        vehicle_of(SMALL | {"costs": costs})
 
 
 def test_a_difference_is_told_by_its_field_and_the_name_is_none() -> None:

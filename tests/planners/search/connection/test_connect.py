@@ -36,7 +36,7 @@ def connection(start: Floats, goal: Floats, vehicle: Vehicle, top: float) -> Dri
     """States ``[T, S]`` and controls of the first of the three quickest words that leads to the goal."""
     buffers = allocate_connection(state_size(vehicle))
     buffers.states[0] = start
-    count = list_connections(buffers, goal, top, vehicle)
+    count = list_connections(buffers, 0.0, goal, top, vehicle)
     for _ in range(3):
         word = next_word(buffers, count, math.inf)
         steps = connect(buffers, word, goal, top, vehicle) if word >= 0 else 0

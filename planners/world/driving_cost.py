@@ -1,0 +1,90 @@
+"""What a drive costs: its seconds, and what the vehicle counts for driving in a gear and for changing it.
+
+Plans are compared by this. Unless a vehicle's file says otherwise it is the driving time.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from planners.world.arrays import Floats, Integers
+from planners.world.jit import inlined
+from planners.world.problem import Plan
+from planners.world.vehicles.vehicle import CAR, Costs, Vehicle
+
+STANDING: Final = 1e-6  # m/s, below which a vehicle stands
+
+
+@inlined
+def cost_of_second(gear: float, vehicle: Vehicle) -> float:
+    """What a second in a gear counts as: above 0 forwards, below 0 backwards; standing it is one."""
+    if gear > 0.0:
+        return vehicle.costs.forwards
+    return vehicle.costs.backwards if gear < 0.0 else 1.0
+
+
+@inlined
+def gear_after(gear: float, speed: float) -> float:
+    """The gear (1 or -1) after a step that ends at this speed (m/s): the one before if it stands then."""
+    if abs(speed) < STANDING:
+        return gear
+    return 1.0 if speed > 0.0 else -1.0
+
+
+@inlined
+def extra_cost(before: float, gear: float, seconds: float, vehicle: Vehicle) -> float:
+    """What some seconds in a gear cost beside these, with the change to it from the one before, if any."""
+    change = vehicle.costs.gear_change if before * gear < 0.0 else 0.0
+    return change + seconds * (cost_of_second(gear, vehicle) - 1.0)
+
+
+@inlined
+def extra_along(states: Floats, gear: float, vehicle: Vehicle) -> float:
+    """What a drive over ``states [T, S]`` costs beside its time, if the vehicle was in this gear before."""
+    extra = 0.0
+    for i in range(1, states.shape[0]):
+        before = gear
+        gear = gear_after(before, states[i, 3])
+        extra += extra_cost(before, gear, vehicle.dt, vehicle)
+    return extra
+
+
+def gears_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
+    """Whether each step ``[T - 1]`` of ``plan`` leads forwards (1) or backwards (-1).
+
+    A step in which ``vehicle`` stands counts to the gear before, or to the first one that follows.
+    """
+    gears = _signs(plan, vehicle)
+    moving = np.flatnonzero(gears)
+    if len(moving) == 0:
+        return np.ones_like(gears)
+    last = np.searchsorted(moving, np.arange(len(gears)), side="right") - 1
+    return gears[moving[np.maximum(last, 0)]]
+
+
+def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
+    """The rows of the states at which ``vehicle`` changes gear on ``plan``."""
+    return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
+
+
+def cost_of(plan: Plan, vehicle: Vehicle) -> float:
+    """What it costs ``vehicle`` to drive a ``plan``, in seconds."""
+    costs = vehicle.costs
+    if costs == Costs():
+        return plan.duration_s
+    signs = _signs(plan, vehicle)
+    seconds = np.array([costs.backwards, 1.0, costs.forwards])[signs + 1].sum() * plan.dt
+    return float(seconds + costs.gear_change * len(cusps_of(plan, vehicle)))
+
+
+def extra_steps(plan: Plan, vehicle: Vehicle) -> int:
+    """What a plan costs beside its time, in steps of the vehicle."""
+    return round((cost_of(plan, vehicle) - plan.duration_s) / vehicle.dt)
+
+
+def _signs(plan: Plan, vehicle: Vehicle) -> Integers:
+    """Whether each step leads forwards (1), backwards (-1) or stands (0)."""
+    speeds = plan.states[1:, 3] if vehicle.first_order else 0.5 * (plan.states[:-1, 3] + plan.states[1:, 3])
+    return np.sign(np.where(np.abs(speeds) < STANDING, 0.0, speeds)).astype(np.int32)
