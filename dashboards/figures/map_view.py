@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Circle, Patch
 
 from dashboards.figures.map_picture import draw_map
 from dashboards.figures.style import new_figure
@@ -29,6 +29,7 @@ _CLOSE_UPS: Final = 3  # side by side, at most
 _MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
 _AROUND: Final = 2.5  # ... and at least so many lengths of the vehicle
 _MOST_OF_MAP: Final = 0.7  # of a side: if that is more, all of the side is shown
+_DISC: Final[dict[str, Any]] = {"facecolor": "#DDF2E9", "edgecolor": GREEN, "linewidth": 0.8}
 _ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
 
 
@@ -91,6 +92,8 @@ def draw_ends(
             continue  # off the map: marks that are not clipped would shrink everything else
         if stop.is_pose:
             _draw_heading(axes, goal, heading, GREEN, longest)
+        else:
+            axes.add_patch(Circle(goal, scale * stop.radius, **_DISC, zorder=3.5))
         axes.plot(
             *goal,
             marker="o" if several else "*",
@@ -106,10 +109,12 @@ def draw_ends(
     x, y, heading = world.pose(scale * start[0], scale * start[1], start[2])
     axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
     _draw_heading(axes, (x, y), heading, INK, longest)
+    discs = not all(stop.is_pose for stop in stops)
     return [
         Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
         Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",
                markersize=10, label="goals in order" if several else "goal"),
+        *[Patch(**_DISC, label="where it may stop")] * discs,
     ]  # fmt: skip
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from matplotlib.patches import Circle
 
 from dashboards.figures.route_picture import route_picture
 from dashboards.figures.stuck_picture import stuck_picture
@@ -28,6 +31,10 @@ def test_every_pose_is_in_the_middle_of_a_close_up_and_no_place_has_one() -> Non
         assert (shown[:, 0] >= 0.0).all()
         assert (shown[:, 1] <= world.size).all()
         assert len(close_ups) == sum(stop.is_pose for stop in stops)
+        discs = [each for each in overview.patches if isinstance(each, Circle)]
+        assert len(discs) == sum(not stop.is_pose for stop in stops)
+        for disc in discs:
+            assert any(math.dist(leg.end[:2], disc.center) <= disc.radius + 1e-6 for leg in found.legs)
         for axes in close_ups:
             left, right = axes.get_xlim()
             low, high = axes.get_ylim()
