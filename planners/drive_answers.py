@@ -124,10 +124,8 @@ def drive_answer(
         if polished.plan is not None:
             entry = entries[chosen]
             number = int(drives.plans[max(entry, -1 - entry)])
-            found, cost = (
-                found._replace(plan=polished.plan, number=number, entry=entry),
-                cost_of(polished.plan, vehicle),
-            )
+            found = found._replace(plan=polished.plan, number=number, entry=entry)
+            cost = cost_of(polished.plan, vehicle)
         if cost**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
             break
     if found.plan is not None:

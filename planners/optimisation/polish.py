@@ -18,7 +18,7 @@ from planners.optimisation.local_model import NEVER, Model, allocate_model
 from planners.optimisation.pressing import WAYS
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
-from planners.world.driving_cost import cost_of, extra_steps
+from planners.world.driving_cost import cost_in_steps, cost_of, extra_steps
 from planners.world.geometry.collision import Scene, count_free_prefix
 from planners.world.goal import goal_of
 from planners.world.problem import Arrival, Plan, Problem, start_state
@@ -69,7 +69,7 @@ def polish(
         seconds: when to end, some iterations late; then another machine may give another result.
 
     Returns:
-        The quickest free plan that was found and arrives as asked, never a longer one than was given.
+        The quickest free plan that was found and arrives as asked, never one that costs more than was given.
     """
     return polish_quickest(problem, [plan], vehicle, scene, workspace, iterations, margin_m, seconds)[1]
 
@@ -147,7 +147,7 @@ def _polished_once(
         gains_little = isinstance(vehicle, (Car, CarWithTrailers)) and not vehicle.first_order  # by pressing
         if moved is None and gains_little and below < NEVER and below <= least:
             return 0, Polished(None, used), False
-        if moved is not None and _cost_in_steps(moved, vehicle) < least:
+        if moved is not None and cost_in_steps(moved, vehicle) < least:
             if gains_little:
                 return number, Polished(moved, used), False
             given = [(number, moved.states, moved.controls, len(moved.controls)), cheapest]
@@ -165,8 +165,8 @@ def _polished_once(
         ends += [] if length == NEVER else [(states, controls)]
         for states, controls in ends:
             each = Plan(states.copy(), controls.copy(), vehicle.dt)
-            if _cost_in_steps(each, vehicle) < cost:
-                number, better, cost = k, each, _cost_in_steps(each, vehicle)
+            if cost_in_steps(each, vehicle) < cost:
+                number, better, cost = k, each, cost_in_steps(each, vehicle)
     was_pressed = arriving and better is not None and len(better.controls) <= enough
     return number, Polished(better, used), was_pressed
 
@@ -246,10 +246,6 @@ def driven_near(
 def most_iterations(problem: Problem) -> int:
     """As many iterations as are of use for a problem."""
     return ITERATIONS if problem.arrival is None else ARRIVING_ITERATIONS
-
-
-def _cost_in_steps(plan: Plan, vehicle: Vehicle) -> int:
-    return len(plan.controls) + extra_steps(plan, vehicle)
 
 
 def _steps_below(seconds: float, vehicle: Vehicle) -> int:

@@ -84,6 +84,11 @@ def extra_steps(plan: Plan, vehicle: Vehicle) -> int:
     return round((cost_of(plan, vehicle) - plan.duration_s) / vehicle.dt)
 
 
+def cost_in_steps(plan: Plan, vehicle: Vehicle) -> int:
+    """What a plan costs, in steps of the vehicle."""
+    return len(plan.controls) + extra_steps(plan, vehicle)
+
+
 def _signs(plan: Plan, vehicle: Vehicle) -> Integers:
     """Whether each step leads forwards (1), backwards (-1) or stands (0)."""
     speeds = plan.states[1:, 3] if vehicle.first_order else 0.5 * (plan.states[:-1, 3] + plan.states[1:, 3])

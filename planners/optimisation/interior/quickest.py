@@ -21,7 +21,7 @@ from planners.optimisation.interior.retiming import retimed
 from planners.optimisation.local_model import Model
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
-from planners.world.driving_cost import extra_steps
+from planners.world.driving_cost import cost_in_steps, extra_steps
 from planners.world.geometry.collision import Scene
 from planners.world.goal import HEADING_TOLERANCE, HITCHES, RADIUS
 from planners.world.problem import Plan
@@ -123,9 +123,9 @@ def quickest(
         number, best, used = _found(guesses, drive, vehicle, WHOLE, most, below, extras)
     drive = drive._replace(firm=(hold, hold._replace(barrier=close)))
     while best is not None and used < most and working_clock() < until:
-        again, extra = [retimed(best.states, vehicle)], extra_steps(best, vehicle)
-        below = len(best.controls) + extra
-        _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below, [extra])
+        again, extra = [retimed(best.states, vehicle)], [extra_steps(best, vehicle)]
+        below = cost_in_steps(best, vehicle)
+        _, quicker, more = _found(again, drive, vehicle, WHOLE, most - used, below, extra)
         used += more
         if quicker is None:
             break
@@ -169,8 +169,8 @@ def _found(
             below = cheaper_than if best is None else cost
             found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below - extras[k], most - used)
             used += spent
-            if found is not None and len(found.controls) + extra_steps(found, vehicle) < below:
-                number, best, cost = k, found, len(found.controls) + extra_steps(found, vehicle)
+            if found is not None and cost_in_steps(found, vehicle) < below:
+                number, best, cost = k, found, cost_in_steps(found, vehicle)
             else:
                 left[k] = guesses[k]
         promising = PROMISING * cheaper_than * vehicle.dt
