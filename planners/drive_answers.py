@@ -36,9 +36,9 @@ FAR_IF_TIGHT: Final = 3.0
 AT_ONCE: Final = 2  # drives of which the quicker one is the answer
 # The longer a drive takes, the more others may gain: a pair is tried for each so many square seconds of it.
 SQUARE_SECONDS: Final = 100.0
-# A drive may not be the best if it takes longer than both of these allow.
+# A drive may not be the best if it costs more than both of these allow.
 LONG: Final = 1.5  # times what it would take without obstacles
-UNUSUAL: Final = 1.3  # times what the quickest of the stored drives takes that begin nearest
+UNUSUAL: Final = 1.3  # times what the cheapest of the stored drives costs that begin nearest
 
 
 class DriveAnswer(NamedTuple):
@@ -108,9 +108,9 @@ def drive_answer(
     order = np.zeros(TRIED, np.int32)
     if blindly is None:
         most = FAR_IF_TIGHT if is_tight(goal, vehicle, view.scene) else FAR
-        count, quickest, checks = rank_drives(drives, start, goal, most, order, vehicle, view.scene)
+        count, cheapest, checks = rank_drives(drives, start, goal, most, order, vehicle, view.scene)
     else:
-        count, quickest, checks = min(TRIED, len(drives.plans)), 0, 0
+        count, cheapest, checks = min(TRIED, len(drives.plans)), 0, 0
         order[:count] = blindly.integers(-len(drives.plans), len(drives.plans), count)
     view.lap("recall")
     found, cost = DriveAnswer(checks=int(checks)), math.inf
@@ -130,7 +130,7 @@ def drive_answer(
             break
     if found.plan is not None:
         without = _seconds_without_obstacles(start, goal, vehicle)
-        usual = max(LONG * without, UNUSUAL * quickest * vehicle.dt)
+        usual = max(LONG * without, UNUSUAL * cheapest * vehicle.dt)
         found = found._replace(is_long=cost > usual)
     view.lap("repair")
     return found

@@ -29,6 +29,7 @@ _CLOSE_UPS: Final = 3  # side by side, at most
 _MARGIN: Final = 0.15  # of the longer side of what is driven: what is shown around it ...
 _AROUND: Final = 2.5  # ... and at least so many lengths of the vehicle
 _MOST_OF_MAP: Final = 0.7  # of a side: if that is more, all of the side is shown
+_SEEN: Final = 0.018  # of the longer side of what is shown: smaller discs lie under the mark of the goal
 _DISC: Final[dict[str, Any]] = {"facecolor": "#DDF2E9", "edgecolor": GREEN, "linewidth": 0.8}
 _ARROW: Final = 0.05  # of the longer side of what is shown: the arrow of a heading
 
@@ -83,7 +84,7 @@ def draw_ends(
     axes: Axes, world: OccupancyMap, start: Pose, stops: Sequence[Stop], scale: float, longest: float
 ) -> list[Line2D | Patch]:
     """Draw the start and the goals; returns what a legend says of them."""
-    several = len(stops) > 1
+    several, discs = len(stops) > 1, False
     for number, stop in enumerate(stops, start=1):
         right, up = stop.place
         x, y, heading = world.pose(scale * right, scale * up, stop.arrival.heading or 0.0)
@@ -92,8 +93,9 @@ def draw_ends(
             continue  # off the map: marks that are not clipped would shrink everything else
         if stop.is_pose:
             _draw_heading(axes, goal, heading, GREEN, longest)
-        else:
+        elif scale * stop.radius > _SEEN * longest:
             axes.add_patch(Circle(goal, scale * stop.radius, **_DISC, zorder=3.5))
+            discs = True
         axes.plot(
             *goal,
             marker="o" if several else "*",
@@ -109,7 +111,6 @@ def draw_ends(
     x, y, heading = world.pose(scale * start[0], scale * start[1], start[2])
     axes.plot(x, y, marker="o", color=INK, markersize=6, zorder=9)
     _draw_heading(axes, (x, y), heading, INK, longest)
-    discs = not all(stop.is_pose for stop in stops)
     return [
         Line2D([], [], color=INK, marker="o", linestyle="none", markersize=6, label="start"),
         Line2D([], [], color=GREEN, marker="o" if several else "*", markeredgecolor=INK, linestyle="none",

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _USUAL: Final = SolveOptions()
 _LEAST_LATERAL: Final = 0.05  # m/s²: a smaller acceleration to the side is not told
+_LEAST_BACKWARDS: Final = 0.05  # m: less is not worth saying
 
 
 def draw(
@@ -68,7 +69,7 @@ def plan(
             is only one.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to go on looking for a quicker plan after the first is found and polished.
+        improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
         explain: Print and draw which plans were recalled, where they collide and how they were used.
         out: Where to write the plan, .json. Why there is none is written too, but over no older file.
         picture: Where to draw it, .png, .svg or .pdf.
@@ -89,6 +90,10 @@ def plan(
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
         gears = answer["gear_changes"]
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
+        if answer["backwards_m"] >= _LEAST_BACKWARDS:
+            changes += f", {answer['backwards_m']:.1f} m backwards"
+        if answer["cost_s"] != found.duration_s:
+            changes += f", costs {answer['cost_s']:.1f} s"
         lateral = answer["lateral_acceleration"]
         sideways = f", up to {lateral:.1f} m/s² sideways" if lateral >= _LEAST_LATERAL else ""
         lines.append(f"{attempt.source}, {times}{changes}{sideways}")
@@ -160,7 +165,7 @@ def solve(
         problems: A .json, .jsonl or .parquet file.
         assist: How the memory helps; fresh is a guide without memory. Default: repair with a memory, none
             without.
-        improve_seconds: Seconds to go on looking for a quicker plan after the first is found and polished.
+        improve_seconds: Seconds to go on looking for a better plan after the first is found and polished.
         out: Where to write the rows, .parquet.
         plans: Folder for the plans, one .json for each problem.
         learn: Data folder that remembers new plans, those from rest to a place 50√2 m ahead.

@@ -107,7 +107,7 @@ def improve(
     A limit in expansions gives the same result for the same seed on any machine; a limit in seconds does not.
     An iteration of a polish counts as ``EXPANSIONS_AN_ITERATION``, but for those by which a search for
     manoeuvres squeezes, mends and turns trains round in loops.
-    Every second search is guided along the best plan.
+    Every second search is guided along the best plan, and half of them count time alone.
 
     Args:
         name: of the planner that searches.
@@ -179,7 +179,8 @@ def improve(
             )
         guide = guidance([best.states]) if best is not None and searches % 2 else None
         rng = generator(seed, "improve", problem.id, name, searches)
-        query = replace(kinds, rng=rng, guide=guide, limits=limits, others=looks_for_kinds)
+        driver = counting_time(vehicle) if searches // 2 % 2 else vehicle
+        query = replace(kinds, rng=rng, guide=guide, limits=limits, others=looks_for_kinds, vehicle=driver)
         outcome = PLANNERS[name](query)
         took = outcome.roadmap_seconds + outcome.search_seconds
         if looks_for_kinds and outcome.expansions < limits.further:

@@ -69,6 +69,11 @@ def cusps_of(plan: Plan, vehicle: Vehicle = CAR) -> Integers:
     return (np.flatnonzero(np.diff(gears_of(plan, vehicle))) + 1).astype(np.int32)
 
 
+def metres_backwards(plan: Plan, vehicle: Vehicle) -> float:
+    """How far a plan leads backwards."""
+    return float(np.hypot(*np.diff(plan.states[:, :2], axis=0).T)[gears_of(plan, vehicle) < 0].sum())
+
+
 def cost_of(plan: Plan, vehicle: Vehicle) -> float:
     """What it costs ``vehicle`` to drive a ``plan``, in seconds."""
     costs = vehicle.costs

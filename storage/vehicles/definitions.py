@@ -58,10 +58,10 @@ _RANGES: Final = {  # up to, unit
     "step": (1.0, "s"),
 }
 _FASTEST: Final = 100.0  # m/s
-_COSTS: Final = {  # least, what the most of each is
-    "gear_change": (0.0, "0 to 100 s"),
-    "forwards": (1.0, "1 to 100 times a second"),
-    "backwards": (1.0, "1 to 100 times a second"),
+_COSTS: Final = {  # the least of each, and what is expected
+    "gear_change": (0.0, "0 to 100 (s)"),
+    "forwards": (1.0, "1 to 100 (what a second forwards counts as)"),
+    "backwards": (1.0, "1 to 100 (what a second backwards counts as)"),
 }
 _DEAREST: Final = 100.0
 _NAME: Final = re.compile(r"[a-z0-9](-?[a-z0-9]){0,39}")

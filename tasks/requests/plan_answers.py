@@ -8,7 +8,7 @@ from typing import Any
 from planners.search.free_goal import lacks_room
 from planners.search.outcome import MEANINGS, Status
 from planners.world.alignment import to_canonical
-from planners.world.driving_cost import cusps_of
+from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
@@ -55,6 +55,8 @@ def plan_answer(record: PlanRecord, out: Path | None, verified: bool | None) -> 
         **where,
         "waypoints": len(fields["states"]),
         "gear_changes": None if plan is None else len(cusps_of(plan, record.vehicle)),
+        "backwards_m": None if plan is None else record.scale * metres_backwards(plan, record.vehicle),
+        "cost_s": None if plan is None else cost_of(plan, record.vehicle),
         "lateral_acceleration": None if plan is None else record.scale * plan.lateral_acceleration,
         "verified": verified,
     }

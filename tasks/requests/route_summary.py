@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
 from dashboards.cells import CellTable, decimal
 from planners.attempt import WITHOUT_MEMORY
 from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
-from planners.world.driving_cost import cusps_of, gears_of
+from planners.world.driving_cost import cusps_of, metres_backwards
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.requests.assistant import Assistant
@@ -85,9 +83,12 @@ def route_summary(
     has_memory = assistant.settings.assist not in WITHOUT_MEMORY
     from_memory = legs_from_memory(route)
     length = _rounded(scale * plan.length_m)
-    whole = f"{length} m in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
+    back = scale * metres_backwards(plan, assistant.vehicle)
+    backwards = f" ({_rounded(back)} m backwards)" if back >= 0.05 else ""
+    whole = f"{length} m{backwards} in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
     whole += f", {from_memory} from memory" * has_memory
-    lines = [whole + _backwards(plan, assistant.vehicle, scale)]
+    changes = len(cusps_of(plan, assistant.vehicle))
+    lines = [whole + (f", {_count(changes, 'change')} of gear" if changes else "")]
     parts = [
         f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
         for source, metres in by_source.items()
@@ -119,14 +120,6 @@ def route_summary(
         f"{_count(len(local_seconds), 'local plan')} took {1000.0 * sum(local_seconds):.2f} ms, the whole "
         f"route{' with its polish' * assistant.settings.polished} {seconds:.2f} s",
     ]
-
-
-def _backwards(plan: Plan, vehicle: Vehicle, scale: float) -> str:
-    """How far a plan leads backwards, and how often it changes gear, if it does."""
-    back = scale * np.hypot(*np.diff(plan.states[:, :2], axis=0).T)[gears_of(plan, vehicle) < 0].sum()
-    changes = len(cusps_of(plan, vehicle))
-    said = f", {_rounded(back)} m of it backwards" if back >= 0.05 else ""
-    return said + (f", {_count(changes, 'change')} of gear" if changes else "")
 
 
 def _rounded(figure: float) -> str:

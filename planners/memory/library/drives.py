@@ -15,6 +15,7 @@ import numpy as np
 from planners.memory.plans.plan_arrays import StoredPlans
 from planners.search.manoeuvres.endings import STANDS, in_frame_of_end
 from planners.world.arrays import Floats, Indices, Integers
+from planners.world.driving_cost import cost_in_steps
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import HEADING, X, Y
 from planners.world.jit import inlined, jit
@@ -25,7 +26,7 @@ from planners.world.vehicles.vehicle import Vehicle
 
 NEAR: Final = 40  # drives that begin most alike, of which ...
 TRIED: Final = 8  # ... those are tried that promise most
-NEAREST: Final = 10  # of them: the quickest of these sets what is usual
+NEAREST: Final = 10  # of them: the cheapest of these sets what is usual
 LOOK: Final = 3  # every so many states a moved drive is looked at
 SECONDS_OFF: Final = 5.0  # what a length, a radian or a second of being blocked counts as
 
@@ -39,11 +40,12 @@ class Drives(NamedTuple):
     starts: Indices  # [K + 1] drive k owns states[starts[k] : starts[k + 1]]
     firsts: Floats  # [K, S] the first state of each, side by side: all of them are looked at
     plans: Indices  # [K] which plan of the library it is
+    costs: Indices  # [K] what each costs to drive, in steps
 
 
-def drives_of(plans: StoredPlans, numbers: Indices | None = None) -> Drives:
+def drives_of(plans: StoredPlans, vehicle: Vehicle, numbers: Indices | None = None) -> Drives:
     """Take the plans of a library that end at rest, and lead anywhere: all, or those of some ``numbers``."""
-    states, controls, bent, starts, taken = [], [], [], [0], []
+    states, controls, bent, starts, taken, costs = [], [], [], [0], [], []
     if numbers is None:
         numbers = np.arange(len(plans))
     stand = np.abs(plans.states[plans.starts[1:] - 1, 3]) <= STANDS
@@ -58,6 +60,7 @@ def drives_of(plans: StoredPlans, numbers: Indices | None = None) -> Drives:
         bent.append(1.0 - driven * driven * (3.0 - 2.0 * driven))
         starts.append(starts[-1] + len(plan.states))
         taken.append(number)
+        costs.append(cost_in_steps(plan, vehicle))
     together = np.concatenate([np.empty((0, plans.states.shape[1])), *states])
     return Drives(
         together,
@@ -66,6 +69,7 @@ def drives_of(plans: StoredPlans, numbers: Indices | None = None) -> Drives:
         np.array(starts, np.int64),
         together[starts[:-1]],
         np.array(taken, np.int64),
+        np.array(costs, np.int64),
     )
 
 
@@ -130,7 +134,7 @@ def rank_drives(
         scene: what must not be met.
 
     Returns:
-        How many there are, the steps of the quickest of the ``NEAREST`` (0 if there are fewer), and how many
+        How many there are, the steps of the cheapest of the ``NEAREST`` (0 if there are fewer), and how many
         states were checked.
     """
     size = start.shape[0]
@@ -141,7 +145,7 @@ def rank_drives(
     off = np.zeros(size)
     moved = np.zeros((1, size))
     body = vehicle.front + vehicle.rear
-    count = checks = quickest = 0
+    count = checks = cheapest = 0
     for drive in range(drives.plans.shape[0]):
         first = drives.firsts[drive]
         for mirrored in range(2):
@@ -173,17 +177,17 @@ def rank_drives(
             checks += 1
             if not state_is_free(load(moved, 0, vehicle), vehicle, scene):
                 blocked += LOOK
-        steps = last - 1 - begin
-        if n == 0 or (n < NEAREST and steps < quickest):
-            quickest = steps
+        steps = drives.costs[drive]
+        if n == 0 or (n < NEAREST and steps < cheapest):
+            cheapest = steps
         promises[n] = (steps + SECONDS_OFF * blocked) * vehicle.dt + SECONDS_OFF * far[n]
     if count < NEAREST:
-        quickest = 0  # a few drives say nothing about what is usual
+        cheapest = 0  # a few drives say nothing about what is usual
     best = np.argsort(promises[:count])
     count = min(count, TRIED)
     for n in range(count):
         order[n] = near[best[n]]
-    return count, quickest, checks
+    return count, cheapest, checks
 
 
 @jit

@@ -15,6 +15,7 @@ from planners.memory.plans.plan_arrays import StoredPlans, store_plans
 from planners.search.manoeuvres.endings import endings_of
 from planners.search.query import Endings
 from planners.world.arrays import Indices
+from planners.world.driving_cost import cost_in_steps
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
@@ -56,15 +57,15 @@ class PlanLibrary:
 
     @functools.cached_property
     def drives(self) -> Drives:
-        """The quickest plans of their questions that end at rest, whole, and ready to be moved to others.
+        """The cheapest plans of their questions that end at rest, whole, and ready to be moved to others.
 
-        A slower one begins where the quickest does, and would only keep other ways out of the choice.
+        Another one begins where the cheapest does, and would only keep other ways out of the choice.
         """
-        return drives_of(self.plans, self._quickest())
+        return drives_of(self.plans, self.vehicle, self._cheapest())
 
-    def _quickest(self) -> Indices:
-        """The numbers of the plans that are the quickest of their questions."""
-        steps = np.diff(self.plans.starts)
+    def _cheapest(self) -> Indices:
+        """The numbers of the plans that cost least of those of their questions."""
+        steps = [cost_in_steps(plan, self.vehicle) for plan in self.plans]
         best: dict[str, int] = {}
         for number, question in enumerate(self.questions):
             if question not in best or steps[number] < steps[best[question]]:

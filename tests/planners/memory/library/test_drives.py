@@ -54,7 +54,7 @@ def test_moved_to_its_own_question_a_drive_stays_as_it_is(
     seed: int, pose: tuple[float, float, float], side: float, vehicle: Vehicle
 ) -> None:
     plan = drive(seed, vehicle)
-    drives = drives_of(store_plans([plan], state_size(vehicle)))
+    drives = drives_of(store_plans([plan], state_size(vehicle)), vehicle)
     wanted = placed(plan.states, pose, side)
     goal = goal_of_pose(*wanted[-1, :3])
     moved = moved_drive(drives, 0 if side > 0.0 else -1, wanted[0], goal, plan.dt)
@@ -71,7 +71,7 @@ def test_a_moved_drive_begins_and_ends_where_it_is_asked(
     entry: int,
     vehicle: Vehicle,
 ) -> None:
-    drives = drives_of(store_plans([drive(seed, vehicle)], state_size(vehicle)))
+    drives = drives_of(store_plans([drive(seed, vehicle)], state_size(vehicle)), vehicle)
     first = np.zeros(state_size(vehicle))
     first[:3] = start
     moved = moved_drive(drives, entry, first, goal_of_pose(*goal), vehicle.dt).states
@@ -85,7 +85,7 @@ def test_a_moved_drive_begins_and_ends_where_it_is_asked(
 @given(seed=st.integers(0, 10**6), vehicle=vehicles)
 def test_only_drives_that_begin_near_are_ranked(seed: int, vehicle: Vehicle) -> None:
     plans = [drive(seed + number, vehicle) for number in range(30)]
-    drives = drives_of(store_plans(plans, state_size(vehicle)))
+    drives = drives_of(store_plans(plans, state_size(vehicle)), vehicle)
     scene, order = scene_of(problem_of([])), np.zeros(TRIED, np.int32)
     rng = np.random.default_rng(seed)
     start = np.zeros(state_size(vehicle))
@@ -114,9 +114,9 @@ def test_drives_that_do_not_end_at_rest_are_left_out() -> None:
     whole = drive(1, CAR)
     moving = Plan(whole.states[:9], whole.controls[:8], whole.dt)
     standing = Plan(whole.states[:1], whole.controls[:0], whole.dt)
-    drives = drives_of(store_plans([moving, whole, standing], state_size(CAR)))
+    drives = drives_of(store_plans([moving, whole, standing], state_size(CAR)), CAR)
     assert drives.plans.tolist() == [1]
-    assert len(drives_of(store_plans([moving], state_size(CAR))).plans) == 0
+    assert len(drives_of(store_plans([moving], state_size(CAR)), CAR).plans) == 0
 
 
 def test_of_the_plans_of_a_question_only_the_quickest_is_a_drive() -> None:
