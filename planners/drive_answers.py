@@ -126,7 +126,7 @@ def drive_answer(
             number = int(drives.plans[max(entry, -1 - entry)])
             found = found._replace(plan=polished.plan, number=number, entry=entry)
             cost = cost_of(polished.plan, vehicle)
-        if cost**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
+        if found.plan is not None and found.plan.duration_s**2 < SQUARE_SECONDS * (1 + k // AT_ONCE):
             break
     if found.plan is not None:
         without = _seconds_without_obstacles(start, goal, vehicle)

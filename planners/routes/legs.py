@@ -12,6 +12,7 @@ import numpy as np
 from planners.attempt import Attempt
 from planners.optimisation.polish import polish
 from planners.world.arrays import Floats, Point
+from planners.world.driving_cost import cost_of
 from planners.world.geometry.collision import Scene, count_free_prefix, scene_of
 from planners.world.problem import Plan, Problem, obstacles_of, start_state
 from planners.world.vehicles.dynamics import simulate
@@ -66,8 +67,8 @@ def polished_legs(
         workspace: the caller's buffers.
 
     Returns:
-        Parts of a quicker drive, one for each leg, that stops no farther from a place than before; or the
-        given ones if none was found.
+        Parts of a drive that costs less, one for each leg, that stops no farther from a place than before; or
+        the given ones if none was found.
     """
     plan = joined(problem, legs, vehicle)
     steps = len(plan.controls)
@@ -75,7 +76,7 @@ def polished_legs(
         return legs
     around = _only_near(stricter(problem, plan.states[-1]), plan)
     better = polish(around, plan, vehicle, scene_of(around), workspace).plan
-    if better is None or len(better.controls) >= steps:
+    if better is None or cost_of(better, vehicle) >= cost_of(plan, vehicle):
         return legs
     states = simulate(plan.states[0], better.controls, vehicle)
     if count_free_prefix(states, vehicle, scene) < len(states):

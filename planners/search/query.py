@@ -47,7 +47,10 @@ NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1, 0)
 
 @dataclass(frozen=True)
 class Limits:
-    """When to give up. Expansions decide the result; seconds only guard against a machine's bad day."""
+    """When to give up. Expansions decide the result; seconds only guard against a machine's bad day.
+
+    Where a vehicle's drives cost more than time, what is searched twice has the expansions twice.
+    """
 
     expansions: int = 20_000
     nodes: int = 400_000  # tree vertices at once

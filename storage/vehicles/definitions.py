@@ -245,7 +245,7 @@ def _costs(fields: object) -> Costs:
     for name, cost in costs.items():
         least, expected = _COSTS[name]
         if not least <= cost <= _DEAREST:
-            raise ValueError(f"has costs.{name} {cost:g}; expected {expected}")
+            raise ValueError(f"has costs.{name} {cost!r}; expected {expected}")
     return Costs(**costs)
 
 

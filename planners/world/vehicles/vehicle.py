@@ -27,9 +27,9 @@ class About(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """What a drive costs beside its seconds, in seconds; by default nothing."""
+    """What a drive costs, in seconds; by default its time."""
 
-    gear_change: float = 0.0  # of each change between forwards and backwards
+    gear_change: float = 0.0  # what each change between forwards and backwards adds
     forwards: float = 1.0  # what a second forwards counts as
     backwards: float = 1.0
 

@@ -52,14 +52,20 @@ def questions(vehicle: Vehicle, count: int) -> list[Problem]:
     return [to_canonical(each)[0] for each in asked if each is not None]
 
 
+def test_who_pays_for_driving_backwards_drives_forwards_mostly() -> None:
+    paying = costing(HUNTER, 0.0, 1.0, 3.0)
+    asked = questions(HUNTER, 8)
+    usual, forwards = (
+        sum(seconds_backwards(driven(each, vehicle), vehicle) for each in asked)
+        for vehicle in (HUNTER, paying)
+    )
+    assert 0.0 < forwards < 0.5 * usual
+
+
 @pytest.mark.parametrize("vehicle", [HUNTER, DIFFERENTIAL_DRIVE, CAR_1_TRAILER])
-def test_who_pays_for_driving_backwards_drives_forwards_mostly(vehicle: Vehicle) -> None:
+def test_no_answer_costs_more_than_the_one_of_who_does_not_pay(vehicle: Vehicle) -> None:
     paying = costing(vehicle, 0.0, 1.0, 3.0)
     plans = [(driven(each, vehicle), driven(each, paying)) for each in questions(vehicle, 8)]
-    usual, forwards = (
-        sum(seconds_backwards(plan, vehicle) for plan in side) for side in zip(*plans, strict=True)
-    )
-    assert forwards <= 0.6 * usual or usual < 1.0
     for pair in plans:
         without, paid = (cost_of(plan, paying) for plan in pair)
         assert paid <= without
@@ -80,7 +86,7 @@ def test_changes_of_gear_that_save_little_are_left_out() -> None:
     for vehicle in (HUNTER, costing(HUNTER, 5.0, 1.0, 1.0)):
         plans = [driven(each, vehicle) for each in questions(HUNTER, 12)]
         changes.append(sum(len(cusps_of(plan, vehicle)) for plan in plans))
-    assert changes[1] <= changes[0]
+    assert changes[1] < changes[0]
 
 
 def test_slots_are_solved_as_often_by_who_pays() -> None:

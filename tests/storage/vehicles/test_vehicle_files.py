@@ -219,7 +219,7 @@ def test_what_drives_cost_is_read_and_told_again_and_what_is_made_for_other_cost
         (2, "has costs 2; expected fields gear_change, forwards, backwards"),
         ({"backward": 2}, "unknown field 'costs.backward'"),
         ({"backwards": 0.5}, "has costs.backwards 0.5; expected 1 to 100"),
-        ({"gear_change": -1}, "has costs.gear_change -1; expected 0 to 100"),
+        ({"gear_change": -1}, "has costs.gear_change -1.0; expected 0 to 100"),
         ({"gear_change": "much"}, "costs.gear_change"),
         ({"forwards": float("nan")}, "costs.forwards"),
         ({"gear_change": None}, "costs.gear_change"),
