@@ -30,7 +30,7 @@ from planners.search.structures.frontier import (
 )
 from planners.search.structures.time_to_go import Ahead, seconds_to_go
 from planners.world.arrays import Floats
-from planners.world.driving_cost import extra_cost, gear_after
+from planners.world.driving_cost import extra_cost, gear_after, pays
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import asks_for_more, reaches
 from planners.world.jit import inlined, lean
@@ -106,15 +106,17 @@ def open_vertex(
     vehicle: Vehicle,
 ) -> None:
     """Let all primitives from a vertex wait. Each is checked for collisions when it is driven."""
+    costs_more = pays(vehicle)
     for motion in range(len(SHARES) * lattice.speeds):
         state = load(tree.states, vertex, vehicle)
         gear, extra = tree.gears[vertex], tree.extras[vertex]
         for _ in range(lattice.steps):
             control_1, control_2 = controls_of(state, motion, lattice, vehicle)
             state = step(state, control_1, control_2, vehicle)
-            before = gear
-            gear = gear_after(before, state[3])
-            extra += extra_cost(before, gear, vehicle.dt, vehicle)
+            if costs_more:
+                before = gear
+                gear = gear_after(before, state[3])
+                extra += extra_cost(before, gear, vehicle.dt, vehicle)
         if not was_reached(frontier, _key(state, ahead.go, lattice, vehicle)):
             spent = (tree.depths[vertex] + lattice.steps) * vehicle.dt + extra
             left = seconds_to_go(state, ahead, lattice.heading_s, lattice.late_s, vehicle)

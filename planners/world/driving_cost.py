@@ -26,6 +26,13 @@ def cost_of_second(gear: float, vehicle: Vehicle) -> float:
 
 
 @inlined
+def pays(vehicle: Vehicle) -> bool:
+    """Whether a drive may cost more than its time; searches need not count what costs nothing."""
+    costs = vehicle.costs
+    return costs.gear_change > 0.0 or costs.forwards > 1.0 or costs.backwards > 1.0
+
+
+@inlined
 def gear_after(gear: float, speed: float) -> float:
     """The gear (1 or -1) after a step that ends at this speed (m/s): the one before if it stands then."""
     if abs(speed) < STANDING:

@@ -21,7 +21,7 @@ from planners.search.guides.sampling import uniform
 from planners.search.structures.controller import NO_ERRORS, Gains, steer
 from planners.search.structures.neighbours import Buckets, allocate_buckets, clear_buckets, put, remove
 from planners.world.arrays import Floats, Indices
-from planners.world.driving_cost import extra_along, extra_cost, gear_after
+from planners.world.driving_cost import extra_along, extra_cost, gear_after, pays
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import asks_for_more, metres_to, reaches
 from planners.world.jit import inlined, lean
@@ -177,6 +177,8 @@ def add_drive(tree: Tree, vertex: int, states: Floats, controls: Floats, vehicle
 def is_beyond(tree: Tree, parent: int, state: State, goal: Floats, vehicle: Vehicle) -> bool:
     """Whether no drive that goes on from a vertex to a state, a step away, stays within the bound."""
     seconds = (tree.depths[parent] + 1) * vehicle.dt + max(metres_to(state, goal), 0.0) / vehicle.max_speed
+    if not pays(vehicle):
+        return bool(seconds >= tree.bound[0])
     before = tree.gears[parent]
     extra = extra_cost(before, gear_after(before, state[3]), vehicle.dt, vehicle)
     return bool(seconds + tree.extras[parent] + extra >= tree.bound[0])
@@ -209,7 +211,7 @@ def connect_to_goal(
         steps = connect(c, word, goal, top, vehicle)
         if steps == 0:
             continue
-        extra = extra_along(c.states[: steps + 1], tree.gears[vertex], vehicle)
+        extra = extra_along(c.states[: steps + 1], tree.gears[vertex], vehicle) if pays(vehicle) else 0.0
         if (depth + steps) * vehicle.dt + tree.extras[vertex] + extra >= tree.bound[0]:
             continue
         if tree.counts[SIZE] + steps > tree.states.shape[0]:
