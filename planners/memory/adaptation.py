@@ -19,12 +19,13 @@ import numpy as np
 
 from planners.memory.retiming import retimed
 from planners.optimisation.polish import driven_near, polish
-from planners.search.manoeuvres.endings import STANDS, last_of_stops, worth_storing
+from planners.search.manoeuvres.endings import last_of_stops, worth_storing
 from planners.search.tracking import ARRIVED, TRACKING, track
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.authority.authority import faults
 from planners.world.classes.families import FAMILIES, family
+from planners.world.driving_cost import STANDING
 from planners.world.geometry.collision import count_free_prefix, scene_of
 from planners.world.goal import goal_of
 from planners.world.problem import (
@@ -84,12 +85,12 @@ class Adaptation:
             canonical: whether it answers a canonical problem: then it is driven from its start to its place.
             workspace: the caller's buffers.
         """
-        if self.new.min_speed >= 0.0 and (stored.states[:, 3] < -STANDS).any():
+        if self.new.min_speed >= 0.0 and (stored.states[:, 3] < -STANDING).any():
             return Adapted(Outcome.BACKWARDS, None, [])
         if not isinstance(self.new, DifferentialDrive) and _turns_on_the_spot(stored):
             return Adapted(Outcome.ON_THE_SPOT, None, [])
         found = Adapted(Outcome.BLOCKED, None, [])
-        if abs(stored.states[-1, 3]) < STANDS and not canonical:
+        if abs(stored.states[-1, 3]) < STANDING and not canonical:
             drawn = None if len(stored.controls) == 0 else self._drawn_again(stored, question)
             unchanged = self._unchanged(stored, drawn, question)
             if unchanged is not None:
@@ -199,7 +200,7 @@ class Adaptation:
 
 def _turns_on_the_spot(plan: Plan) -> bool:
     ways = np.hypot(*np.diff(plan.states[:, :2], axis=0).T)
-    return bool((np.abs(np.diff(plan.states[:, 2]))[ways < STANDS] > SPOT_RAD).any())
+    return bool((np.abs(np.diff(plan.states[:, 2]))[ways < STANDING] > SPOT_RAD).any())
 
 
 def _placed(states: Floats, drawn: tuple[Problem, Problem], factor: float) -> Floats:
@@ -244,6 +245,6 @@ def _asked(
     )
     if canonical:
         return replace(place, start=CANONICAL_START, goal=CANONICAL_GOAL, bounds=BOUNDS, start_motion=())
-    if abs(states[-1, 3]) >= STANDS:
+    if abs(states[-1, 3]) >= STANDING:
         return place
     return replace(place, goal_radius=POSE_RADIUS, arrival=Arrival(heading, POSE_TOLERANCE, 0.0, 0.0))

@@ -165,8 +165,8 @@ def _polished_once(
         ends += [] if length == NEVER else [(states, controls)]
         for states, controls in ends:
             each = Plan(states.copy(), controls.copy(), vehicle.dt)
-            if cost_in_steps(each, vehicle) < cost:
-                number, better, cost = k, each, cost_in_steps(each, vehicle)
+            if (steps := cost_in_steps(each, vehicle)) < cost:
+                number, better, cost = k, each, steps
     was_pressed = arriving and better is not None and len(better.controls) <= enough
     return number, Polished(better, used), was_pressed
 

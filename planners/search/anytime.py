@@ -208,7 +208,8 @@ def search_and_polish(
 ) -> tuple[Outcome, Plan | None]:
     """Search for several plans, polish them and keep the one that costs least.
 
-    Unless time alone counts, that is done once more as if it did, so no answer costs more than that.
+    Where a vehicle's drives cost more than their time, all of that is done twice: by what they cost, and as
+    if only time counted. The answer that costs less is returned.
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the

@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from planners.memory.plans.plan_arrays import StoredPlans
-from planners.search.manoeuvres.endings import STANDS, in_frame_of_end
+from planners.search.manoeuvres.endings import in_frame_of_end
 from planners.world.arrays import Floats, Indices, Integers
-from planners.world.driving_cost import cost_in_steps
+from planners.world.driving_cost import STANDING, cost_in_steps
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.goal import HEADING, X, Y
 from planners.world.jit import inlined, jit
@@ -48,7 +48,7 @@ def drives_of(plans: StoredPlans, vehicle: Vehicle, numbers: Indices | None = No
     states, controls, bent, starts, taken, costs = [], [], [], [0], [], []
     if numbers is None:
         numbers = np.arange(len(plans))
-    stand = np.abs(plans.states[plans.starts[1:] - 1, 3]) <= STANDS
+    stand = np.abs(plans.states[plans.starts[1:] - 1, 3]) <= STANDING
     for number in numbers[stand[numbers]].tolist():
         plan = plans[number]
         metres = np.hypot(*np.diff(plan.states[:, :2], axis=0).T)

@@ -151,7 +151,7 @@ def _found(
     room = len(model.controls) - MORE_STEPS[-1]
     guesses = {k: guess for k, guess in enumerate(given) if 0 < len(guess.controls) <= room}
     used = 0
-    number, best, cost = -1, None, 0
+    number, best, below = -1, None, cheaper_than
     for attempt in effort.attempts:
         barrier = around.soft.barrier._replace(strength=attempt.strength, contact=attempt.contact_m)
         drive = around._replace(
@@ -166,15 +166,14 @@ def _found(
         left = {}
         costs = {k: guess.duration_s + extras[k] * vehicle.dt for k, guess in guesses.items()}
         for k in sorted(guesses, key=lambda k: costs[k]):
-            below = cheaper_than if best is None else cost
             found, spent = _in_whole_steps(drive, guesses[k], vehicle, effort, below - extras[k], most - used)
             used += spent
-            if found is not None and cost_in_steps(found, vehicle) < below:
-                number, best, cost = k, found, cost_in_steps(found, vehicle)
+            if found is not None and (cost := cost_in_steps(found, vehicle)) < below:
+                number, best, below = k, found, cost
             else:
                 left[k] = guesses[k]
         promising = PROMISING * cheaper_than * vehicle.dt
-        most_s = promising if best is None else (cost - 1) * vehicle.dt
+        most_s = promising if best is None else (below - 1) * vehicle.dt
         guesses = {k: guess for k, guess in left.items() if costs[k] < most_s}
         if not guesses or used >= most or working_clock() > drive.until:
             break

@@ -10,7 +10,7 @@ import numpy as np
 from planners.search.manoeuvres.pose_tree import CHECKS, PoseTree, add_known_node
 from planners.search.query import Endings
 from planners.world.arrays import Floats, Indices, Integers
-from planners.world.driving_cost import extra_cost
+from planners.world.driving_cost import STANDING, extra_cost
 from planners.world.geometry.collision import Scene, state_is_free
 from planners.world.jit import inlined, lean
 from planners.world.problem import Plan
@@ -18,7 +18,6 @@ from planners.world.trigonometry import sincos
 from planners.world.vehicles.dynamics import State, load
 from planners.world.vehicles.vehicle import Vehicle, state_size
 
-STANDS: Final = 1e-6  # m/s
 FARTHEST: Final = 4.0  # from the goal, in the length of vehicle and trailers: where an ending begins
 
 
@@ -30,7 +29,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
     size = vehicle.front + vehicle.rear + sum(each.hitch_length for each in getattr(vehicle, "trailers", ()))
     states, controls, starts, follows = [], [], [0], []
     for drive, steering in plans:
-        stands = np.abs(drive[:, 3]) < STANDS
+        stands = np.abs(drive[:, 3]) < STANDING
         if not stands[-1]:
             continue
         local = in_frame_of_end(drive)
@@ -55,7 +54,7 @@ def endings_of(plans: Iterable[tuple[Floats, Floats]], vehicle: Vehicle) -> Endi
 
 def last_of_stops(drive: Floats) -> Indices:
     """The numbers of those states ``[T, S]`` of a drive that are the last of a stop."""
-    stands = np.abs(drive[:, 3]) < STANDS
+    stands = np.abs(drive[:, 3]) < STANDING
     return np.flatnonzero(stands[:-1] & ~stands[1:])
 
 
