@@ -77,7 +77,7 @@ def passable(world: OccupancyMap, width: float, cell_m: float) -> GlobalPaths:
     squares = squares.reshape(rows, columns, -1)
     best = squares.argmax(axis=2)
     roomy = np.take_along_axis(squares, best[..., np.newaxis], axis=2)[..., 0]
-    fits = roomy >= 0.5 * NEARLY * width / world.resolution - OFF_MIDDLE
+    fits = (roomy > 0.0) & (roomy >= 0.5 * NEARLY * width / world.resolution - OFF_MIDDLE)
     row, column = np.indices((rows, columns))
     spots = np.stack((factor * column + best % factor, factor * row + best // factor), axis=-1) + 0.5
     grid = OccupancyMap(world.name, ~fits, factor * world.resolution, world.origin)

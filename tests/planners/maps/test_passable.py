@@ -52,9 +52,10 @@ def test_every_spot_lies_in_its_cell_and_as_free_as_any_there() -> None:
     assert world.is_free(paths.spots[~paths.grid.occupied]).all()
 
 
-def test_cells_of_a_coarse_map_stay_as_they_are() -> None:
+@given(width=st.floats(0.01, WIDTH))
+def test_cells_of_a_coarse_map_stay_as_they_are(width: float) -> None:
     blocked = np.random.default_rng(4).random((30, 30)) < 0.3
-    paths = passable(OccupancyMap("coarse", blocked, 1.0), WIDTH, 1.0)
+    paths = passable(OccupancyMap("coarse", blocked, 1.0), width, 1.0)
     assert np.array_equal(paths.grid.occupied, blocked)
     assert np.allclose(paths.spots[2, 5], [5.5, 2.5])
 
