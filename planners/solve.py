@@ -18,7 +18,7 @@ from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.memory import Memory, scale_fault
 from planners.memory.plans.free import turned
 from planners.memory_answers import LateHelp, MemoryAnswer, answer_from
-from planners.search.anytime import improve, search_and_polish
+from planners.search.anytime import improve
 from planners.search.free_goal import aimed_view
 from planners.search.guides.detour import SECOND_LOOK
 from planners.search.guides.guidance import published_guidance
@@ -26,6 +26,7 @@ from planners.search.help import fresh_guide
 from planners.search.outcome import Status
 from planners.search.query import Limits, Query, usual_limits
 from planners.search.registry import PLANNERS
+from planners.search.search_and_polish import search_and_polish
 from planners.world.arrays import Integers
 from planners.world.compiling import working_clock
 from planners.world.driving_cost import cost_of

@@ -1,30 +1,23 @@
 """Improves a plan: polishes it, then searches again and again for one that is better once it is polished.
 
-Answers are improved a little, since the first plan is rarely a good drive (``search_and_polish``): in narrow
-places drives of several kinds are found at once, elsewhere one after another, each shorter. Where there is
-more time (``improve``), each search has a bound on driving time and random numbers of its own (AO-x, Hauser
-and Zhou, T-RO 2016, with any of the planners as x). A plan within the bound is polished. The bound is a
-little above the best driving time at first, because a plan as a search finds it takes longer, and falls with
-each search in vain. In narrow places each search looks for drives of other kinds instead, each for twice as
-long as the one before, as long as there is time for that.
+Each search has a bound on driving time and random numbers of its own (AO-x, Hauser and Zhou, T-RO 2016, with
+any of the planners as x). A plan within the bound is polished. The bound is a little above the best driving
+time at first, because a plan as a search finds it takes longer, and falls with each search in vain. In narrow
+places each search looks for drives of other kinds instead, each for twice as long as the one before, as long
+as there is time for that.
 """
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
-
 from planners.optimisation.polish import most_iterations, polish_quickest
 from planners.search.guides.guidance import guidance
-from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
 from planners.search.manoeuvres.suitability import is_tight, meets, suits
 from planners.search.manoeuvres.variants import counting_time
-from planners.search.outcome import Outcome, Status
 from planners.search.query import POSE_EXPANSIONS, Limits, Query
 from planners.search.registry import PLANNERS
 from planners.world.compiling import working_clock
@@ -45,12 +38,6 @@ LEAST_GAIN = 0.01  # share of the cost that a new plan must save, when all slack
 FIRST_SLACK = 0.1  # share of the cost by which a plan may cost more before it is polished
 SLACK_KEPT = 0.5  # after each search in vain
 EXPANSIONS_AN_ITERATION = 50  # of a polish: they take about as long
-SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cost ...
-AGAIN = 1000  # ... and so many expansions its search at least, ...
-AS_MANY = 8  # ... so many times as many as the first one had, ...
-MOST_AGAIN = 8000  # ... and so many at most
-BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
-POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
 
 class Improvement(NamedTuple):
@@ -80,7 +67,7 @@ def _is_there(plan: Plan | None) -> bool:
     return plan is not None and len(plan.controls) == 0
 
 
-def _asking_for_kinds(planner: str, query: Query) -> Query:
+def asking_for_kinds(planner: str, query: Query) -> Query:
     """Ask for drives of other kinds, too, where it is narrow and the planner finds such."""
     goal, vehicle = goal_of(query.problem, query.vehicle), query.vehicle
     if planner != "lattice" or not suits(goal, vehicle):
@@ -101,6 +88,7 @@ def improve(
     scene: Scene | None = None,
     vehicle: Vehicle = CAR,
     workspace: Workspace | None = None,
+    is_polished: bool = False,
 ) -> Improved:
     """Improve a plan, or find a first one, until a limit is reached.
 
@@ -119,6 +107,7 @@ def improve(
         scene: ``scene_of(problem)``, if the caller has it already.
         vehicle: what is to be driven.
         workspace: the caller's buffers; by default new ones.
+        is_polished: whether the given plan is polished already.
 
     Raises:
         ValueError: There is no limit.
@@ -158,8 +147,9 @@ def improve(
 
     if given is not None:
         history.append(Improvement(0.0, 0, given.duration_s, cost_of(given, vehicle)))
-        consider(given)
-    kinds = _asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
+        if not is_polished:
+            consider(given)
+    kinds = asking_for_kinds(name, Query(problem, generator(seed), scene, workspace, vehicle=vehicle))
     looks_for_kinds, took = kinds.others, 0.0
     seen: set[bytes] = set()  # drives that were polished
     while spent < most and not _is_there(best) and (left := seconds - (working_clock() - began)) > 0.0:
@@ -201,99 +191,3 @@ def improve(
             budget = min(budget * GROWTH, MOST_EXPANSIONS)
             slack *= SLACK_KEPT
     return Improved(best, tuple(history), working_clock() - began, checks, spent, nodes, is_given)
-
-
-def search_and_polish(
-    planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
-) -> tuple[Outcome, Plan | None]:
-    """Search for several plans, polish them and keep the one that costs least.
-
-    Where a vehicle's drives cost more than their time, all of that is done twice: by what they cost, and as
-    if only time counted. The answer that costs less is returned.
-
-    Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
-    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
-    first search took, the worse its plan mostly is, and the longer they may take. A given plan may be of a
-    worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
-
-    Args:
-        planner: one of ``PLANNERS``.
-        query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
-        seed: of the further searches.
-        given: a plan to begin with, which is polished too.
-        below_s: only a plan that costs less is wanted: the search goes on for as long as that is worth, and
-            what seems to cost more is not polished on.
-
-    Returns:
-        The outcome of the search with the plan that costs least, polished, or the first without a plan,
-        with the work and the time of all; and what that plan was before it was polished.
-    """
-    until = working_clock() + query.limits.seconds
-    vehicle = counting_time(query.vehicle)
-    if vehicle == query.vehicle:
-        return _searched_and_polished(planner, query, seed, given, below_s)
-    by_time = replace(query, vehicle=vehicle, rng=copy.deepcopy(query.rng), beside=None)
-    answers = [_searched_and_polished(planner, query, seed, given, below_s)]
-    limits = replace(query.limits, seconds=max(until - working_clock(), 0.0))
-    answers.append(_searched_and_polished(planner, replace(by_time, limits=limits), seed, given, below_s))
-    costs = [cost_of(each.plan, query.vehicle) if each.plan else math.inf for each, _ in answers]
-    best, rough = answers[int(np.argmin(costs))]
-    return _with_work([each for each, _ in answers], best), rough
-
-
-def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
-    """One outcome with the work and the time of all."""
-    return replace(
-        one,
-        collision_checks=sum(each.collision_checks for each in all_of),
-        expansions=sum(each.expansions for each in all_of),
-        nodes=sum(each.nodes for each in all_of),
-        roadmap_seconds=sum(each.roadmap_seconds for each in all_of),
-        search_seconds=sum(each.search_seconds for each in all_of),
-    )
-
-
-def _searched_and_polished(
-    planner: str, query: Query, seed: int, given: Plan | None, below_s: float
-) -> tuple[Outcome, Plan | None]:
-    """As ``search_and_polish``, once."""
-    until = working_clock() + query.limits.seconds
-    query, vehicle = _asking_for_kinds(planner, query), query.vehicle
-    varies = query.others
-    if math.isfinite(below_s):
-        worth = int(PER_SQUARE_SECOND * below_s * below_s)
-        query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))
-    most = query.limits.expansions
-    if given is not None:
-        most = min(BESIDE if varies else AGAIN, most)
-    found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
-    plan = None if varies else found[0].plan
-    again = min(max(AGAIN, AS_MANY * found[0].expansions), MOST_AGAIN)
-    least_s = min((cost_of(each, vehicle) for each in (given, found[0].plan) if each), default=0.0)
-    while plan is not None and least_s > 0.0:  # it may be at the goal already
-        limits = replace(
-            query.limits,
-            expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
-            seconds=until - working_clock(),
-            bound_s=min(SHORTER * least_s, query.limits.bound_s),
-        )
-        if limits.expansions <= 0 or limits.seconds <= 0.0:
-            break
-        rng = generator(seed, "again", query.problem.id, planner, len(found))
-        found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
-        plan = found[-1].plan
-        least_s = least_s if plan is None else cost_of(plan, vehicle)
-    answers = found if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0), *found]
-    solved = [(each, each.plan) for each in answers if each.plan is not None]
-    cheapest = sorted(range(len(solved)), key=lambda k: cost_of(solved[k][1], vehicle))[:POLISHED]
-    solved = [solved[k] for k in sorted(cheapest)]  # a given plan first: it stays unless another is quicker
-    solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
-    if not solved:
-        return found[0], None
-    number, polished = polish_quickest(
-        *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
-        seconds=until - working_clock(),
-        below_s=below_s,
-    )
-    best, rough = solved[number]
-    return _with_work(found, replace(best, plan=polished.plan or rough)), rough

@@ -27,11 +27,11 @@ from planners.search.structures.cost_to_go import (
 from planners.search.structures.frontier import (
     allocate_frontier,
 )
-from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of
+from planners.search.structures.time_to_go import NO_TABLE, Ahead, ahead_of, expected_seconds
 from planners.world.arrays import Floats
 from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, drawing_of, window_of
-from planners.world.goal import RADIUS, X, Y, asks_for_more, place
+from planners.world.goal import RADIUS, X, Y, place
 from planners.world.problem import Plan, is_canonical
 from planners.world.vehicles.dynamics import turning_speed
 
@@ -51,7 +51,7 @@ class LatticeSettings(NamedTuple):
         Lattice(steps=4, speeds=4, cell=0.5, headings=32, pace=0.5),
         Lattice(steps=3, speeds=4, cell=0.25, headings=48, pace=0.25),
     )  # the same for problems that are not canonical; where a speed is asked at the goal, without one or two
-    sharpest: float = 0.65  # 1/m: no primitive on the way to a pose bends more at full speed
+    sharpest: float = 0.65  # 1/m: no primitive bends more at full speed
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
@@ -87,6 +87,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
     joining: Manoeuvring | None = None
     joined = False
     squeezed: Plan | None = None
+    expected_s: float | None = None
     may_squeeze = not improving
     may_stop = not improving and query.prefix is None
 
@@ -96,7 +97,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
         return drawing_of(query.problem, query.workspace).occupied
 
     def prepare(tree: trees.Tree, goal: Floats, trial: int) -> None:
-        nonlocal level, tried, ahead, manoeuvring, joining
+        nonlocal level, tried, ahead, manoeuvring, joining, expected_s
         if trial == 0:
             ahead = ahead_of(goal, go, vehicle)
             cells = occupied()
@@ -106,9 +107,10 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                 manoeuvring = Manoeuvring(query, goal, cells)
                 if query.endings is not None:
                     joining = manoeuvring.joining(query, query.endings)
-        sharpest = settings.sharpest if asks_for_more(goal) else math.inf
-        level = paced(levels[min(tried, len(levels) - 1)], vehicle, sharpest)
+        level = paced(levels[min(tried, len(levels) - 1)], vehicle, settings.sharpest)
         tried += 1
+        if trial == 0:
+            expected_s = expected_seconds(tree.states, ahead, level.heading_s, level.late_s, vehicle)
         if improving:
             level = varied(level, settings.improving_greed, query)
         begin_lattice(tree, frontier, ahead, level, vehicle)
@@ -226,6 +228,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
             collision_checks=outcome.collision_checks + manoeuvring.checks - checks,
             search_seconds=outcome.search_seconds + working_clock() - began,
         )
+    outcome = replace(outcome, expected_s=expected_s)
     if joining is None:
         return outcome
     return replace(

@@ -215,7 +215,7 @@ def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
     steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
     slower = top / turning_speed(vehicle)  # times as long as at full speed a turn takes
     turn = lattice.turn
-    if sharpest < math.inf and vehicle.max_lateral_acceleration == math.inf:
+    if vehicle.max_lateral_acceleration == math.inf:
         turn *= min(sharpest_at(top, sharpest * top * top, vehicle) / turn_limit(vehicle), 1.0)
     return lattice._replace(steps=max(steps, 1), paces=paces, turn=turn, heading_s=slower * lattice.heading_s)
 

@@ -96,3 +96,9 @@ def seconds_to_go(state: State, ahead: Ahead, turn_s: float, late_s: float, vehi
         rest = seconds_from(state[0], state[1], state[2], pose, ahead.table, vehicle.max_speed)
         seconds = max(seconds, rest + slow - 0.5 * vehicle.max_speed / acceleration)
     return float(seconds)
+
+
+@lean
+def expected_seconds(states: Floats, ahead: Ahead, turn_s: float, late_s: float, vehicle: Vehicle) -> float:
+    """``seconds_to_go`` from the first of ``states [T, S]``, for callers that are not compiled themselves."""
+    return seconds_to_go(load(states, 0, vehicle), ahead, turn_s, late_s, vehicle)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planners.maps.questions import question_in
 from planners.optimisation.polish import Polished
 from planners.search import anytime
 from planners.search.anytime import improve
@@ -17,7 +16,6 @@ from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family
-from planners.world.classes.problem_classes import problem_class
 from planners.world.randomness import generator
 from planners.world.vehicles.vehicle import CAR
 from tests.planners.clock import ticks
@@ -156,13 +154,3 @@ def test_who_is_there_already_is_done(name, limit):
     assert found.plan is not None
     assert found.plan.duration_s == 0.0
     assert found.seconds < 30.0
-
-
-def test_where_a_first_plan_was_hard_to_find_the_next_search_may_take_longer(monkeypatch):
-    world = problem_class("curves").draw(5001, 68)
-    asked, _ = to_canonical(question_in(world, 5001, 0, pose=True))
-    answer = solve(asked, "lattice", seed=1)
-    monkeypatch.setattr(anytime, "AS_MANY", 0)
-    hasty = solve(asked, "lattice", seed=1)
-    assert faults(asked, answer.plan) == []
-    assert answer.duration_s < 0.7 * hasty.duration_s

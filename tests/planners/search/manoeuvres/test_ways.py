@@ -10,8 +10,8 @@ import pytest
 from planners.optimisation import polish
 from planners.optimisation.interior import quickest
 from planners.optimisation.polish import polish_quickest
-from planners.search import anytime, lattice
-from planners.search.anytime import search_and_polish
+from planners.search import lattice
+from planners.search import search_and_polish as searching
 from planners.search.lattice import LatticeSettings
 from planners.search.manoeuvres import manoeuvring
 from planners.search.manoeuvres.endings import endings_of
@@ -19,6 +19,7 @@ from planners.search.manoeuvres.ways import KEPT, allocate_ways, forget_ways, ke
 from planners.search.outcome import Outcome
 from planners.search.query import Endings, Limits, Query
 from planners.search.registry import PLANNERS
+from planners.search.search_and_polish import search_and_polish
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
 from planners.world.classes.families import family
@@ -127,7 +128,7 @@ def test_the_clock_is_looked_at_all_the_time_and_ends_all_soon(
     assert first is not None
     for looks in (0, 3, 10, 30, 100, 10**9):
         now = ticks(1.0)
-        for module in (anytime, lattice, manoeuvring, polish, quickest):
+        for module in (searching, lattice, manoeuvring, polish, quickest):
             monkeypatch.setattr(module, "working_clock", now)
         query = replace(asked(problem), limits=Limits(seconds=looks))
         found = search_and_polish("lattice", query, 0)[0].plan

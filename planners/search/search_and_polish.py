@@ -1,0 +1,164 @@
+"""Searches for several plans, polishes them and keeps the best: the first plan is rarely a good drive.
+
+In narrow places drives of several kinds are found at once, elsewhere one after another, each shorter. What
+then still takes much longer than was expected is improved for as long as that is worth.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from planners.optimisation.polish import polish_quickest
+from planners.search.anytime import asking_for_kinds, improve
+from planners.search.manoeuvres.manoeuvring import PER_SQUARE_SECOND
+from planners.search.manoeuvres.variants import counting_time
+from planners.search.outcome import Outcome, Status
+from planners.search.query import Query
+from planners.search.registry import PLANNERS
+from planners.world.compiling import working_clock
+from planners.world.driving_cost import cost_of
+from planners.world.problem import Plan
+from planners.world.randomness import generator
+
+SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cost ...
+AGAIN = 1000  # ... and so many expansions its search at least, ...
+AS_MANY = 8  # ... so many times as many as the first one had, ...
+MOST_AGAIN = 8000  # ... and so many at most
+LONG = 0.05  # share of its cost by which a drive may cost more than was expected ...
+A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it costs more
+BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
+POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
+
+
+def search_and_polish(
+    planner: str, query: Query, seed: int, given: Plan | None = None, below_s: float = math.inf
+) -> tuple[Outcome, Plan | None]:
+    """Search for several plans, polish them and keep the one that costs least.
+
+    Where a vehicle's drives cost more than their time, all of that is done twice: by what they cost, and as
+    if only time counted. The answer that costs less is returned.
+
+    Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
+    kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
+    first search took, the worse its plan mostly is, and the longer they may take. A given plan may be of a
+    worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
+
+    Args:
+        planner: one of ``PLANNERS``.
+        query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
+        seed: of the further searches.
+        given: a plan to begin with, which is polished too.
+        below_s: only a plan that costs less is wanted: the search goes on for as long as that is worth, and
+            what seems to cost more is not polished on.
+
+    Returns:
+        The outcome of the search with the plan that costs least, polished, or the first without a plan,
+        with the work and the time of all; and what that plan was before it was polished.
+    """
+    until = working_clock() + query.limits.seconds
+    vehicle = counting_time(query.vehicle)
+    if vehicle == query.vehicle:
+        return _searched_and_polished(planner, query, seed, given, below_s)
+    by_time = replace(query, vehicle=vehicle, rng=copy.deepcopy(query.rng), beside=None)
+    answers = [_searched_and_polished(planner, query, seed, given, below_s)]
+    limits = replace(query.limits, seconds=max(until - working_clock(), 0.0))
+    answers.append(_searched_and_polished(planner, replace(by_time, limits=limits), seed, given, below_s))
+    costs = [cost_of(each.plan, query.vehicle) if each.plan else math.inf for each, _ in answers]
+    best, rough = answers[int(np.argmin(costs))]
+    return _with_work([each for each, _ in answers], best), rough
+
+
+def _with_work(all_of: Sequence[Outcome], one: Outcome) -> Outcome:
+    """One outcome with the work and the time of all."""
+    return replace(
+        one,
+        collision_checks=sum(each.collision_checks for each in all_of),
+        expansions=sum(each.expansions for each in all_of),
+        nodes=sum(each.nodes for each in all_of),
+        roadmap_seconds=sum(each.roadmap_seconds for each in all_of),
+        search_seconds=sum(each.search_seconds for each in all_of),
+    )
+
+
+def _searched_and_polished(
+    planner: str, query: Query, seed: int, given: Plan | None, below_s: float
+) -> tuple[Outcome, Plan | None]:
+    """As ``search_and_polish``, once."""
+    until = working_clock() + query.limits.seconds
+    query, vehicle = asking_for_kinds(planner, query), query.vehicle
+    varies = query.others
+    if math.isfinite(below_s):
+        worth = int(PER_SQUARE_SECOND * below_s * below_s)
+        query = replace(query, limits=replace(query.limits, expansions=min(worth, query.limits.expansions)))
+    most = query.limits.expansions
+    if given is not None:
+        most = min(BESIDE if varies else AGAIN, most)
+    found = [PLANNERS[planner](replace(query, limits=replace(query.limits, expansions=most)))]
+    plan = None if varies else found[0].plan
+    again = min(max(AGAIN, AS_MANY * found[0].expansions), MOST_AGAIN)
+    least_s = min((cost_of(each, vehicle) for each in (given, found[0].plan) if each), default=0.0)
+    while plan is not None and least_s > 0.0:  # it may be at the goal already
+        limits = replace(
+            query.limits,
+            expansions=min(again, query.limits.expansions - sum(each.expansions for each in found)),
+            seconds=until - working_clock(),
+            bound_s=min(SHORTER * least_s, query.limits.bound_s),
+        )
+        if limits.expansions <= 0 or limits.seconds <= 0.0:
+            break
+        rng = generator(seed, "again", query.problem.id, planner, len(found))
+        found.append(PLANNERS[planner](replace(query, rng=rng, limits=limits, beside=None)))
+        plan = found[-1].plan
+        least_s = least_s if plan is None else cost_of(plan, vehicle)
+    answers = found if given is None else [Outcome(Status.SOLVED, given, 0, 0, 0, 0.0, 0.0), *found]
+    solved = [(each, each.plan) for each in answers if each.plan is not None]
+    cheapest = sorted(range(len(solved)), key=lambda k: cost_of(solved[k][1], vehicle))[:POLISHED]
+    solved = [solved[k] for k in sorted(cheapest)]  # a given plan first: it stays unless another is quicker
+    solved += [(replace(each, joined=other.joined), other.plan) for each in found for other in each.others]
+    if not solved:
+        return found[0], None
+    number, polished = polish_quickest(
+        *(query.problem, [plan for _, plan in solved], vehicle, query.scene, query.workspace),
+        seconds=until - working_clock(),
+        below_s=below_s,
+    )
+    best, rough = solved[number]
+    answer = _with_work(found, replace(best, plan=polished.plan or rough))
+    expected_s, cost = found[0].expected_s, min(cost_of(polished.plan or rough, vehicle), below_s)
+    if varies or expected_s is None or cost - expected_s <= LONG * cost:
+        return answer, rough
+    worth = int(A_SECOND * (cost - expected_s))
+    answer, found_more = _improved(planner, query, seed, answer, worth, until)
+    return answer, found_more or rough
+
+
+def _improved(
+    planner: str, query: Query, seed: int, answer: Outcome, expansions: int, until: float
+) -> tuple[Outcome, Plan | None]:
+    """A polished answer after so many more expansions, and its plan if that was found anew."""
+    plan, vehicle = answer.plan, query.vehicle
+    more = improve(
+        *(planner, query.problem, plan),
+        seconds=until - working_clock(),
+        expansions=min(expansions, query.limits.expansions),
+        seed=seed,
+        scene=query.scene,
+        vehicle=vehicle,
+        workspace=query.workspace,
+        is_polished=True,
+    )
+    answer = replace(
+        answer,
+        plan=more.plan,
+        joined=answer.joined and more.is_given,
+        expansions=answer.expansions + more.expansions,
+        collision_checks=answer.collision_checks + more.collision_checks,
+        nodes=answer.nodes + more.nodes,
+        search_seconds=answer.search_seconds + more.seconds,
+    )
+    return answer, None if more.is_given else more.plan
