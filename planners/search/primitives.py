@@ -7,6 +7,7 @@ turn rates). States in the same cell of place, heading and speed count as one.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 from planners.search.connection.connection import word_speed
@@ -39,9 +40,11 @@ from planners.world.vehicles.dynamics import (
     State,
     admissible,
     control_limits,
+    curvature_of,
     load,
     sharpest_at,
     step,
+    tightest_bend,
     turn_limit,
     turn_limit_at,
     turning_speed,
@@ -51,6 +54,8 @@ from planners.world.vehicles.vehicle import Vehicle
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
 GRIPPING: Final = 0.6  # of ``SHARES``: the one that is as sharp as lateral acceleration allows at the speed
 SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
+TURNED: Final = 2.0 / 3.0  # radians: the least that a primitive turns by, fully steered ...
+FARTHEST_M: Final = 12.0  # ... unless that takes a longer way
 CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
 
 
@@ -199,15 +204,20 @@ def grow_lattice(
                 open_vertex(tree, last, frontier, ahead, lattice, vehicle)
 
 
+@lru_cache(64)
 def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
     """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
 
-    Speeds are told apart more finely if two primitives one after another would not get from one to the next.
-    Who turns on the spot would turn round in each primitive: at full speed none bends more than ``sharpest``
-    (1/m). Where lateral acceleration is limited that does so already.
+    Who turns in wide circles drives on until it has turned by ``TURNED``, if that is not too far: else
+    turning and driving straight on end in one cell, and only one of them counts. Speeds are told apart more
+    finely if two primitives one after another would not get from one to the next. Who turns on the spot would
+    turn round in each primitive: at full speed none bends more than ``sharpest`` (1/m). Where lateral
+    acceleration is limited that does so already.
     """
     top = vehicle.max_speed
-    seconds = 2.0 / top
+    unlimited = vehicle._replace(max_lateral_acceleration=math.inf)
+    sharpest_bend = curvature_of(tightest_bend(top, unlimited), unlimited)
+    seconds = max(2.0, min(TURNED / sharpest_bend, FARTHEST_M)) / top
     faster = 2.0 * seconds * control_limits(vehicle)[0]
     paces = lattice.paces
     while faster * paces < top - vehicle.min_speed and paces < 8:
