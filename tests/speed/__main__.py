@@ -18,6 +18,7 @@ SECTIONS: Final = {
     "connections": "tests.speed.connections",
     "planners": "tests.speed.planners",
     "vehicles": "tests.speed.vehicles",
+    "unlike_vehicles": "tests.speed.unlike_vehicles",
     "driving_costs": "tests.speed.driving_costs",
     "manoeuvres": "tests.speed.manoeuvres",
     "kin": "tests.speed.kin",

@@ -46,21 +46,21 @@ WITH_MEMORY: Final = [("lattice", "closed"), ("lattice", "random-closed"), ("gus
 WORLDS: Final = (*CLASSES, *(CITIES if SHARED.is_dir() else ()))
 
 
-def worlds_of(name: str, count: int, vehicle: Vehicle) -> list[Problem]:
+def worlds_of(name: str, count: int, vehicle: Vehicle, seed: int = SEED) -> list[Problem]:
     """So many worlds of a class, or windows of a city."""
     if name in CLASSES:
         source = problem_class(name, vehicle=vehicle)
-        return [source.draw(SEED, index) for index in range(count)]
+        return [source.draw(seed, index) for index in range(count)]
     city = source_at(SHARED / "maps" / f"{name}.map")
     size = vehicle.scale  # a city for a vehicle half as large is half as large
-    settings = ImportSettings(vehicle, count=count, seed=SEED, scale=size, resolution=size)
+    settings = ImportSettings(vehicle, count=count, seed=seed, scale=size, resolution=size)
     return list(import_part(city, "test", settings).problems)
 
 
-def questions_of(name: str, count: int, vehicle: Vehicle, pose: bool) -> Iterator[Problem]:
+def questions_of(name: str, count: int, vehicle: Vehicle, pose: bool, seed: int = SEED) -> Iterator[Problem]:
     """One question in each of ``count`` worlds, fewer if some have no room."""
-    for number, world in enumerate(worlds_of(name, count, vehicle)):
-        asked = question_in(world, number, SEED, vehicle, pose)
+    for number, world in enumerate(worlds_of(name, count, vehicle, seed)):
+        asked = question_in(world, number, seed, vehicle, pose)
         if asked is not None:
             yield to_canonical(asked)[0]
 
