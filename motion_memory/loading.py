@@ -14,6 +14,7 @@ from planners.drive_answers import first_question
 from planners.memory.library.plan_library import PlanLibrary
 from planners.memory.recall import default_recall
 from planners.optimisation.polish import driven_near
+from planners.search.guides.guidance import guidance
 from planners.world.alignment import to_canonical
 from planners.world.arrays import Floats
 from planners.world.classes.families import families_of, family
@@ -117,4 +118,5 @@ def _warmed(ready: Memory) -> Memory:
     slot = to_canonical(narrow)[0]
     stands = np.tile(start_state(slot, ready.vehicle), (3, 1))
     driven_near(slot, stands, ready.vehicle, scene_of(slot), Workspace())  # pressing, which few plans need
+    guidance([stands])  # along a drive that is improved, as few are
     return ready

@@ -45,12 +45,14 @@ def search_and_polish(
 
     Where it is narrow, the lattice's search for manoeuvres goes on after its first drive, for others of other
     kinds. Elsewhere further searches look for a shorter plan as long as one is found soon: the longer the
-    first search took, the worse its plan mostly is, and the longer they may take. A given plan may be of a
-    worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
+    first search took, the worse its plan mostly is, and the longer they may take. If the answer still takes
+    much longer than the planner expected, it is improved for as long as that is worth. A given plan may be of
+    a worse kind than what the planner finds, so it searches as if there were none, but at first not for long.
 
     Args:
         planner: one of ``PLANNERS``.
-        query: what it is asked; its limits are those of all searches, its seconds of the polish, too.
+        query: what it is asked; its limits are those of all searches but the improvement, which has as many
+            expansions again; its seconds are those of the polish and the improvement, too.
         seed: of the further searches.
         given: a plan to begin with, which is polished too.
         below_s: only a plan that costs less is wanted: the search goes on for as long as that is worth, and
@@ -133,22 +135,21 @@ def _searched_and_polished(
     if varies or expected_s is None or cost - expected_s <= LONG * cost:
         return answer, rough
     worth = int(A_SECOND * (cost - expected_s))
-    answer, found_more = _improved(planner, query, seed, answer, worth, until)
-    return answer, found_more or rough
+    answer, anew = _improved(planner, query, seed, answer, worth, until)
+    return answer, anew or rough
 
 
 def _improved(
     planner: str, query: Query, seed: int, answer: Outcome, expansions: int, until: float
 ) -> tuple[Outcome, Plan | None]:
     """A polished answer after so many more expansions, and its plan if that was found anew."""
-    plan, vehicle = answer.plan, query.vehicle
     more = improve(
-        *(planner, query.problem, plan),
+        *(planner, query.problem, answer.plan),
         seconds=until - working_clock(),
         expansions=min(expansions, query.limits.expansions),
         seed=seed,
         scene=query.scene,
-        vehicle=vehicle,
+        vehicle=query.vehicle,
         workspace=query.workspace,
         is_polished=True,
     )
