@@ -109,7 +109,7 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
                     joining = manoeuvring.joining(query, query.endings)
         level = paced(levels[min(tried, len(levels) - 1)], vehicle, settings.sharpest)
         tried += 1
-        if trial == 0:
+        if trial == 0 and ahead.table is NO_TABLE:  # to a pose it is not known around obstacles
             expected_s = expected_seconds(tree.states, ahead, level.heading_s, level.late_s, vehicle)
         if improving:
             level = varied(level, settings.improving_greed, query)

@@ -54,8 +54,8 @@ from planners.world.vehicles.vehicle import Vehicle
 SHARES: Final = (0.0, 0.25, -0.25, 0.6, -0.6, 1.0, -1.0)  # of the largest steering angle or turn rate
 GRIPPING: Final = 0.6  # of ``SHARES``: the one that is as sharp as lateral acceleration allows at the speed
 SPEEDS: Final = (1.0, 0.5, -1.0, 0.0)  # shares of the largest speed; below 0 of the largest backwards
-TURNED: Final = 2.0 / 3.0  # radians: the least that a primitive turns by, fully steered ...
-FARTHEST_M: Final = 12.0  # ... unless that takes a longer way
+FARTHEST_M: Final = 12.0  # that a primitive leads, for those that turn in wide circles
+LEAVES: Final = 1.2  # cells of heading that they turn by
 CONNECT_M: Final = 15.0  # from the goal around obstacles: nearer vertices try to connect to it
 
 
@@ -208,21 +208,23 @@ def grow_lattice(
 def paced(lattice: Lattice, vehicle: Vehicle, sharpest: float) -> Lattice:
     """The lattice for a vehicle of any speed: a primitive leads as far as the car's, 2 m at full speed.
 
-    Who turns in wide circles drives on until it has turned by ``TURNED``, if that is not too far: else
-    turning and driving straight on end in one cell, and only one of them counts. Speeds are told apart more
-    finely if two primitives one after another would not get from one to the next. Who turns on the spot would
-    turn round in each primitive: at full speed none bends more than ``sharpest`` (1/m). Where lateral
+    Who turns in wide circles drives on until it has left its cell of heading, if that is not too far: else
+    turning and driving straight on end in one cell, and only one of them counts. Speeds are told apart
+    more finely if two primitives one after another would not get from one to the next. Who turns on the spot
+    would turn round in each primitive: at full speed none bends more than ``sharpest`` (1/m). Where lateral
     acceleration is limited that does so already.
     """
     top = vehicle.max_speed
     unlimited = vehicle._replace(max_lateral_acceleration=math.inf)
     sharpest_bend = curvature_of(tightest_bend(top, unlimited), unlimited)
-    seconds = max(2.0, min(TURNED / sharpest_bend, FARTHEST_M)) / top
+    leaving = LEAVES * math.tau / (lattice.headings * sharpest_bend)  # metres
+    metres = max(0.4 * lattice.steps, min(leaving, FARTHEST_M))
+    seconds = 2.0 / top
     faster = 2.0 * seconds * control_limits(vehicle)[0]
     paces = lattice.paces
     while faster * paces < top - vehicle.min_speed and paces < 8:
         paces += 1
-    steps = round(lattice.steps * seconds / (5.0 * vehicle.dt))
+    steps = round(metres / (top * vehicle.dt))
     slower = top / turning_speed(vehicle)  # times as long as at full speed a turn takes
     turn = lattice.turn
     if vehicle.max_lateral_acceleration == math.inf:

@@ -29,8 +29,8 @@ SHORTER = 0.9  # of what the cheapest so far costs: so much may the next one cos
 AGAIN = 1000  # ... and so many expansions its search at least, ...
 AS_MANY = 8  # ... so many times as many as the first one had, ...
 MOST_AGAIN = 8000  # ... and so many at most
-LONG = 0.05  # share of its cost by which a drive may cost more than was expected ...
-A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it costs more
+LONG = 0.05  # share of its time by which a drive may take longer than was expected ...
+A_SECOND = 1000  # ... else it is improved, with so many expansions for each second that it takes longer
 BESIDE = 4000  # expansions of the first search beside a plan that is given where it is narrow, else ``AGAIN``
 POLISHED = 2  # of the cheapest plans: which of them is cheapest when polished cannot be told before
 
@@ -131,10 +131,13 @@ def _searched_and_polished(
     )
     best, rough = solved[number]
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
-    expected_s, cost = found[0].expected_s, min(cost_of(polished.plan or rough, vehicle), below_s)
-    if varies or expected_s is None or cost - expected_s <= LONG * cost:
+    plan, expected_s = polished.plan or rough, found[0].expected_s
+    if varies or expected_s is None or cost_of(plan, vehicle) >= below_s:
         return answer, rough
-    worth = int(A_SECOND * (cost - expected_s))
+    too_long_s = plan.duration_s - expected_s
+    if too_long_s <= LONG * plan.duration_s:
+        return answer, rough
+    worth = int(A_SECOND * too_long_s)
     answer, anew = _improved(planner, query, seed, answer, worth, until)
     return answer, anew or rough
 
