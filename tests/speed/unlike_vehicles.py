@@ -94,6 +94,8 @@ def answers_of(problems: list[Problem], vehicle: Vehicle, seconds: float) -> lis
     """Answer each problem without and with an improvement of what takes long, in turning order."""
     workspace, other_work = Workspace(), OtherWork()
     found: list[Answers | None] = []
+    if not problems:
+        return found
     for before in (True, False):
         _answer(problems[0], vehicle, workspace, before)  # compiles
     with no_garbage_collection():
@@ -157,6 +159,9 @@ def report(
         table.add_column(heading, justify="left" if heading == "vehicle" else "right")
     for label, found in rows.items():
         solved = [each for each in found if each is not None]
+        if len(solved) < 2:  # of one there is no interval
+            table.add_row(label, f"{len(found)}", f"{len(solved)}")
+            continue
         planning, driving = (np.array([each[part] for each in solved]) for part in (0, 1))
         sooner = (planning + driving) @ [1.0, -1.0]
         low, high = bootstrap((sooner,), np.mean, rng=np.random.default_rng(1)).confidence_interval
