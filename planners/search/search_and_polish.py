@@ -132,10 +132,8 @@ def _searched_and_polished(
     best, rough = solved[number]
     answer = _with_work(found, replace(best, plan=polished.plan or rough))
     plan, expected_s = polished.plan or rough, found[0].expected_s
-    if varies or expected_s is None or cost_of(plan, vehicle) >= below_s:
-        return answer, rough
-    too_long_s = plan.duration_s - expected_s
-    if too_long_s <= LONG * plan.duration_s:
+    too_long_s = 0.0 if expected_s is None else plan.duration_s - expected_s
+    if varies or cost_of(plan, vehicle) >= below_s or too_long_s <= LONG * plan.duration_s:
         return answer, rough
     worth = int(A_SECOND * too_long_s)
     answer, anew = _improved(planner, query, seed, answer, worth, until)
