@@ -24,7 +24,7 @@ from dashboards.palette import INK, VERMILLION
 from dashboards.world_outlines import asked_pose, footprint_spacing_m, outlines
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import AT_REST, Stop
-from planners.routes.route import Stuck
+from planners.routes.stuck import Stuck
 from planners.world.arrays import Floats, Point, Pose
 from planners.world.vehicles.vehicle import CAR, Vehicle
 
@@ -55,7 +55,11 @@ def stuck_picture(
     x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
     is_on_map = all(0.0 <= scale * each <= side for each, side in zip(stuck.place, world.size, strict=True))
     figure, axes, close_ups = figure_over(
-        world, view, int(is_on_map), f"No route over {world.name}", f"{stuck.why}, at ({x:.1f}, {y:.1f})"
+        world,
+        view,
+        int(is_on_map),
+        f"No route over {world.name}",
+        stuck.told(world, scale).replace("; ", ";\n"),
     )
     handles = draw_ends(axes, world, start, stops, scale, view.longest)
     for close_up in close_ups:

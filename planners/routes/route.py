@@ -22,13 +22,15 @@ from planners.attempt import Attempt
 from planners.maps.global_path import GlobalPaths, length_of, passable
 from planners.maps.occupancy_map import OccupancyMap
 from planners.maps.surroundings import surroundings_of
+from planners.maps.widest_way import narrowest_gap
 from planners.routes.legs import Leg, joined, polished_legs, stricter
 from planners.routes.path_ahead import LocalGoal, PathAhead, Stop
+from planners.routes.stuck import NARROW, Stuck
 from planners.search.braking import free_stop, is_free_drive
 from planners.search.free_goal import lacks_room, unfolded
 from planners.search.query import Limits, usual_limits
 from planners.world.alignment import to_canonical
-from planners.world.arrays import Floats, Point, Pose
+from planners.world.arrays import Floats, Pose
 from planners.world.geometry.collision import count_free_prefix, note_free, point_is_free, scene_of
 from planners.world.problem import (
     CANONICAL_DISTANCE,
@@ -58,14 +60,6 @@ POSE_TRIES: Final = 8  # of states from which a pose is asked for: more take lon
 BRIEFLY: Final = Limits(expansions=8_000)
 
 Solve = Callable[[Problem, Limits], Attempt]
-
-
-class Stuck(NamedTuple):
-    """Why there is no route."""
-
-    place: Point  # metres; after a search the stop that was nearest to the goal
-    why: str  # a clause, which "at (x, y)" follows
-    attempts: int  # local problems that were tried; 0 if there was nothing to try
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +123,7 @@ class Router:
             tolerance_m: how far the outlines of occupied regions may move.
             polishes: whether the drive to each stop is polished as a whole.
         """
-        self._name, self._vehicle, self._polishes = world.name, vehicle, polishes
+        self._world, self._vehicle, self._polishes = world, vehicle, polishes
         self._workspace = Workspace()
         self._solve = solve
         self._surroundings = surroundings_of(world, 1.0, tolerance_m)
@@ -139,9 +133,9 @@ class Router:
             world.name, world.name, CANONICAL_START, (0.0, 0.0), GOAL_RADIUS, bounds, occupied
         )
         self._scene = scene_of(self._whole)
-        widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
-        self._paths = passable(world, widest, CELL_M)
-        self._wider = [cache(partial(passable, world, more * widest, CELL_M)) for more in WIDER]
+        self._widest = max(body.width for body in (vehicle, *trailers_of(vehicle)))
+        self._paths = passable(world, self._widest, CELL_M)
+        self._wider = [cache(partial(passable, world, more * self._widest, CELL_M)) for more in WIDER]
         self._wider.append(cache(self._roomy_paths))
         self._attempts = self._most_attempts = self._pose_tries = 0
 
@@ -236,16 +230,25 @@ class Router:
             else:
                 options.pop()
                 if not options:
-                    metres = ahead.to_go(nearest[np.newaxis])[0]
-                    tried = self._attempts - begun
-                    why = f"no plan leads on from where it came nearest, {metres:.0f} m before the goal"
-                    if free_stop(start, self._vehicle, self._scene) is None:
-                        why = "the vehicle can neither stop in time nor drive on from its motion at the start"
-                    return Stuck((float(nearest[0]), float(nearest[1])), why, max(tried, 1))
+                    return self._stuck(ahead, start, nearest, max(self._attempts - begun, 1))
                 legs.pop()
             state = legs[-1].end if legs else start
             nearest = min(nearest, state, key=lambda each: ahead.to_go(each[np.newaxis])[0])
         return legs
+
+    def _stuck(self, ahead: PathAhead, start: Floats, nearest: Floats, tried: int) -> Stuck:
+        """Why no legs were found from ``start [S]``; the search came as far as ``nearest [S]``."""
+        place = float(nearest[0]), float(nearest[1])
+        if free_stop(start, self._vehicle, self._scene) is None:
+            why = "the vehicle can neither stop in time nor drive on from its motion at the start"
+            return Stuck(place, why, tried)
+        to_go = float(ahead.to_go(nearest[np.newaxis])[0])
+        length = self._vehicle.front + self._vehicle.rear
+        gap = narrowest_gap(self._world, (float(start[0]), float(start[1])), ahead.stop.place, length)
+        if gap is not None and gap.width > NARROW * self._widest:
+            gap = None
+        why = "no plan leads on to the goal from where it came nearest"
+        return Stuck(place, why, tried, to_go, gap, self._widest)
 
     def _rests(self, state: Floats) -> bool:
         """Whether the vehicle stands, however its wheels are steered; of the first order it stops at once."""
@@ -284,7 +287,11 @@ class Router:
         before = 0.5 * max(CANONICAL_DISTANCE - distance, 0.0)
         cos, sin = math.cos(towards), math.sin(towards)
         window = self._surroundings.problem(
-            x - before * cos, y - before * sin, towards, f"{self._name}-route-{self._attempts}", self._name
+            x - before * cos,
+            y - before * sin,
+            towards,
+            f"{self._world.name}-route-{self._attempts}",
+            self._world.name,
         )
         along = CANONICAL_START[2]
         place = before * math.cos(along), before * math.sin(along), along + heading - towards

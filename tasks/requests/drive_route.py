@@ -14,7 +14,8 @@ from dashboards.cells import CellTable
 from planners.attempt import Attempt
 from planners.maps.occupancy_map import OccupancyMap
 from planners.routes.path_ahead import Stop
-from planners.routes.route import Route, Router, Stuck
+from planners.routes.route import Route, Router
+from planners.routes.stuck import Stuck
 from planners.search.query import Limits
 from planners.world.alignment import Alignment, from_canonical
 from planners.world.arrays import Pose
@@ -179,12 +180,12 @@ def _drive_mirrored(
 
 def _refusal(stuck: Stuck, source: Source, world: OccupancyMap, scale: float, moves: bool) -> Exception:
     """The error that says where the route ends: UsageError if nothing could be tried, else RunError."""
-    x, y, _ = world.pose(scale * stuck.place[0], scale * stuck.place[1], 0.0)
-    line = f"No route across {source.path.name}: {stuck.why}, at ({x:.1f}, {y:.1f})"
+    line = f"No route across {source.path.name}: {stuck.told(world, scale)}"
     if stuck.attempts == 0:
         return UsageError(f"{line}; choose another place or heading.")
     other = "motion at the start, --seed, heading" if moves else "--seed, heading"
-    return RunError(f"{line} ({stuck.attempts} local problems tried); try another {other} or planner.")
+    advice = f"try another {other} or planner" if stuck.gap is None else "it hardly fits through, if at all"
+    return RunError(f"{line} ({stuck.attempts} local problems tried); {advice}.")
 
 
 def _check(route: Route, plan: Plan, assistant: Assistant) -> None:

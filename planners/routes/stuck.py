@@ -1,0 +1,39 @@
+"""Why there is no route."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+from planners.maps.occupancy_map import OccupancyMap
+from planners.maps.widest_way import Gap
+from planners.world.arrays import Point
+
+NARROW: Final = 1.25  # times the width of the widest body: gaps below may be why no plan leads on
+
+
+class Stuck(NamedTuple):
+    """Why there is no route, and where. Lengths are canonical metres in grid coordinates."""
+
+    place: Point  # after a search the stop that was nearest to the goal
+    why: str  # a clause, which "at (x, y)" follows
+    attempts: int  # local problems that were tried; 0 if there was nothing to try
+    to_go: float | None = None  # metres of the shortest path from there, after a search
+    gap: Gap | None = None  # the narrowest on the widest way to the goal, if the vehicle hardly fits through
+    width: float = 0.0  # metres, of the widest body
+
+    def told(self, world: OccupancyMap, scale: float) -> str:
+        """Say it in metres of a map's own frame, of which ``scale`` are a canonical one."""
+        line = f"{self.why}, at {_place(self.place, world, scale)}"
+        if self.to_go is not None:
+            line += f", {scale * self.to_go:.0f} m before it"
+        if self.gap is not None:
+            line += (
+                f"; every way there is {scale * self.gap.width:.2f} m wide or less, as at "
+                f"{_place(self.gap.place, world, scale)}, and the vehicle {scale * self.width:.2f} m"
+            )
+        return line
+
+
+def _place(point: Point, world: OccupancyMap, scale: float) -> str:
+    x, y, _ = world.pose(scale * point[0], scale * point[1], 0.0)
+    return f"({x:.1f}, {y:.1f})"
