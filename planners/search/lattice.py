@@ -33,7 +33,7 @@ from planners.world.compiling import working_clock
 from planners.world.geometry.occupancy import Bits, drawing_of, window_of
 from planners.world.goal import RADIUS, X, Y, place
 from planners.world.problem import Plan, is_canonical
-from planners.world.vehicles.dynamics import turning_speed
+from planners.world.vehicles.dynamics import control_limits, turning_speed
 
 
 class LatticeSettings(NamedTuple):
@@ -54,6 +54,7 @@ class LatticeSettings(NamedTuple):
     sharpest: float = 0.65  # 1/m: no primitive bends more at full speed
     improving_greed: float = 1.2  # where only a plan better than a given one will do
     restart_after: int = 400  # expansions; every second trial is grown by RRT
+    full_speed_m: float = 4.0  # who gathers speed on a longer way has longer trials
     alone: int = 256  # expansions before manoeuvres are searched for as well, unless the goal is tight
     by_turns: tuple[int, int] = (64, 16)  # then expansions of this search, and of that for manoeuvres ...
     if_tight: tuple[int, int] = (16, 48)  # ... or so many, and with trailers
@@ -240,10 +241,12 @@ def lattice(query: Query, settings: LatticeSettings) -> Outcome:
 
 
 def _restart_after(query: Query, settings: LatticeSettings) -> int:
-    """Expansions of a trial: more where a vehicle brakes for bends, as a way then has more states."""
-    slower = query.vehicle.max_speed / turning_speed(query.vehicle)
+    """Expansions of a trial: more for who brakes for bends or gathers speed slowly: ways have more states."""
+    top = query.vehicle.max_speed
+    slower = top / turning_speed(query.vehicle)
+    longer = 0.5 * top * top / (control_limits(query.vehicle)[0] * settings.full_speed_m)
     most = max(query.limits.expansions // TRIALS, settings.restart_after)
-    return min(int(slower * slower * settings.restart_after), most)
+    return min(int(max(slower, longer, 1.0) ** 2 * settings.restart_after), most)
 
 
 def _differing(kept: list[Other], plan: Plan) -> list[Other]:

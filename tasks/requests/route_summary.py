@@ -12,7 +12,7 @@ from planners.maps.global_path import length_of
 from planners.routes.legs import Leg
 from planners.routes.path_ahead import Stop
 from planners.routes.route import Route
-from planners.world.driving_cost import cusps_of, metres_backwards
+from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.requests.assistant import Assistant
@@ -88,7 +88,9 @@ def route_summary(
     whole = f"{length} m{backwards} in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
     whole += f", {from_memory} from memory" * has_memory
     changes = len(cusps_of(plan, assistant.vehicle))
-    lines = [whole + (f", {_count(changes, 'change')} of gear" if changes else "")]
+    whole += f", {_count(changes, 'change')} of gear" if changes else ""
+    cost = cost_of(plan, assistant.vehicle)
+    lines = [whole + (f", costs {_rounded(cost)} s" if cost != plan.duration_s else "")]
     parts = [
         f"{source} {_count(len(metres), 'leg')}, {scale * sum(metres):.0f} m"
         for source, metres in by_source.items()

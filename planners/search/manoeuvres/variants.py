@@ -54,6 +54,21 @@ def counting_time(vehicle: Vehicle) -> Vehicle:
     return vehicle._replace(costs=Costs())
 
 
+def slowed(vehicle: Vehicle, speed: float) -> Vehicle:
+    """The vehicle as if it were slower wherever seconds count more: then its time is what drives cost.
+
+    One that has this ``speed`` (m/s) at the start and could not be slower is returned as it is.
+    """
+    costs = vehicle.costs
+    least = min(costs.forwards, costs.backwards)
+    slow = vehicle._replace(
+        min_speed=vehicle.min_speed * (least / costs.backwards),
+        max_speed=vehicle.max_speed * (least / costs.forwards),
+        costs=Costs(gear_change=costs.gear_change),
+    )
+    return slow if vehicle.min_speed < 0.0 and slow.min_speed <= speed <= slow.max_speed else vehicle
+
+
 def slimmer(vehicle: Vehicle, share: float) -> Vehicle:
     """The vehicle with every body smaller on all sides, by a ``share`` of its width; it drives as before."""
 

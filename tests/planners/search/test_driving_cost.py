@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from planners.maps.questions import question_in
 from planners.optimisation.polish import polish_quickest
 from planners.search.anytime import improve
+from planners.search.manoeuvres.variants import slowed
 from planners.solve import solve
 from planners.world.alignment import to_canonical
 from planners.world.authority.authority import faults
@@ -95,6 +96,30 @@ def test_slots_are_solved_as_often_by_who_pays() -> None:
         for i in range(3):
             problem = to_canonical(family(name, "hard", vehicle).draw(45, i))[0]
             driven(problem, costing(vehicle, 3.0, 1.0, 3.0))
+
+
+@given(forwards=st.floats(1.0, 10.0), backwards=st.floats(1.0, 10.0), speed=st.floats(-1.5, 1.5))
+def test_who_is_slower_in_a_gear_takes_as_long_as_driving_in_it_costs(
+    forwards: float, backwards: float, speed: float
+) -> None:
+    paying = costing(HUNTER, 0.5, forwards, backwards)
+    slow = slowed(paying, speed)
+    if slow == paying:
+        return
+    assert paying.min_speed <= slow.min_speed <= speed <= slow.max_speed <= paying.max_speed
+    least = min(forwards, backwards)  # whoever is as dear in both gears need not be slower
+    assert paying.max_speed / slow.max_speed == pytest.approx(forwards / least)
+    assert paying.min_speed / slow.min_speed == pytest.approx(backwards / least)
+    assert slow.costs == Costs(gear_change=0.5)
+    problem = strewn(3, 5)
+    plan = solve(problem, "lattice", vehicle=slow, polished=False).plan
+    assert plan is not None
+    assert faults(problem, plan, paying) == []
+
+
+def test_who_cannot_stand_is_never_slower() -> None:
+    plane = costing(HUNTER._replace(min_speed=0.5), 0.0, 3.0, 1.0)
+    assert slowed(plane, 0.5) == plane
 
 
 @given(seed=st.integers(0, 10**6))

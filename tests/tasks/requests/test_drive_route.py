@@ -280,3 +280,31 @@ def test_where_no_route_is_found_the_picture_says_where(town: Path, tmp_path: Pa
     assert call(asked) == 2
     assert picture.stat().st_size > 10_000
     assert not plan.exists()
+
+
+def test_a_heavy_vehicle_that_pays_for_driving_backwards_turns_round_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It begins in a corner, facing away: backing all the way took 50 s, turning round takes 65 s."""
+    (tmp_path / "hauler.yaml").write_text(
+        "name: hauler\n"
+        "kind: car\n"
+        "body: [[[-1.5, -1], [6.5, -1], [6.5, 1], [-1.5, 1]]]\n"
+        "wheelbase: 5\n"
+        "limits: {speed: [-4, 4], acceleration: 0.3, steering: 0.6, steering_rate: 0.5}\n"
+        "step: 0.1\n"
+        "costs: {backwards: 3, gear_change: 1}\n"
+    )
+    asked = [
+        "route",
+        str(SHARED / "maps/Berlin_0_256.map"),
+        "--vehicle",
+        str(tmp_path / "hauler.yaml"),
+    ]
+    asked += ["--from", "248,20,-1.5", "--to", "120,30,0"]
+    assert call([*asked, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    answer = told["answer"]
+    assert any(f"{answer['cost_s']:.1f} s" in line for line in told["lines"])
+    assert answer["backwards_m"] < 0.1 * answer["length_m"]
+    assert answer["cost_s"] < 1.5 * answer["duration_s"]
