@@ -25,6 +25,7 @@ from planners.world.vehicles.vehicle import (
 )
 
 HEADING_M: Final = 4.5  # from the start to the tip of the line that shows its heading
+LONGER: Final = 2.0  # times as long as beside a goal pose it is at most
 _CLEAR_M: Final = 2.0  # between two footprints of a plan, so that a small picture stays readable
 
 
@@ -50,7 +51,8 @@ def heading_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float]
 
     On the way to a pose it is shorter, but it ends well ahead of the ``vehicle``.
     """
-    return _tip(problem.start, HEADING_M if problem.arrival is None else _ahead_m(vehicle))
+    ahead = _ahead_m(vehicle)
+    return _tip(problem.start, min(HEADING_M, LONGER * ahead) if problem.arrival is None else ahead)
 
 
 def goal_tip(problem: Problem, vehicle: Vehicle = CAR) -> tuple[float, float] | None:

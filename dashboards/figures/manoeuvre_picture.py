@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 import shapely
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
@@ -33,17 +34,22 @@ def draw_manoeuvre(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     """
     swept = PathPatch(_path_of(swept_by(plan.states, vehicle)), facecolor=_SWEPT, linewidth=0, zorder=2)
     axes.add_patch(swept)
-    gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
-    steps = np.stack([plan.states[:-1, :2], plan.states[1:, :2]], axis=1)
-    for gear, colour in ((1, FORWARDS), (-1, BACKWARDS)):
-        driven = LineCollection(list(steps[gears == gear]), color=colour, linewidth=1.8, zorder=6.5)
-        axes.add_collection(driven)
-    draw_travel_arrows(axes, plan, vehicle, {1: FORWARDS, -1: BACKWARDS})
-    for row in [*cusps, *[len(gears)] * (len(gears) > 0)]:
+    draw_way(axes, plan, vehicle)
+    gears = gears_of(plan, vehicle)
+    for row in [*cusps_of(plan, vehicle), *[len(gears)] * (len(gears) > 0)]:
         colour = FORWARDS if gears[row - 1] > 0 else BACKWARDS
         bodies, _ = outlines(plan.states[row : row + 1], vehicle)
         drawn = PolyCollection(bodies, facecolor="none", edgecolor=colour, linewidth=0.9, zorder=3)
         axes.add_collection(drawn)
+
+
+def draw_way(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
+    """Draw the way of the reference point along ``plan`` in the colours of its gears, with arrows."""
+    gears, cusps = gears_of(plan, vehicle), cusps_of(plan, vehicle)
+    for first, last in pairwise([0, *cusps, len(gears)] if len(gears) else []):
+        colour = FORWARDS if gears[first] > 0 else BACKWARDS
+        axes.plot(*plan.states[first : last + 1, :2].T, color=colour, linewidth=1.8, zorder=6.5)
+    draw_travel_arrows(axes, plan, vehicle, {1: FORWARDS, -1: BACKWARDS})
     axes.plot(
         *plan.states[cusps, :2].T, linestyle="none", marker="o", markersize=4, color="white",
         markeredgecolor=INK, markeredgewidth=1.0, zorder=7,
@@ -71,6 +77,11 @@ def _path_of(ground: shapely.Geometry) -> Path:
 
 def manoeuvre_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Patch]:
     """What ``draw_manoeuvre`` draws of these ``drives``, plans and who drives them."""
+    return [*way_legend(drives), Patch(facecolor=_SWEPT, label="swept by its bodies")]
+
+
+def way_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Patch]:
+    """What ``draw_way`` draws of these ``drives``, plans and who drives them."""
     gears = {gear for plan, vehicle in drives for gear in gears_of(plan, vehicle).tolist()}
     changes = any(len(cusps_of(plan, vehicle)) for plan, vehicle in drives)
     shown: list[tuple[bool, Line2D | Patch]] = [
@@ -78,6 +89,5 @@ def manoeuvre_legend(drives: Sequence[tuple[Plan, Vehicle]]) -> list[Line2D | Pa
         (-1 in gears, Line2D([], [], color=BACKWARDS, linewidth=1.8, label="backwards")),
         (changes, Line2D([], [], color="white", marker="o", markeredgecolor=INK, markersize=5,
                          linestyle="none", label="change of gear")),
-        (True, Patch(facecolor=_SWEPT, label="swept by its bodies")),
     ]  # fmt: skip
     return [entry for occurs, entry in shown if occurs]

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
-from dashboards.figures.manoeuvre_picture import draw_manoeuvre, manoeuvre_legend
-from dashboards.figures.marks import draw_scale_bar, draw_travel_arrows
+from dashboards.figures.manoeuvre_picture import draw_manoeuvre, draw_way, manoeuvre_legend, way_legend
+from dashboards.figures.marks import draw_scale_bar
 from dashboards.figures.style import legend_below, message_figure, new_figure
 from dashboards.palette import GREEN, INK, OBSTACLE, ORANGE, SKY, VERMILLION
 from dashboards.world_outlines import (
@@ -89,12 +89,11 @@ def draw_problem(axes: Axes, problem: Problem, vehicle: Vehicle = CAR, colour: s
     draw_scale_bar(axes, problem)
 
 
-def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR, colour: str = GREEN) -> None:
+def draw_plan(axes: Axes, plan: Plan, vehicle: Vehicle = CAR) -> None:
     """Draw the way of the reference point along ``plan``, with arrows; the ``vehicle`` every few metres."""
-    axes.plot(*plan.states[:, :2].T, color=colour, linewidth=1.8, zorder=4)
-    draw_travel_arrows(axes, plan, vehicle, {1: colour, -1: colour})
+    draw_way(axes, plan, vehicle)
     shown = shown_states(plan, vehicle)
-    _draw_bodies(axes, shown, vehicle, facecolor=(colour, 0.2), edgecolor=colour, linewidth=0.8, zorder=3)
+    _draw_bodies(axes, shown, vehicle, facecolor=(GREEN, 0.2), edgecolor=GREEN, linewidth=0.8, zorder=3)
 
 
 def draw_recalled(axes: Axes, recalled: CheckedPlan, collisions: bool = False) -> None:
@@ -221,17 +220,19 @@ def _legend(examples: Sequence[Example], called: str) -> list[Line2D | Patch]:
     if any(speed_tip(example.problem) is not None for example in examples):
         label = "speed at the start: the way of a second"
         handles.append(Line2D([], [], color=VERMILLION, linewidth=2.4, label=label))
-    if any(example.answer is not None for example in to_places):
-        label = "plan found, with the vehicle every few metres"
-        handles.append(Line2D([], [], color=GREEN, linewidth=1.8, label=label))
     if to_poses:
         handles.append(
             Line2D([], [], marker="s", markerfacecolor="none", markeredgecolor=ORANGE, markersize=8,
                    linestyle="none", label="goal pose")
         )  # fmt: skip
-    drives = [(each.answer, each.vehicle) for each in to_poses if each.answer is not None]
-    if drives:
-        handles += manoeuvre_legend(drives)
+    ways, manoeuvres = (
+        [(each.answer, each.vehicle) for each in those if each.answer is not None]
+        for those in (to_places, to_poses)
+    )
+    if manoeuvres:
+        handles += manoeuvre_legend([*ways, *manoeuvres])
+    elif ways:
+        handles += way_legend(ways)
     if any(example.moved is not None for example in examples):
         handles.append(Line2D([], [], **_MOVED, label="stored drive, before it was moved"))
     if not any(example.recalled for example in examples):

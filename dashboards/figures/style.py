@@ -25,6 +25,7 @@ from storage.places.files import whole_file
 NO_ATTEMPTS: Final = "No attempts to show: run the benchmark first."
 PANEL_WIDTH: Final = 2.6  # inches: four panels across a page stay readable in print
 _NOTE_SIZE: Final = 8.0
+_LEGEND_SHARE: Final = 0.98  # of a figure's width, that legends may take with what is empty beside them
 _LEGEND_SIZE: Final = 8.5
 _LEGEND_LINE: Final = 0.55  # inches of an entry beside its label
 _LEGEND_HEIGHT: Final = 0.2  # inches of a line of entries
@@ -146,7 +147,7 @@ def legend_below(figure: Figure, handles: Sequence[Any], columns: int) -> None:
         legend = figure.legend(
             handles=handles, loc="outside lower left", ncols=count, frameon=False, fontsize=_LEGEND_SIZE
         )
-        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+        if count == 1 or legend.get_window_extent().width <= _LEGEND_SHARE * figure.bbox.width:
             return
         legend.remove()
 

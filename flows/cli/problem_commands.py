@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 _USUAL: Final = SolveOptions()
 _LEAST_LATERAL: Final = 0.05  # m/s²: a smaller acceleration to the side is not told
-_LEAST_BACKWARDS: Final = 0.05  # m: less is not worth saying
 
 
 def draw(
@@ -77,6 +76,7 @@ def plan(
         options: How the problem is solved.
     """
     from tasks.requests.assistant import Assistant
+    from tasks.requests.plan_answers import LEAST_BACKWARDS_M
     from tasks.requests.plan_one import plan_one
     from tasks.settings.errors import RunError
 
@@ -90,7 +90,7 @@ def plan(
         times = f"{1e3 * attempt.planning_seconds:.2f} ms, {attempt.length_m:.1f} m, {found.duration_s:.1f} s"
         gears = answer["gear_changes"]
         changes = f", {gears} change{'s' * (gears > 1)} of gear" if gears else ""
-        if answer["backwards_m"] >= _LEAST_BACKWARDS:
+        if answer["backwards_m"] >= LEAST_BACKWARDS_M:
             changes += f", {answer['backwards_m']:.1f} m backwards"
         if answer["cost_s"] != found.duration_s:
             changes += f", costs {answer['cost_s']:.1f} s"

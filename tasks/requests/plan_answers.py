@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from planners.search.free_goal import lacks_room
 from planners.search.outcome import MEANINGS, Status
@@ -13,6 +13,8 @@ from planners.world.geometry.collision import scene_of
 from planners.world.problem import Problem
 from planners.world.vehicles.vehicle import Vehicle
 from storage.exchange.plans import PlanRecord, plan_fields, write_plan
+
+LEAST_BACKWARDS_M: Final = 0.05  # less is not worth saying
 
 
 def write_answer_file(out: Path | None, record: PlanRecord) -> Path | None:

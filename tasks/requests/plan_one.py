@@ -10,12 +10,19 @@ from planners.attempt import TIMED_PARTS, Attempt
 from planners.explanation import MovedDrive, parts_found, recollections
 from planners.memory.memory import Memory
 from planners.world.alignment import from_canonical, to_canonical
+from planners.world.driving_cost import metres_backwards
 from planners.world.problem import Plan, Problem
 from storage.exchange.problems import read_problem
 from tasks.attempts.timing import no_garbage_collection
 from tasks.inputs.gained_on_the_job import Solved, remember
 from tasks.requests.assistant import Assistant
-from tasks.requests.plan_answers import meaning_of, no_plan, plan_answer, write_answer_file
+from tasks.requests.plan_answers import (
+    LEAST_BACKWARDS_M,
+    meaning_of,
+    no_plan,
+    plan_answer,
+    write_answer_file,
+)
 from tasks.requests.waiting import told_meanwhile
 from tasks.settings.checks import check_plan_outputs
 from tasks.settings.run_settings import UNASSISTED
@@ -76,7 +83,9 @@ def plan_one(
         from dashboards.figures.style import save_picture
 
         driven = "" if plan is None else f"{attempt.length_m:.1f} m, {plan.duration_s:.1f} s, "
-        caption = f"{driven}{attempt.source or attempt.status}"
+        back = 0.0 if plan is None else record.scale * metres_backwards(plan, assistant.vehicle)
+        backwards = f", {back:.1f} m backwards" if back >= LEAST_BACKWARDS_M else ""
+        caption = f"{driven}{attempt.source or attempt.status}{backwards}"
         moved = None if drive is None else from_canonical(drive.stored, to_canonical(problem)[1])
         figure = picture(
             *(problem, plan, caption, recalled, assistant.vehicle), collisions=explained, moved=moved

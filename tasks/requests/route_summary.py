@@ -16,6 +16,7 @@ from planners.world.driving_cost import cost_of, cusps_of, metres_backwards
 from planners.world.problem import Plan
 from planners.world.vehicles.vehicle import Vehicle
 from tasks.requests.assistant import Assistant
+from tasks.requests.plan_answers import LEAST_BACKWARDS_M
 
 SOURCES: Final = ("recalled", "repaired", "searched")
 HEADINGS: Final = ("leg", "source", "driven m", "braking m", "s", "from m/s", "planning ms", "retrieval ms")
@@ -84,7 +85,7 @@ def route_summary(
     from_memory = legs_from_memory(route)
     length = _rounded(scale * plan.length_m)
     back = scale * metres_backwards(plan, assistant.vehicle)
-    backwards = f" ({_rounded(back)} m backwards)" if back >= 0.05 else ""
+    backwards = f" ({_rounded(back)} m backwards)" if back >= LEAST_BACKWARDS_M else ""
     whole = f"{length} m{backwards} in {_rounded(plan.duration_s)} s, {_count(len(legs), 'leg')}"
     whole += f", {from_memory} from memory" * has_memory
     changes = len(cusps_of(plan, assistant.vehicle))

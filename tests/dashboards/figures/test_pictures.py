@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation, Text
 from shapely import Polygon, affinity, box
 
+from dashboards.figures.manoeuvre_picture import BACKWARDS, FORWARDS
 from dashboards.figures.pictures import Example, draw_plan, draw_recalled, gallery, picture
 from dashboards.figures.style import save
 from dashboards.world_outlines import (
@@ -23,6 +24,7 @@ from dashboards.world_outlines import (
     goal_tip,
     speed_tip,
 )
+from planners.world.driving_cost import cusps_of
 from planners.world.geometry.collision import scene_of
 from planners.world.problem import (
     BOUNDS,
@@ -190,6 +192,17 @@ def test_a_stored_drive_that_was_moved_is_drawn_and_named(straight: Plan) -> Non
     (way,) = (line for line in both.axes[0].lines if line.is_dashed())
     assert np.array_equal(way.get_xydata(), straight.states[:, :2])
     assert not any(line.is_dashed() for line in plain.axes[0].lines)
+
+
+def test_a_drive_to_a_place_shows_where_it_leads_backwards() -> None:
+    """It begins backwards, and changes gear once."""
+    controls = np.concatenate([np.tile([-1.0, 0.0], (10, 1)), np.tile([1.0, 0.0], (30, 1))])
+    plan = Plan(simulate(start_state(problem(), CAR), controls, CAR), controls)
+    axes = picture(problem(), plan, "").axes[0]
+    ways = {line.get_color(): line.get_xydata() for line in axes.lines if line.get_linestyle() == "-"}
+    (cusp,) = cusps_of(plan)
+    assert np.array_equal(ways[BACKWARDS], plan.states[: cusp + 1, :2])
+    assert np.array_equal(ways[FORWARDS], plan.states[cusp:, :2])
 
 
 def test_a_plan_of_one_state_can_be_drawn() -> None:
