@@ -109,8 +109,9 @@ def route_summary(
         if not stop.is_pose
     ]
     if off:
-        places = f"the place{'s' * (len(off) > 1)} asked for; --goal-radius says how far that may be"
-        lines.append(f"stops {', '.join(off)} from {places}")
+        allowed = scale * max(stop.radius for stop in stops if not stop.is_pose)
+        place = f"the place{'s' * (len(off) > 1)} asked for"
+        lines.append(f"stops {', '.join(off)} from {place}; --goal-radius allows {allowed:g} m")
     if has_memory:
         share = (sum(by_source["recalled"]) + sum(by_source["repaired"])) / max(plan.length_m, 1e-9)
         lines.append(
