@@ -59,7 +59,9 @@ def narrowest_gap(world: OccupancyMap, start: Point, goal: Point, reach: float) 
 
 def _widest_near(world: OccupancyMap, clear: Floats, place: Point, reach: float) -> tuple[int, int]:
     """The cell ``(row, column)`` with most room within some metres of a place."""
+    rows, columns = clear.shape
     column, row = (int(each / world.resolution) for each in place)
+    column, row = min(column, columns - 1), min(row, rows - 1)
     around = int(reach / world.resolution)
     low, left = max(row - around, 0), max(column - around, 0)
     window = clear[low : row + around + 1, left : column + around + 1]

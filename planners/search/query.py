@@ -49,8 +49,8 @@ NO_GUIDE = Guide(np.empty((0, 2)), np.zeros(1, np.int32), np.empty(0), 0.1, 0)
 class Limits:
     """When to give up. Expansions decide the result; seconds only guard against a machine's bad day.
 
-    Where a vehicle's drives cost more than time, what is searched twice has the expansions twice; what takes
-    longer than expected is improved with as many again at most.
+    Where a vehicle's drives cost more than time, what is searched two or three times has the expansions as
+    often; what takes longer than expected is improved with as many again at most.
     """
 
     expansions: int = 20_000

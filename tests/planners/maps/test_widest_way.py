@@ -47,3 +47,8 @@ def test_of_two_walls_the_narrower_door_counts(one: int, other: int) -> None:
 def test_where_no_wall_is_or_no_door_there_is_no_gap() -> None:
     assert narrowest_gap(walls(), START, GOAL, 1.0) is None
     assert narrowest_gap(walls([]), START, GOAL, 1.0) is None
+
+
+def test_places_at_the_edge_of_a_coarse_map_are_on_it() -> None:
+    gap = narrowest_gap(walls([(20, 30)]), START, (20.0, 16.0), 0.01)
+    assert gap is None  # the corner is narrower than the door
